@@ -1,0 +1,1 @@
+"""What a thing does in time: effects, mechanisms, memoryless and hysteretic elements, the PID."""

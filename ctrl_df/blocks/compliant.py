@@ -1,0 +1,132 @@
+"""The compliant form of a mechanism, for ordinary ODE solvers.
+
+An ODE right-hand side cannot hold a body still against an unknown force, nor reverse a velocity in no time.
+Here sticking becomes creep and impact a short spring contact:
+
+- dry friction rises linearly up to the speed ``ctrl_df.stick_velocity`` (default 1e-4 m/s): a stuck body creeps
+  at up to that speed; the static level holds only below it;
+- contacts are springs and dampers whose stiffness makes a contact last ``ctrl_df.contact_time`` (default 1 ms)
+  and whose damping gives the stated restitution: a body pressed on by a steady force F sinks in by F/stiffness;
+- delays become first-order Pade elements: right up to about 0.5/delay rad/s.
+
+Both settings live in ``control.config.defaults``. The exact laws are what `ctrl_df.event_response` runs.
+"""
+
+from __future__ import annotations
+
+import math
+
+import control as ct
+
+from .core import ELASTIC, IMPACT, RIGID, Core, level
+from .primitives import Delay, Lag, Play, Primitive, Ramp, RateLimiter
+
+DEFAULTS = {"ctrl_df.stick_velocity": 1e-4, "ctrl_df.contact_time": 1e-3}
+for _key, _value in DEFAULTS.items():
+    ct.config.defaults.setdefault(_key, _value)
+
+
+def rates(core: Core, t: float, x, u: float) -> list[float]:
+    """Return dx/dt of the compliant form for force input `u` [N]."""
+    dx = [0.0] * core.nstates
+    driven = core.driven
+    force = [0.0] * core.bodies
+    force[driven] = run_channel(core.input_channel, t, x, u, dx)
+    for term in core.forces:
+        b, z = term.body, term.state
+        z_rate = [0.0] * term.effect.states
+        law = type(term.effect).law
+        force[b] += law(t, x[2 * b], x[2 * b + 1], x[z : z + term.effect.states], term.effect.values, z_rate)  # type: ignore[misc]
+        dx[z : z + term.effect.states] = z_rate
+    for b in range(core.bodies):
+        carried = core.bristle is not None and b == driven
+        force[b] += _bristle(core, x, dx) if carried else _creep(core.friction[b], x[2 * b + 1])
+    _joint(core, x, force)
+    _stops(core, x, force)
+    for b in range(core.bodies):
+        dx[2 * b] = x[2 * b + 1]
+        dx[2 * b + 1] = force[b] / core.masses[b]
+    if core.joint == RIGID:
+        a = sum(force) / sum(core.masses)
+        dx[1] = dx[3] = a
+    run_channel(core.output_channel, t, x, x[2 * core.measured], dx)
+    return dx
+
+
+def outputs(core: Core, t: float, x) -> list[float]:
+    """Return x, v (of the measured body; x through the sensor channel) and, with two bodies, x_motor, v_motor."""
+    m = core.measured
+    y = [run_channel(core.output_channel, t, x, x[2 * m], [0.0] * core.nstates), x[2 * m + 1]]
+    return y + [x[2], x[3]] if core.bodies == 2 else y
+
+
+def run_channel(channel: tuple[tuple[Primitive, int], ...], t: float, x, u: float, dx) -> float:
+    """Pass a signal through the elements of a channel; writes the rates of their states into `dx`."""
+    for element, state in channel:
+        if isinstance(element, Lag):
+            dx[state] = (u - x[state]) / element.time_constant
+            u = x[state]
+        elif isinstance(element, Delay):
+            if element.delay > 0:
+                dx[state] = (u - x[state]) * 2 / element.delay
+                u = 2 * x[state] - u
+        elif isinstance(element, Ramp):
+            u = u + element.offset + element.rate * t
+        elif isinstance(element, Play | RateLimiter):
+            raise TypeError(f"{type(element).__name__} is no channel element; use it as a block of its own.")
+        else:
+            u = float(element.value(u))
+    return u
+
+
+def _creep(friction, v):
+    if not friction:
+        return 0.0
+    vs = ct.config.defaults["ctrl_df.stick_velocity"]
+    direction = 1.0 if v >= 0 else -1.0
+    kinetic = level(friction, 1.0, direction, abs(v))
+    static = level(friction, 0.0, direction, 0.0)
+    if abs(v) < vs:
+        return -static * v / vs
+    return -direction * (kinetic + (static - kinetic) * math.exp(-abs(v) / vs + 1))
+
+
+def _bristle(core, x, dx):
+    bristle, s, v = core.bristle, core.bristle_state, x[2 * core.driven + 1]
+    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v)) + bristle.level
+    dx[s] = type(bristle).rate(v, x[s], g, bristle.values)
+    return -(bristle.stiffness * x[s] + bristle.damping * dx[s])
+
+
+def _joint(core, x, force):
+    if core.joint not in (IMPACT, ELASTIC):
+        return
+    delta, rate = x[2] - x[0], x[3] - x[1]
+    bend = delta - min(max(delta, 0.0), core.gap)
+    if core.joint == ELASTIC:
+        k, c = core.stiffness, core.damping
+        f = k * bend + (c * rate if bend != 0 or core.gap == 0 else 0.0)
+    else:
+        f = _contact(bend, rate, core.masses[0] * core.masses[1] / sum(core.masses), core.restitution)
+    force[0] += f
+    force[1] -= f
+
+
+def _stops(core, x, force):
+    if core.stop is None:
+        return
+    b = core.driven
+    low, high = core.stop.span
+    bend = x[2 * b] - min(max(x[2 * b], low), high)
+    force[b] -= _contact(bend, x[2 * b + 1], core.masses[b], core.stop.restitution)
+
+
+def _contact(bend, rate, mass, restitution):
+    """Force of a contact compressed by `bend`; never pulls."""
+    if bend == 0.0:
+        return 0.0
+    loss = -math.log(max(restitution, 1e-3))
+    omega = math.sqrt(math.pi**2 + loss**2) / ct.config.defaults["ctrl_df.contact_time"]
+    zeta = loss / math.sqrt(math.pi**2 + loss**2)
+    f = mass * (omega**2 * bend + 2 * zeta * omega * rate)
+    return f if f * bend > 0 else 0.0

@@ -1,0 +1,138 @@
+"""A mechanism as numbers: what the event engine and the compliant form both read.
+
+Bodies are numbered from the output side: body 0 carries the output `x`; in a two-mass block body 1 is the
+motor, which the force drives. States: ``x, v`` of body 0, then of body 1, then the internal states of force
+effects, the bristle's deflection, and one state for every lag or delay of the channels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from .effect import Effect
+from .effects import Backlash, Bristle, Compliance, HardStop
+from .primitives import Delay, Lag, Play, Primitive, RateLimiter
+
+RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
+
+
+@dataclass(frozen=True)
+class ForceTerm:
+    """A smooth force on one body, with the offset of its internal states."""
+
+    effect: Effect
+    body: int
+    state: int
+
+
+@dataclass(frozen=True)
+class Core:
+    """Masses, laws, contacts and channels of one mechanism."""
+
+    masses: tuple[float, ...]
+    joint: str | None
+    forces: tuple[ForceTerm, ...]
+    friction: tuple[tuple[Effect, ...], ...]
+    gap: float = 0.0
+    restitution: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    stop: HardStop | None = None
+    bristle: Bristle | None = None
+    bristle_state: int = -1
+    input_channel: tuple[tuple[Primitive, int], ...] = ()
+    output_channel: tuple[tuple[Primitive, int], ...] = ()
+    measured: int = 0
+    nstates: int = 2
+    state_names: tuple[str, ...] = field(default=("x", "v"))
+
+    @property
+    def bodies(self) -> int:
+        """Number of bodies, 1 or 2."""
+        return len(self.masses)
+
+    @property
+    def driven(self) -> int:
+        """Index of the body the force acts on."""
+        return self.bodies - 1
+
+
+def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effect], measured: str) -> Core:
+    """Lay out states and sort effects by role; `masses` is (mass,) or (load, motor)."""
+    backlash = _only(effects, Backlash)
+    compliance = _only(effects, Compliance)
+    joint: str | None = None
+    if compliance is not None:
+        joint = ELASTIC
+    elif backlash is not None:
+        joint = IMPACT
+    elif two_mass:
+        joint = RIGID
+    if joint is not None and not two_mass:
+        share = (compliance or backlash).load_fraction  # type: ignore[union-attr]
+        masses = (share * masses[0], (1 - share) * masses[0])
+    motor = len(masses) - 1
+    names = ["x", "v"] + (["x_motor", "v_motor"] if motor else [])
+
+    forces = []
+    friction: list[list[Effect]] = [[] for _ in masses]
+    for effect in effects:
+        body = 0 if effect.side == "load" else motor
+        if effect.role == "force":
+            forces.append(ForceTerm(effect, body, len(names)))
+            names += [f"{effect.id}_{i}" for i in range(effect.states)]
+        elif effect.role == "friction":
+            friction[body].append(effect)
+    bristle, bristle_state = _only(effects, Bristle), -1
+    if bristle is not None:
+        bristle_state = len(names)
+        names.append("bristle")
+    channels: dict[str, list[tuple[Primitive, int]]] = {"input": [], "output": []}
+    for effect in effects:
+        if effect.role in channels:
+            for primitive in effect.channel():
+                has_state = isinstance(primitive, Lag | Delay | Play | RateLimiter)
+                channels[effect.role].append((primitive, len(names) if has_state else -1))
+                if has_state:
+                    names.append(effect.id)
+    return Core(
+        masses=tuple(map(float, masses)),
+        joint=joint,
+        forces=tuple(forces),
+        friction=tuple(tuple(sorted(group, key=lambda e: e.rank)) for group in friction),
+        gap=backlash.gap if backlash else 0.0,
+        restitution=backlash.restitution if backlash else 0.0,
+        stiffness=compliance.stiffness if compliance else 0.0,
+        damping=compliance.damping if compliance else 0.0,
+        stop=_only(effects, HardStop),
+        bristle=bristle,
+        bristle_state=bristle_state,
+        input_channel=tuple(channels["input"]),
+        output_channel=tuple(channels["output"]),
+        measured=motor if measured == "motor" else 0,
+        nstates=len(names),
+        state_names=tuple(_unique(names)),
+    )
+
+
+def level(effects: Sequence[Effect], moving: float, direction: float, speed: float) -> float:
+    """Dry friction level [N] of a chain of friction effects."""
+    value = 0.0
+    for effect in effects:
+        value = type(effect).law(moving, direction, speed, value, effect.values)  # type: ignore[misc]
+    return value
+
+
+def _only(effects, cls):
+    found = [e for e in effects if isinstance(e, cls)]
+    if len(found) > 1:
+        raise ValueError(f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters.")
+    return found[0] if found else None
+
+
+def _unique(names):
+    seen: dict[str, int] = {}
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        yield name if seen[name] == 1 else f"{name}_{seen[name]}"

@@ -1,0 +1,140 @@
+"""What an effect is, and the library of effects that users may extend.
+
+An effect is one piece of physics that can be added to an inertia. It is a frozen dataclass whose fields are
+declared with `parameter`; its class states the role and the law. The law is a plain function of floats that
+numba can compile; it then runs at full speed inside the event engine, and the same function serves the
+ordinary ``updfcn``. A law numba cannot compile still runs, slowly.
+
+============  ==================================================================================
+role          what the class provides
+============  ==================================================================================
+``force``     ``law(t, x, v, z, p, dz) -> force`` [N] along +x, smooth; ``states`` internal states
+              z, whose rates the law writes into dz
+``friction``  ``law(moving, direction, speed, base, p) -> level`` [N]: the dry friction level given the
+              level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static
+``contact``   known to the engine: `HardStop`, `Backlash`
+``coupling``  known to the engine: `Compliance`
+``presliding`` known to the engine: `Bristle`
+``input``     ``channel() -> tuple of primitives`` that the applied force passes through
+``output``    ``channel() -> tuple of primitives`` that the measured position passes through
+============  ==================================================================================
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from .parameter import Parameter, checked
+from .primitives import Primitive
+
+ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
+
+_LIBRARY: dict[str, type[Effect]] = {}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Base of every effect; see the module docstring for what a subclass states.
+
+    Attributes
+    ----------
+    id : str
+        Canonical name, the class name in snake_case.
+    role : str
+        One of `ROLES`.
+    shows : str
+        How the effect shows in the residual of a model without it, in plain words.
+    source : str
+        Where the law comes from.
+    rank : int
+        Order among friction effects: levels that add (0) before laws that shape them (1).
+    side : str
+        The body it acts on in a two-mass block: ``motor`` or ``load``.
+    states : int
+        Internal states of a force law.
+    """
+
+    id: ClassVar[str] = ""
+    role: ClassVar[str] = ""
+    shows: ClassVar[str] = ""
+    source: ClassVar[str] = ""
+    rank: ClassVar[int] = 0
+    side: ClassVar[str] = "motor"
+    states: ClassVar[int] = 0
+    law: ClassVar[Callable | None] = None
+
+    def __init_subclass__(cls, **kwargs):
+        super().__init_subclass__(**kwargs)
+        cls.id = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            spec = field.metadata.get("parameter")
+            if spec is not None:
+                value = checked(type(self).__name__, field.name, getattr(self, field.name), spec, self.remedy)
+                object.__setattr__(self, field.name, value)
+        self.check()
+
+    remedy: ClassVar[str] = ""
+
+    def check(self) -> None:
+        """Raise ValueError where parameters contradict each other; the base class has nothing to check."""
+
+    def channel(self) -> tuple[Primitive, ...]:
+        """Return the primitives of an input or output effect, in the order the signal passes them."""
+        raise NotImplementedError(f"{type(self).__name__} has role {self.role!r}, which is no channel.")
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Its parameters by field name."""
+        return {
+            f.name: Parameter(getattr(self, f.name), **f.metadata["parameter"])
+            for f in dataclasses.fields(self)
+            if "parameter" in f.metadata
+        }
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Parameter values in declaration order: the `p` its law sees."""
+        return tuple(getattr(self, f.name) for f in dataclasses.fields(self) if "parameter" in f.metadata)
+
+    def replace(self, **changes: Any) -> Effect:
+        """Return the same effect with other parameter values."""
+        return dataclasses.replace(self, **changes)
+
+
+def register_effect(cls: type[Effect]) -> type[Effect]:
+    """Class decorator: add an effect to the library, so that diagnosis screens it and blocks accept it.
+
+    Raises
+    ------
+    ValueError
+        If the id is taken or the role unknown.
+    """
+    if cls.role not in ROLES:
+        raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
+    known = _LIBRARY.get(cls.id)
+    if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+        raise ValueError(f"effect id {cls.id!r} is taken by {known.__module__}.{known.__qualname__}; rename the class.")
+    _LIBRARY[cls.id] = cls
+    return cls
+
+
+def effect_library() -> dict[str, type[Effect]]:
+    """Return every registered effect class by id, built-in and user-registered."""
+    return dict(_LIBRARY)
+
+
+def effect_class(effect_id: str) -> type[Effect]:
+    """Look an effect class up by id; an unknown id raises ValueError with the list of those known."""
+    try:
+        return _LIBRARY[effect_id]
+    except KeyError:
+        raise ValueError(
+            f"an effect id must be one of the library's; got {effect_id!r}. Known: {', '.join(sorted(_LIBRARY))}. "
+            "Register your own with ctrl_df.register_effect."
+        ) from None

@@ -1,0 +1,48 @@
+"""The library of effects: friction, contact, springs, input channel, sensor."""
+
+from .asymmetric_coulomb import AsymmetricCoulomb
+from .asymmetric_viscous import AsymmetricViscous
+from .backlash import Backlash
+from .bristle import Bristle
+from .compliance import Compliance
+from .constant_force import ConstantForce
+from .coulomb import Coulomb
+from .cubic_spring import CubicSpring
+from .hard_stop import HardStop
+from .input_channel import InputDeadZone, InputDelay, InputGain, InputLag, InputSaturation
+from .linear_spring import LinearSpring
+from .load_friction import LoadFriction
+from .position_ripple import PositionRipple
+from .quadratic_drag import QuadraticDrag
+from .sensor_channel import Drift, SensorDelay, SensorOffset, SensorQuantization
+from .stiction import Stiction
+from .stribeck import Stribeck
+from .viscous import Viscous
+
+__all__ = [
+    "AsymmetricCoulomb",
+    "AsymmetricViscous",
+    "Backlash",
+    "Bristle",
+    "Compliance",
+    "ConstantForce",
+    "Coulomb",
+    "CubicSpring",
+    "Drift",
+    "HardStop",
+    "InputDeadZone",
+    "InputDelay",
+    "InputGain",
+    "InputLag",
+    "InputSaturation",
+    "LinearSpring",
+    "LoadFriction",
+    "PositionRipple",
+    "QuadraticDrag",
+    "SensorDelay",
+    "SensorOffset",
+    "SensorQuantization",
+    "Stiction",
+    "Stribeck",
+    "Viscous",
+]

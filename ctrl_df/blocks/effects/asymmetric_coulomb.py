@@ -1,0 +1,35 @@
+"""Dry friction that differs by direction."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class AsymmetricCoulomb(Effect):
+    """Dry friction with unequal levels: half of `difference` more for v > 0, half of it less for v < 0.
+
+    Together with a Coulomb level this is the same map as a constant force of ``-difference/2``; alone, the
+    level it would make negative is zero.
+
+    Parameters
+    ----------
+    difference : float
+        Level for v > 0 minus level for v < 0 [N], either sign.
+    """
+
+    difference: float = parameter("N", lower=-math.inf, meaning="level for v > 0 minus level for v < 0")
+
+    role: ClassVar[str] = "friction"
+    rank: ClassVar[int] = 1
+    shows: ClassVar[str] = "a constant error whose two directions of motion do not mirror each other"
+    source: ClassVar[str] = "Janot, Gautier & Brunot (2019), asymmetric friction model"
+
+    @staticmethod
+    def law(moving, direction, speed, base, p):
+        """Return the level [N]."""
+        return max(base + 0.5 * direction * p[0], 0.0)

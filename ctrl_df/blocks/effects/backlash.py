@@ -1,0 +1,37 @@
+"""A gap between motor and load."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class Backlash(Effect):
+    """A gap between motor and load, closed by impacts with Newton's restitution.
+
+    ``0 <= x_motor - x <= gap``. Together with `Compliance` the faces are elastic and the restitution unused.
+    Added to a single `Mass`, it splits off `load_fraction` of it as the load.
+
+    Parameters
+    ----------
+    gap : float
+        Total clearance [m], > 0.
+    restitution : float
+        Rebound speed over approach speed, 0 to 1.
+    load_fraction : float
+        Share of a single mass that lies behind the gap, in (0, 1); no meaning in a two-mass block.
+    """
+
+    gap: float = parameter("m", strict=True, meaning="total clearance")
+    restitution: float = parameter("", upper=1.0, default=0.0, meaning="coefficient of restitution")
+    load_fraction: float = parameter(
+        "", strict=True, upper=0.999, default=0.5, meaning="share of a single mass behind the gap"
+    )
+
+    role: ClassVar[str] = "contact"
+    shows: ClassVar[str] = "error after reversals that lasts as long as the gap is crossed"
+    source: ClassVar[str] = "Azenha & Machado (1997), eqs. (9)-(13)"
+    remedy: ClassVar[str] = "For a tight joint leave the effect out."

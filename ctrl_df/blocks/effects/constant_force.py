@@ -1,0 +1,31 @@
+"""A constant force."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class ConstantForce(Effect):
+    """A force that is always there: gravity, an amplifier's offset.
+
+    Parameters
+    ----------
+    force : float
+        [N], positive along +x.
+    """
+
+    force: float = parameter("N", lower=-math.inf, meaning="constant force along +x")
+
+    role: ClassVar[str] = "force"
+    shows: ClassVar[str] = "an error of constant sign, in motion and at rest"
+    source: ClassVar[str] = "Newton"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        """Return the force [N]."""
+        return p[0]

@@ -1,0 +1,35 @@
+"""Coulomb friction."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class Coulomb(Effect):
+    """Dry friction of constant level; at rest it holds any force up to that level.
+
+          F│
+         K ┤──────── v > 0
+        ───┼──────── v
+    ───────┤ -K
+
+    Parameters
+    ----------
+    level : float
+        K [N], >= 0.
+    """
+
+    level: float = parameter("N", meaning="Coulomb level")
+
+    role: ClassVar[str] = "friction"
+    shows: ClassVar[str] = "a step in the error at every reversal of velocity, flat in between"
+    source: ClassVar[str] = "Azenha & Machado (1997), eq. (6)"
+
+    @staticmethod
+    def law(moving, direction, speed, base, p):
+        """Return the level [N]."""
+        return base + p[0]

@@ -1,0 +1,46 @@
+"""End stops."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class HardStop(Effect):
+    """Rigid stops at both ends of the stroke, hit with Newton's restitution.
+
+    Parameters
+    ----------
+    limit : float
+        Upper stop [m]; the lower one stands at ``-limit`` unless given.
+    restitution : float
+        Rebound speed over impact speed, 0 to 1.
+    lower : float or None
+        Lower stop [m] < limit.
+    """
+
+    limit: float = parameter("m", lower=-math.inf, meaning="upper end of the stroke")
+    restitution: float = parameter("", upper=1.0, default=0.0, meaning="coefficient of restitution")
+    lower: float | None = None
+
+    role: ClassVar[str] = "contact"
+    shows: ClassVar[str] = "error at the ends of the stroke only: the measured position stops short"
+    source: ClassVar[str] = "Newton's law of restitution"
+
+    def check(self):
+        """Check that the stroke has a length."""
+        low = self.span[0]
+        if not (math.isfinite(low) and low < self.limit):
+            raise ValueError(
+                f"HardStop needs lower < limit (a stroke of some length); got lower={low:g}, limit={self.limit:g}. "
+                "Give lower= when the stroke does not contain x = 0."
+            )
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Lower and upper stop [m]."""
+        return (-self.limit if self.lower is None else float(self.lower), self.limit)

@@ -1,0 +1,122 @@
+"""Effects on the way of the applied force: saturation, dead zone, gain, lag, delay."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+from ..primitives import Delay, Lag, PiecewiseAffine
+
+
+@register_effect
+@dataclass(frozen=True)
+class InputSaturation(Effect):
+    """The drive gives no more than `level`, in either direction.
+
+    Parameters
+    ----------
+    level : float
+        [N], > 0.
+    """
+
+    level: float = parameter("N", strict=True, meaning="largest force")
+
+    role: ClassVar[str] = "input"
+    shows: ClassVar[str] = "error when the commanded force is large: the real force has a plateau"
+    source: ClassVar[str] = "current limit of the amplifier"
+
+    def channel(self):
+        """Return the clipping line."""
+        s = self.level
+        return (PiecewiseAffine.from_corners((-s, s), (0, 1, 0), (-s, 0, s)),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class InputDeadZone(Effect):
+    """The drive gives nothing until the command exceeds `threshold`, in either direction.
+
+    Parameters
+    ----------
+    threshold : float
+        Half width of the dead zone [N], >= 0.
+    """
+
+    threshold: float = parameter("N", meaning="half width of the dead zone")
+
+    role: ClassVar[str] = "input"
+    shows: ClassVar[str] = "error when the commanded force is small, and a force short by the threshold beyond"
+    source: ClassVar[str] = "Tao & Kokotovic (1996), ch. 2"
+
+    def channel(self):
+        """Return the dead band and its two flanks."""
+        d = self.threshold
+        return (PiecewiseAffine.from_corners((-d, d), (1, 0, 1), (d, 0, -d)),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class InputGain(Effect):
+    """The drive gives `gain` times the commanded force.
+
+    Parameters
+    ----------
+    gain : float
+        Actual over nominal drive gain, > 0.
+    """
+
+    gain: float = parameter("", strict=True, meaning="actual over nominal drive gain")
+
+    role: ClassVar[str] = "input"
+    shows: ClassVar[str] = "error proportional to the applied force"
+    source: ClassVar[str] = "drive gain"
+
+    def channel(self):
+        """Return the straight line."""
+        return (PiecewiseAffine.from_corners((), (self.gain,), (0.0,)),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class InputLag(Effect):
+    """The drive's force follows the command with a first-order lag.
+
+    Parameters
+    ----------
+    time_constant : float
+        [s], > 0.
+    """
+
+    time_constant: float = parameter("s", strict=True, meaning="time constant of the drive")
+
+    role: ClassVar[str] = "input"
+    states: ClassVar[int] = 1
+    shows: ClassVar[str] = "error in phase with the rate of the applied force, at high frequency"
+    source: ClassVar[str] = "current loop of the amplifier"
+    remedy: ClassVar[str] = "For a fast drive leave the effect out."
+
+    def channel(self):
+        """Return the lag."""
+        return (Lag(self.time_constant),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class InputDelay(Effect):
+    """The force acts `delay` after the command.
+
+    Parameters
+    ----------
+    delay : float
+        [s], >= 0.
+    """
+
+    delay: float = parameter("s", meaning="dead time of the drive")
+
+    role: ClassVar[str] = "input"
+    shows: ClassVar[str] = "error proportional to the rate of the output, everywhere"
+    source: ClassVar[str] = "dead time"
+
+    def channel(self):
+        """Return the delay."""
+        return (Delay(self.delay),)

@@ -1,0 +1,34 @@
+"""A linear spring to ground."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class LinearSpring(Effect):
+    """A spring to ground, ``F = -k (x - center)``.
+
+    Parameters
+    ----------
+    stiffness : float
+        k [N/m], >= 0.
+    center : float
+        Position of zero force [m].
+    """
+
+    stiffness: float = parameter("N/m", meaning="spring stiffness")
+    center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
+
+    role: ClassVar[str] = "force"
+    shows: ClassVar[str] = "error proportional to position"
+    source: ClassVar[str] = "Hooke"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        """Return the force [N]."""
+        return -p[0] * (x - p[1])

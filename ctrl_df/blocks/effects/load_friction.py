@@ -1,0 +1,31 @@
+"""Dry friction on the load side."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class LoadFriction(Effect):
+    """Coulomb friction that acts on the load, behind the joint; on a rigid block it is the same as `Coulomb`.
+
+    Parameters
+    ----------
+    level : float
+        Level [N], >= 0.
+    """
+
+    level: float = parameter("N", meaning="Coulomb level on the load")
+
+    role: ClassVar[str] = "friction"
+    side: ClassVar[str] = "load"
+    shows: ClassVar[str] = "a step in the error when the load reverses, later than the motor does"
+    source: ClassVar[str] = "Azenha & Machado (1997), eq. (6), on mass M1"
+
+    @staticmethod
+    def law(moving, direction, speed, base, p):
+        """Return the level [N]."""
+        return base + p[0]

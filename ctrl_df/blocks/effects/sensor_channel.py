@@ -1,0 +1,98 @@
+"""Effects on the way of the measured position: delay, quantization, offset, drift."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+from ..primitives import Delay, Quantizer, Ramp
+
+
+@register_effect
+@dataclass(frozen=True)
+class SensorDelay(Effect):
+    """The position is reported `delay` late.
+
+    Parameters
+    ----------
+    delay : float
+        [s], >= 0.
+    """
+
+    delay: float = parameter("s", meaning="delay of the sensor")
+
+    role: ClassVar[str] = "output"
+    shows: ClassVar[str] = "error proportional to velocity in the measured position"
+    source: ClassVar[str] = "dead time"
+
+    def channel(self):
+        """Return the delay."""
+        return (Delay(self.delay),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class SensorQuantization(Effect):
+    """The position is reported in steps.
+
+    Parameters
+    ----------
+    step : float
+        [m], > 0.
+    """
+
+    step: float = parameter("m", strict=True, meaning="resolution of the sensor")
+
+    role: ClassVar[str] = "output"
+    shows: ClassVar[str] = "an error that jumps by one step and never exceeds half of it"
+    source: ClassVar[str] = "encoder"
+    remedy: ClassVar[str] = "For a fine encoder leave the effect out."
+
+    def channel(self):
+        """Return the rounding."""
+        return (Quantizer(self.step),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class SensorOffset(Effect):
+    """The reported position is shifted by a constant.
+
+    Parameters
+    ----------
+    offset : float
+        Reported minus true position [m].
+    """
+
+    offset: float = parameter("m", lower=-math.inf, meaning="reported minus true position")
+
+    role: ClassVar[str] = "output"
+    shows: ClassVar[str] = "a constant error of position"
+    source: ClassVar[str] = "zero of the scale"
+
+    def channel(self):
+        """Return the shift."""
+        return (Ramp(self.offset),)
+
+
+@register_effect
+@dataclass(frozen=True)
+class Drift(Effect):
+    """The reported position runs away at a constant rate.
+
+    Parameters
+    ----------
+    rate : float
+        [m/s].
+    """
+
+    rate: float = parameter("m/s", lower=-math.inf, meaning="rate of the sensor's drift")
+
+    role: ClassVar[str] = "output"
+    shows: ClassVar[str] = "an error of position that grows in proportion to time"
+    source: ClassVar[str] = "thermal drift of the sensor"
+
+    def channel(self):
+        """Return the ramp."""
+        return (Ramp(0.0, self.rate),)

@@ -1,0 +1,33 @@
+"""Static friction above the kinetic level."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class Stiction(Effect):
+    """Static friction: a body at rest breaks away only above `level`; once moving, the kinetic level holds.
+
+    Parameters
+    ----------
+    level : float
+        Breakaway level Ks [N], >= the kinetic level of the block it is added to.
+    """
+
+    level: float = parameter("N", meaning="breakaway level")
+
+    role: ClassVar[str] = "friction"
+    rank: ClassVar[int] = 1
+    shows: ClassVar[str] = "error just after standstill: the real mass stays longer at rest, then jumps off"
+    source: ClassVar[str] = "Karnopp (1985)"
+
+    @staticmethod
+    def law(moving, direction, speed, base, p):
+        """Return the level [N]."""
+        if moving > 0.5:
+            return base
+        return max(base, p[0])

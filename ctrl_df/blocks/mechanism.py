@@ -1,0 +1,298 @@
+"""Inertias with effects: `Mass`, `TwoMass`, and the factories of the paper's two mechanisms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from . import compliant
+from .core import Core, build_core, level
+from .effect import Effect
+from .effects import Backlash, Coulomb, Stiction, Stribeck, Viscous
+from .parameter import Parameter, checked
+
+_MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
+
+
+class Mechanism(ct.NonlinearIOSystem):
+    """An inertia plus a tuple of effects; a value, and a pure function of ``(t, x, u, params)``.
+
+    Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form of `ctrl_df.blocks.compliant`; the event engine
+    runs the exact laws.
+    """
+
+    _inertias: tuple[str, ...] = ()
+
+    def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
+        owner = type(self).__name__
+        self._values = {k: checked(owner, k, v, {**_MASS, "meaning": k.replace("_", " ")}) for k, v in inertias.items()}
+        self._effects = _as_effects(effects)
+        if measured not in ("load", "motor"):
+            raise ValueError(f"{owner} needs measured='load' or 'motor' (the body the sensor sees); got {measured!r}.")
+        self._measured = measured
+        self._keys = _effect_keys(self._effects)
+        _check_levels(self._effects)
+        self._core = self._build(self._values, self._effects)
+        core = self._core
+        out = ["x", "v"] + (["x_motor", "v_motor"] if core.bodies == 2 else [])
+        super().__init__(
+            self._updfcn,
+            self._outfcn,
+            inputs=["F"],
+            outputs=out,
+            states=list(core.state_names),
+            dt=0,
+            name=name,
+            params={key: p.value for key, p in self.parameters.items()},
+        )
+
+    def _build(self, values, effects) -> Core:
+        masses = tuple(values[k] for k in self._inertias)
+        return build_core(masses, len(masses) == 2, effects, self._measured)
+
+    # --- a value --------------------------------------------------------------------------------------
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects, in the order they were added."""
+        return self._effects
+
+    @property
+    def core(self) -> Core:
+        """The mechanism as numbers, for the engine."""
+        return self._core
+
+    @property
+    def measured(self) -> str:
+        """The body whose position is the output `x` where a joint separates two: ``load`` or ``motor``."""
+        return self._measured
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Ordered mapping of name (``mass``, ``coulomb.level``, ...) to `Parameter` (value, unit, bounds)."""
+        table = {k: Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}) for k, v in self._values.items()}
+        for key, effect in zip(self._keys, self._effects, strict=True):
+            for name, p in effect.parameters.items():
+                if name == "load_fraction" and len(self._inertias) == 2:
+                    continue
+                table[f"{key}.{name}"] = p
+        return MappingProxyType(table)
+
+    def with_effect(self, effect: Effect) -> Mechanism:
+        """Return the block with one more effect."""
+        return self._remade(self._values, (*self._effects, *_as_effects([effect])))
+
+    def without_effect(self, id: str) -> Mechanism:
+        """Return the block without the effect of that id; ValueError if it has none."""
+        if id not in self._keys:
+            raise ValueError(f"without_effect needs an id the block has ({', '.join(self._keys) or 'none'}); got {id!r}.")
+        kept = [e for k, e in zip(self._keys, self._effects, strict=True) if k != id]
+        return self._remade(self._values, kept)
+
+    def with_parameters(self, values: Mapping[str, float]) -> Mechanism:
+        """Return the block with some parameters changed; unknown names raise ValueError with those known."""
+        inertias, effects = self._changed(values)
+        return self._remade(inertias, effects)
+
+    def with_measured(self, measured: str) -> Mechanism:
+        """Return the block with its sensor on the other body (``load`` or ``motor``)."""
+        return type(self)._make(self._values, self._effects, measured)
+
+    def _changed(self, values: Mapping[str, float]):
+        known = self.parameters
+        for name in values:
+            if name not in known:
+                raise ValueError(f"a parameter name must be one of {', '.join(known)}; got {name!r}.")
+        inertias = {k: values.get(k, v) for k, v in self._values.items()}
+        effects = []
+        for key, effect in zip(self._keys, self._effects, strict=True):
+            mine = {n.split(".", 1)[1]: v for n, v in values.items() if n.startswith(key + ".")}
+            effects.append(effect.replace(**mine) if mine else effect)
+        return inertias, tuple(effects)
+
+    def _remade(self, inertias, effects) -> Mechanism:
+        return type(self)._make(inertias, effects, self._measured)
+
+    @classmethod
+    def _make(cls, inertias, effects, measured) -> Mechanism:
+        return cls(**inertias, effects=effects, measured=measured)  # type: ignore[call-arg]
+
+    def __reduce__(self):
+        return _unpickle, (type(self), self._values, self._effects, self._measured, self.name)
+
+    def __eq__(self, other: Any) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        mine = (self._values, self._effects, self._measured)
+        return mine == (other._values, other._effects, other._measured)
+
+    def __hash__(self) -> int:
+        return hash((type(self), tuple(self._values.items()), self._effects, self._measured))
+
+    def __repr__(self) -> str:
+        inertias = ", ".join(f"{k}={v:g}" for k, v in self._values.items())
+        return f"{type(self).__name__}({inertias})" + "".join(f".with_effect({e})" for e in self._effects)
+
+    # --- the dialect of python-control -------------------------------------------------------------------
+
+    def _core_for(self, params) -> Core:
+        if not params:
+            return self._core
+        known = self.parameters
+        changed = {k: float(v) for k, v in params.items() if k in known and known[k].value != v}
+        return self._core if not changed else _core_with(self, tuple(sorted(changed.items())))
+
+    def _updfcn(self, t, x, u, params):
+        return np.array(compliant.rates(self._core_for(params), t, x, float(u[0])))
+
+    def _outfcn(self, t, x, u, params):
+        return np.array(compliant.outputs(self._core_for(params), t, x))
+
+
+class Mass(Mechanism):
+    """A mass on a line, driven by a force; add physics with `with_effect`.
+
+    ``mass dv/dt = F + effects``; input ``F`` [N]; outputs ``x`` [m], ``v`` [m/s]. With `Backlash` or `Compliance`
+    the mass divides into motor and load, and ``x_motor``, ``v_motor`` are outputs too.
+
+    Parameters
+    ----------
+    mass : float
+        [kg], > 0.
+    effects : sequence of Effect
+        What acts on it.
+    measured : {'load', 'motor'}
+        Where the sensor sits once a joint divides the mass.
+    name : str
+        System name.
+
+    Raises
+    ------
+    ValueError
+        Mass not positive, contradictory effects; the message gives rule, value, remedy.
+    """
+
+    _inertias = ("mass",)
+
+    def __init__(self, mass, effects=(), *, measured="load", name=None):
+        super().__init__({"mass": mass}, effects, measured=measured, name=name)
+
+    @property
+    def mass(self) -> float:
+        """Inertia [kg]."""
+        return self._values["mass"]
+
+
+class TwoMass(Mechanism):
+    """A motor and a load on a line, rigidly joined until `Backlash` or `Compliance` loosens the joint.
+
+    Input ``F`` [N] on the motor; outputs ``x`` (load position), ``v``, ``x_motor``, ``v_motor``. Friction and springs
+    act on the motor, `LoadFriction` on the load.
+
+    Parameters
+    ----------
+    motor_mass, load_mass : float
+        [kg], > 0.
+    effects, measured, name
+        As in `Mass`.
+    """
+
+    _inertias = ("load_mass", "motor_mass")
+
+    def __init__(self, motor_mass, load_mass, effects=(), *, measured="load", name=None):
+        super().__init__({"load_mass": load_mass, "motor_mass": motor_mass}, effects, measured=measured, name=name)
+
+    @property
+    def motor_mass(self) -> float:
+        """Inertia of the motor [kg], M2 of the paper."""
+        return self._values["motor_mass"]
+
+    @property
+    def load_mass(self) -> float:
+        """Inertia of the load [kg], M1 of the paper."""
+        return self._values["load_mass"]
+
+
+def friction_mass(mass, coulomb, viscous=0.0, static=None, *, name=None) -> Mass:
+    """A mass with Coulomb and viscous friction, and stiction if `static` is given.
+
+    Parameters
+    ----------
+    mass : float
+        M [kg], > 0.
+    coulomb : float
+        Kinetic level K [N], >= 0.
+    viscous : float
+        B [N s/m], >= 0.
+    static : float or None
+        Breakaway level Ks [N], >= `coulomb`; None: no stiction (Ks = K).
+
+    References
+    ----------
+    Azenha & Machado (1997), Fig. 2 and eq. (6).
+    """
+    effects: list[Effect] = [Coulomb(coulomb), Viscous(viscous)]
+    if static is not None:
+        effects.append(Stiction(static))
+    return Mass(mass, effects, name=name)
+
+
+def backlash_masses(motor_mass, load_mass, gap, restitution=0.0, *, name=None) -> TwoMass:
+    """Two masses with a gap between them: the force drives the motor, the load is measured.
+
+    Parameters
+    ----------
+    motor_mass, load_mass : float
+        M2 and M1 of the paper [kg], > 0.
+    gap : float
+        Total clearance h [m], > 0: contact at ``x_motor = x`` and at ``x_motor = x + gap``.
+    restitution : float
+        Newton's coefficient, 0 (plastic) to 1 (elastic).
+
+    References
+    ----------
+    Azenha & Machado (1997), Fig. 6 and eqs. (9)-(13).
+    """
+    return TwoMass(motor_mass, load_mass, [Backlash(gap, restitution)], name=name)
+
+
+def _unpickle(cls, inertias, effects, measured, name):
+    return cls(**inertias, effects=effects, measured=measured, name=name)
+
+
+@lru_cache(maxsize=64)
+def _core_with(block: Mechanism, changed) -> Core:
+    inertias, effects = block._changed(dict(changed))
+    return block._build(inertias, effects)
+
+
+def _as_effects(effects) -> tuple[Effect, ...]:
+    effects = tuple(effects)
+    for effect in effects:
+        if not isinstance(effect, Effect):
+            raise TypeError(f"an effect must be an instance of a ctrl_df Effect, e.g. Coulomb(5); got {effect!r}.")
+    return effects
+
+
+def _effect_keys(effects) -> tuple[str, ...]:
+    keys: list[str] = []
+    for effect in effects:
+        count = sum(e.id == effect.id for e in effects[: len(keys)])
+        keys.append(effect.id if count == 0 else f"{effect.id}_{count + 1}")
+    return tuple(keys)
+
+
+def _check_levels(effects) -> None:
+    base = [e for e in effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
+    kinetic = level(base, 1.0, 1.0, 0.0)
+    for effect in effects:
+        if isinstance(effect, Stiction | Stribeck) and effect.level < kinetic:
+            raise ValueError(
+                f"a static level must be >= the Coulomb level of the block; got {effect.id} level {effect.level:g} "
+                f"below {kinetic:g}. Without stiction leave it out (static=None)."
+            )

@@ -1,0 +1,36 @@
+"""How a computation ended: every member's value is the message and the remedy."""
+
+from enum import Enum
+
+
+class Status(Enum):
+    """Why a solver stopped; ``status.ok`` tells success, ``str(status)`` the message with its remedy."""
+
+    CONVERGED = "converged"
+    NO_SOLUTION = "the whole box was scanned and holds no solution"
+    WORK_LIMIT = (
+        "stopped at the bound on work (steps or events); raise max_steps, loosen rtol, or shorten the time span"
+    )
+    DIVERGED = (
+        "the state left every bound (overflow or NaN): the loop is unstable from here; "
+        "lower the gains or start nearer to rest"
+    )
+    CHATTERING = (
+        "the switching element chatters: infinitely many switches in finite time (a sliding mode); "
+        "give the relay a hysteresis or the loop a lag"
+    )
+    STEP_TOO_SMALL = (
+        "the step fell below the resolution of time: the law is not continuous between its stated corners; "
+        "state its corners, or loosen rtol"
+    )
+    USER_ERROR = "a user-written law or system raised or returned NaN; see the exception it carries"
+    NOT_CONVERGED = "no periodic orbit was reached within the iterations allowed; start nearer or raise max_iterations"
+    NO_PERIOD = "the motion from this start settles to no period; averages over many periods are given instead"
+
+    @property
+    def ok(self) -> bool:
+        """Whether the computation reached what was asked."""
+        return self in (Status.CONVERGED, Status.NO_SOLUTION)
+
+    def __str__(self) -> str:
+        return self.value
