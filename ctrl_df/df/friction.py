@@ -1,20 +1,22 @@
 """Describing functions of a mass with dry and viscous friction, in closed form.
 
-With theta = omega t, kappa = K/a, sigma = Ks/a, beta = B/(M omega) and the velocity u in units of a/(M omega),
-a mass that slides forward obeys
+With theta = omega t, kappa = K/a, sigma = Ks/a, beta = B/(M omega) and the velocity u in units of
+a/(M omega), a mass that slides forward obeys
 
     du/dtheta + beta u = cos(theta) - kappa
 
 and three numbers (kappa, sigma, beta) decide everything. All motions are half-wave symmetric:
 
 - *stuck*, sigma >= 1: the force never reaches the static level;
-- *slip*: the mass reverses without stopping. Its phase psi0 follows from u(psi0) = u(psi0 + pi) = 0
-  (Azenha & Machado 1997, eqs. 6-8, give the steady state this closes);
-- *stick-slip*: it breaks away at psi_s = -arccos(sigma), slides until u = 0 and waits for the next half period.
+- *slip*: the mass reverses without stopping. Its phase psi0 follows from u(psi0) = u(psi0 + pi) = 0, which
+  fixes the constants that eq. (6) of Azenha & Machado (1997) leaves open;
+- *stick-slip*: it breaks away at psi_s = -arccos(sigma), slides until u = 0 and waits for the next half
+  period.
 
 The arc that starts from rest at psi_s decides between the last two: u(psi_s + pi) > 0 means it never stops.
-A mass cannot slip backward before the mirrored breakaway, because friction and damping end the arc at or before
-psi_s + pi + 2 arccos(sigma), where the force has just reached -Ks.
+An arc from breakaway never outlasts the reversed force: without friction and damping it ends at the phase
+pi + arccos(sigma), where the force falls below Ks again, and either one ends it earlier. So no motion is
+one-sided, and a mass that stops before psi_s + pi stops under less than Ks.
 
 The harmonics need no velocity, only the force along the arc: as u vanishes at both of its ends,
 (jk + beta) int u e^{-jk theta} = int (cos(theta) - kappa) e^{-jk theta}.
@@ -39,7 +41,7 @@ _PANEL = 8.0  # phase [rad] of the highest harmonic that 16 nodes integrate to 1
 
 
 def friction_family(mass, coulomb, viscous, static, A, omega, orders=9):
-    """Harmonics of the position of a mass under ``F = a cos(omega t)`` with Coulomb, viscous and static friction.
+    """Harmonics of the position of a mass with dry and viscous friction under ``F = a cos(omega t)``.
 
     Parameters
     ----------
@@ -57,13 +59,14 @@ def friction_family(mass, coulomb, viscous, static, A, omega, orders=9):
     Returns
     -------
     harmonics : complex array (na, nw, orders + 1)
-        X_k/a [m/N], x = Re sum X_k e^{jk omega t}; index 1 is N(a, omega). Even orders are zero by symmetry, and so
-        is index 0 by convention (the mean position is wherever the mass started). NaN where the mass is stuck.
+        X_k/a [m/N], x = Re sum X_k e^{jk omega t}; index 1 is N(a, omega). Even orders are zero by
+        symmetry, and so is index 0 by convention (the mean position is wherever the mass started). NaN
+        where the mass is stuck.
     regime : int8 array (na, nw)
         Index into `FRICTION_REGIMES`.
     residual : float array (na, nw)
-        Velocity left at the end of the half period (slip) or of the arc (stick-slip), over the velocity at
-        F = K, which is at most the peak. NaN where stuck.
+        Velocity left at the end of the half period (slip) or of the arc (stick-slip), over the peak velocity
+        (the peak within a factor of two). NaN where stuck.
 
     Raises
     ------
@@ -102,7 +105,9 @@ def positive_axis(name, values, unit):
         raise ValueError(f"a family needs {name} as a non-empty 1-D array [{unit}]; got shape {axis.shape}.")
     bad = axis[~((axis > 0) & np.isfinite(axis))]
     if bad.size:
-        raise ValueError(f"a family needs {name} > 0 and finite [{unit}]; got {name}={bad[0]:g}. Leave that point out.")
+        raise ValueError(
+            f"a family needs {name} > 0 and finite [{unit}]; got {name}={bad[0]:g}. Leave that point out."
+        )
     return axis
 
 
@@ -181,16 +186,14 @@ def _slip(kappa, beta, falls, E, S, C, out):
         power *= square
     rise = cos0 - kappa
     left = rise * E + cos0 * C - sin0 * S
-    E, S, C, _, _ = _responses(beta, falls - math.atan2(sin0, cos0))
-    return abs(left) / (rise * E + cos0 * C - sin0 * S)
+    return abs(left) / _speed(rise, cos0, -sin0, beta, falls - math.atan2(sin0, cos0))
 
 
 @njit(cache=True)
 def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
     """One slip arc from rest a half period; returns the velocity left at its end, relative."""
     low, high = delta + falls, math.pi
-    E, S, C, _, _ = _responses(beta, low)
-    peak = rise * E + sigma * C + sine * S
+    peak = _speed(rise, sigma, sine, beta, low)
     # Newton from the small-angle arc without damping, or from the quasi-steady one: both lie near the root.
     s = min(0.5 * (3.0 * delta + math.sqrt(9.0 * delta * delta + 24.0 * rise)), high)
     if beta > 0.0:
@@ -220,8 +223,15 @@ def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
 
 
 @njit(cache=True)
+def _speed(rise, sigma, sine, beta, s):
+    """Peak velocity of an arc, within a factor of two: where F = K falling, or half way when overdamped."""
+    E, S, C, _, _ = _responses(beta, s if beta < 1.0 else 0.5 * s)
+    return rise * E + sigma * C + sine * S
+
+
+@njit(cache=True)
 def _long_arc(kappa, delta, s, beta, out):
-    """Closed form: the force over the arc, int (cos(theta) - kappa) e^{-jk theta}."""
+    """Integrate the force over the arc in closed form: int (cos(theta) - kappa) e^{-jk theta}."""
     middle, h = 0.5 * s - delta, 0.5 * s
     z = complex(math.cos(middle), -math.sin(middle))
     wide = complex(math.cos(h), math.sin(h))
