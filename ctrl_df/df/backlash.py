@@ -46,7 +46,7 @@ _STARTS = np.array([[_RELEASE, 0.0], [-1.0, 0.7], [0.9, 0.4], [2.2, 1.3], [-2.6,
 
 
 def backlash_family(
-    motor_mass, load_mass, gap, restitution, A, omega, orders=9, periods=1000, transient=500, progress=None
+    motor_mass, load_mass, gap, restitution, A, omega, orders=9, periods=600, transient=300, progress=None
 ):
     """Harmonics of the load position of two masses with a gap, under ``F = a cos(omega t)`` on the motor.
 
@@ -160,7 +160,7 @@ class BacklashAttractor:
     share: float
 
 
-def backlash_attractors(A, restitution, phases=8, speeds=5, periods=1000, transient=500, tol=1e-6):
+def backlash_attractors(A, restitution, phases=8, speeds=5, periods=600, transient=300, tol=1e-6):
     """List the distinct motions reached from `phases` x `speeds` impacts, most frequent first.
 
     Parameters
@@ -232,7 +232,9 @@ def _same(one, other, tol):
     if one.regime != other.regime:
         return False
     if one.regime == "aperiodic":
-        return abs(one.q - other.q) <= 3 * (one.residual + other.residual) * max(abs(1 + one.q), abs(1 + other.q))
+        return abs(one.q - other.q) <= 3 * (one.residual + other.residual) * max(
+            abs(1 + one.q), abs(1 + other.q)
+        )
     mirrored = abs(abs(one.mean) - abs(other.mean)) <= tol
     return one.period == other.period and abs(one.q - other.q) <= tol * max(1.0, abs(one.q)) and mirrored
 
@@ -303,7 +305,7 @@ def _two_impact(A, eps):
             continue
         if _stays(A, eps, -cs, -sn, eps * v):
             continue
-        kind, time, speed, _ = _flight(A, -cs, -sn, eps * v)
+        kind, time, speed = _flight(A, -cs, -sn, eps * v)
         closing = abs(time - math.pi) + abs(speed - v) / v
         if kind == 1 and closing < 1e-6:
             return True, tau, v, closing
@@ -324,34 +326,35 @@ def _two_impact_harmonics(A, eps, tau, v, out):
 
 @njit(cache=True)
 def _flight(A, c, s, w):
-    """Follow the ball from a wall to its next impact: (kind, time, speed, velocity slope by phase).
+    """Follow the ball from a wall to its next impact: (kind, time, speed).
 
     Left at speed w >= 0 in phase phi, c = cos(phi), s = sin(phi). Kind 0: back on the same wall, 1: on the
-    opposite one, 2: never. Velocity w + A (sin(theta) - s) repeats, so that extremes follow in closed form;
-    between two of them xi is monotone, and no impact, grazing included, escapes.
+    opposite one, 2: never. The velocity w + A (sin(phi + r) - s) repeats, so that the extremes of xi follow in
+    closed form; between two of them xi is monotone, and no impact, grazing included, escapes.
     """
     W = w / A
     reach = c * c + W * (2.0 * s - W)
     drift = w - A * s
     if reach <= 0.0:  # never turns back
         return _impact(A, c, s, w, 0.0, (1.0 + 2.0 * A) / drift, 1)
+    # velocity = 0 is a quadratic in tan(r/2); each root in the form that does not cancel
     D = math.sqrt(reach)
     if c >= 0.0:
-        top = 2.0 * math.atan2(c + D, 2.0 * s - W)
-        bottom = 2.0 * math.pi - 2.0 * math.atan2(W, c + D)
+        top, peak = _extreme(A, c, s, w, c + D, 2.0 * s - W)
     else:
-        top = 2.0 * math.atan2(W, D - c)
-        bottom = 2.0 * math.atan2(D - c, W - 2.0 * s)
-    peak = _place(A, c, s, w, top)
+        top, peak = _extreme(A, c, s, w, W, D - c)
     if peak >= 1.0:
         return _impact(A, c, s, w, 0.0, top, 1)
-    low = _place(A, c, s, w, bottom)
+    if c >= 0.0:
+        bottom, low = _extreme(A, c, s, w, W, -c - D)
+    else:
+        bottom, low = _extreme(A, c, s, w, D - c, W - 2.0 * s)
     if low <= 0.0:
         return _impact(A, c, s, w, top, bottom, 0)
     step = 2.0 * math.pi * drift  # shift of the extremes from period to period
     gap = 1.0 - peak if drift > 0.0 else low
     if gap > _LONGEST * abs(step):
-        return 2, 0.0, 0.0, 0.0
+        return 2, 0.0, 0.0
     late = 2.0 * math.pi * math.ceil(gap / abs(step))
     if drift > 0.0:
         if _place(A, c, s, w, top + late) < 1.0:
@@ -363,33 +366,49 @@ def _flight(A, c, s, w):
 
 
 @njit(cache=True)
+def _extreme(A, c, s, w, up, along):
+    """Time r in (0, 2 pi] with tan(r/2) = up/along, up >= 0, and xi there."""
+    r = 2.0 * math.atan2(up, along)
+    size = 2.0 * up / (up * up + along * along)
+    return r, w * r + A * (c * size * up - s * _lag(r, size * along))
+
+
+@njit(cache=True)
 def _impact(A, c, s, w, low, high, kind):
-    """Time and speed at which xi reaches the wall within a monotone piece, by safeguarded Newton."""
+    """Time and speed at which xi reaches the wall within a monotone piece, by safeguarded Halley steps."""
     target = 1.0 if kind == 1 else 0.0
     sign = 1.0 if kind == 1 else -1.0
+    r = 0.5 * (low + high)
     if kind == 0:
-        r = min(2.0 * low, 0.5 * (low + high))  # steady pressing: twice the time to the top
-    else:
-        r = 0.5 * (low + high)
+        r = min(r, 2.0 * low)  # steady pressing: twice the time to the top
     v = 0.0
     for _ in range(80):
-        sn = math.sin(r)
-        versine = 2.0 * math.sin(0.5 * r) ** 2
+        h, g = math.sin(0.5 * r), math.cos(0.5 * r)
+        sn, versine = 2.0 * h * g, 2.0 * h * h
         miss = sign * (w * r + A * (c * versine - s * _lag(r, sn)) - target)
         v = sign * (w + A * (c * sn - s * versine))
+        force = sign * A * (c - c * versine - s * sn)
         if miss > 0.0:
             high = r
         elif miss < 0.0:
             low = r
         else:
             break
-        new = r - miss / v if v > 0.0 else low
-        if not low < new < high:
+        slope = v - 0.5 * force * miss / v if v > 0.0 else 0.0
+        new = r - miss / slope if slope > 0.0 else low
+        inside = low < new < high
+        if not inside:
             new = 0.5 * (low + high)
-        if abs(new - r) <= 4e-16 * r:
-            break
+        move = new - r
         r = new
-    return kind, r, max(v, 0.0), A * (c * (math.sin(r) - r) - s * 2.0 * math.sin(0.5 * r) ** 2)
+        if abs(move) <= 4e-16 * r:
+            break
+        if inside and abs(move) <= 1e-6 * r and abs(move * force) <= 1e-6 * v:
+            # the next step would be 1e-12 of this one
+            jerk = -sign * A * (c * sn + s * (1.0 - versine))
+            v += move * (force + 0.5 * move * jerk)
+            break
+    return kind, r, max(v, 0.0)
 
 
 @njit(cache=True)
@@ -427,21 +446,20 @@ def _wrap(phi):
 
 
 @njit(cache=True)
-def _event(A, eps, phi, w):
+def _event(A, eps, phi, c, s, w):
     """One flight, the impact, and sustained contact if it follows.
 
-    Returns kind, time of flight, time of contact, phi and w after, speed of impact, slope (see `_polish`).
+    Returns kind, time of flight, time of contact, then phi, its cosine and sine, and w after, speed of impact.
     """
-    c, s = math.cos(phi), math.sin(phi)
-    kind, time, speed, slope = _flight(A, c, s, w)
+    kind, time, speed = _flight(A, c, s, w)
     if kind == 2:
-        return kind, 0.0, 0.0, phi, w, 0.0, 0.0
+        return kind, 0.0, 0.0, phi, c, s, w, 0.0
     phi = _wrap(phi + time + math.pi * kind)
-    w = eps * speed
-    if _stays(A, eps, math.cos(phi), math.sin(phi), w):
+    c, s, w = math.cos(phi), math.sin(phi), eps * speed
+    if _stays(A, eps, c, s, w):
         rest = (_RELEASE - phi) % (2.0 * math.pi)
-        return kind, time, rest, _RELEASE, 0.0, speed, slope
-    return kind, time, 0.0, phi, w, speed, slope
+        return kind, time, rest, _RELEASE, 0.0, -1.0, 0.0, speed
+    return kind, time, 0.0, phi, c, s, w, speed
 
 
 @njit(cache=True)
@@ -452,8 +470,9 @@ def _settle(A, eps, phi, w, transient):
     contact is sustained, largest multiplier of the lap, closing error.
     """
     ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
+    c, s = math.cos(phi), math.sin(phi)
     for _ in range(_IMPACTS * transient):
-        kind, time, rest, phi, w, _, _ = _event(A, eps, phi, w)
+        kind, time, rest, phi, c, s, w, _ = _event(A, eps, phi, c, s, w)
         if kind == 2:
             return 2, 0, 0, phi, w, False, 0.0, 0.0
         since += 1
@@ -479,11 +498,11 @@ def _polish(A, eps, phi, w, count, lap):
     """Close a lap of `count` impacts: (stable orbit found, phi, w, contact, largest multiplier, closing error)."""
     before = np.inf
     for _ in range(15):
-        p, v, total, contact = phi, w, 0.0, False
+        p, c, s, v, total, contact = phi, math.cos(phi), math.sin(phi), w, 0.0, False
         j11, j12, j21, j22 = 1.0, 0.0, 0.0, 1.0
         for _ in range(count):
-            c0 = math.cos(p)
-            kind, time, rest, p1, v1, speed, slope = _event(A, eps, p, v)
+            p0, c0, s0 = p, c, s
+            kind, time, rest, p, c, s, v, speed = _event(A, eps, p, c, s, v)
             if kind == 2 or (speed == 0.0 and rest == 0.0):
                 return False, phi, w, False, 0.0, 0.0
             total += time + rest
@@ -492,8 +511,9 @@ def _polish(A, eps, phi, w, count, lap):
                 j11 = j12 = j21 = j22 = 0.0
             else:
                 # xi(time) = const: velocity dr + time dw + slope dphi = 0; then d(velocity)
+                slope = A * (c0 * (math.sin(time) - time) - s0 * 2.0 * math.sin(0.5 * time) ** 2)
                 out = speed if kind == 1 else -speed
-                force = A * math.cos(p + time)
+                force = A * math.cos(p0 + time)
                 r1, r2 = -slope / out, -time / out
                 sign = eps if kind == 1 else -eps
                 m11, m12 = 1.0 + r1, r2
@@ -505,7 +525,6 @@ def _polish(A, eps, phi, w, count, lap):
                     m21 * j11 + m22 * j21,
                     m21 * j12 + m22 * j22,
                 )
-            p, v = p1, v1
         dp, dw = _wrap(p - phi), v - w
         size = abs(dp) + abs(dw) / (1.0 + A)
         if abs(total - lap * math.pi) > 0.01:
@@ -535,11 +554,12 @@ def _polish(A, eps, phi, w, count, lap):
 def _measure(A, eps, phi, w, count, out):
     """Harmonics C_k/(k^2 A), and -mean(y)/A at index 0, of a periodic motion over one lap."""
     side, clock, area = -1.0, 0.0, 0.0
+    c, s = math.cos(phi), math.sin(phi)
     wall = np.zeros(out.size, dtype=np.complex128)
     for _ in range(count):
-        c, s, w0 = math.cos(phi), math.sin(phi), w
-        kind, time, rest, phi, w, speed, _ = _event(A, eps, phi, w)
-        area += side * (0.5 * time - _swept(A, c, s, w0, time))
+        c0, s0, w0 = c, s, w
+        kind, time, rest, phi, c, s, w, speed = _event(A, eps, phi, c, s, w)
+        area += side * (0.5 * time - _swept(A, c0, s0, w0, time))
         clock += time + rest
         side = -side if kind == 1 else side
         _push(A, eps, side, phi, rest, rest, speed, wall)
@@ -560,27 +580,27 @@ def _average(A, eps, phi, w, periods, out):
     """
     n = out.size
     half = max(periods // 2, 1)
-    side = -1.0
+    c, s, side = math.cos(phi), math.sin(phi), -1.0
     tau = phi  # at the lower wall; time counts from here in the forcing phase
     cut = 2.0 * math.pi * math.ceil(tau / (2.0 * math.pi))
     wall = np.zeros(n, dtype=np.complex128)
     marks = np.zeros((3, n), dtype=np.complex128)
     area, cuts = 0.0, 0
     for _ in range(2 * half * _IMPACTS):
-        c, s, w0, side0 = math.cos(phi), math.sin(phi), w, side
-        kind, time, rest, phi, w, speed, _ = _event(A, eps, phi, w)
+        c0, s0, w0, side0 = c, s, w, side
+        kind, time, rest, phi, c, s, w, speed = _event(A, eps, phi, c, s, w)
         if kind == 2:
             return -1.0
         while cuts < 3 and tau + time > cut:
             r = cut - tau
-            y = side0 * (0.5 - _place(A, c, s, w0, r))
-            rate = -side0 * (w0 + A * (c * math.sin(r) - s * 2.0 * math.sin(0.5 * r) ** 2))
+            y = side0 * (0.5 - _place(A, c0, s0, w0, r))
+            rate = -side0 * (w0 + A * (c0 * math.sin(r) - s0 * 2.0 * math.sin(0.5 * r) ** 2))
             for k in range(1, n):
                 marks[cuts, k] = wall[k] - complex(rate, k * y)
-            marks[cuts, 0] = area + side0 * (0.5 * r - _swept(A, c, s, w0, r))
+            marks[cuts, 0] = area + side0 * (0.5 * r - _swept(A, c0, s0, w0, r))
             cuts += 1
             cut += 2.0 * math.pi * half
-        area += side0 * (0.5 * time - _swept(A, c, s, w0, time))
+        area += side0 * (0.5 * time - _swept(A, c0, s0, w0, time))
         tau += time
         side = -side if kind == 1 else side
         if cuts < 3 and rest > 0.0 and tau + rest > cut:
