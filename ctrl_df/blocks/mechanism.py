@@ -103,6 +103,10 @@ class Mechanism(ct.NonlinearIOSystem):
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""
         return type(self)._make(self._values, self._effects, measured)
 
+    def _named(self, name) -> Mechanism:
+        """Return the same block under another name."""
+        return _unpickle(type(self), self._values, self._effects, self._measured, name)
+
     def _changed(self, values: Mapping[str, float]):
         known = self.parameters
         for name in values:

@@ -1,0 +1,221 @@
+"""The event engine from Python: a compiled program of one system, run between given times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..status import Status
+from . import driver, layout, pointers
+from .flatten import flatten, pack
+from .layout import EVENT_KINDS, Drive
+
+RTOL = 1e-9
+"""Default relative tolerance; the absolute one is a thousandth of it."""
+
+_STATUS = {
+    driver.DONE: Status.CONVERGED,
+    driver.EVENT: Status.CONVERGED,
+    driver.SECTION: Status.CONVERGED,
+    driver.STEPS: Status.WORK_LIMIT,
+    driver.NAN: Status.DIVERGED,
+    driver.CHATTER: Status.CHATTERING,
+    driver.TINY: Status.STEP_TOO_SMALL,
+}
+
+
+@dataclass(frozen=True)
+class Event:
+    """One located event: time [s], the subsystem it happened in, and its kind."""
+
+    time: float
+    subsystem: str
+    kind: str
+
+
+@dataclass
+class State:
+    """Everything needed to go on: time, continuous state, discrete modes, step size."""
+
+    time: float
+    x: np.ndarray
+    mode: np.ndarray
+    step: float = 0.0
+    segment: int = 0
+    on_section: bool = False
+    fresh: bool = True
+    scale: np.ndarray | None = None
+
+    def copy(self) -> State:
+        """Return an independent copy."""
+        scale = None if self.scale is None else self.scale.copy()
+        return replace(self, x=self.x.copy(), mode=self.mode.copy(), scale=scale)
+
+
+@dataclass
+class Run:
+    """Outcome of `Engine.run`."""
+
+    state: State
+    status: Status
+    reason: int
+    outputs: np.ndarray  # (nt, ny)
+    states: np.ndarray  # (nt, nx)
+    recorded: int
+    steps: int
+    event_count: int
+    events: tuple[np.ndarray, np.ndarray, np.ndarray]  # time, node, kind
+    before: np.ndarray  # state just before the event that stopped the run
+
+
+def constant_drive(values) -> Drive:
+    """External inputs that do not change."""
+    values = np.atleast_1d(np.asarray(values, float))
+    return harmonic_drive(values[:, None].astype(complex), 0.0)
+
+
+def harmonic_drive(coefficients, omega: float) -> Drive:
+    """External inputs ``Re sum_k c_k exp(j k omega t)``; `coefficients` (nr, nh) complex, k = 0, 1, ..."""
+    c = np.ascontiguousarray(coefficients, dtype=complex)
+    return Drive(np.zeros(0), np.zeros((c.shape[0], 0)), 1, c, float(omega), 0)
+
+
+def sampled_drive(time, samples, hold: str) -> Drive:
+    """External inputs from samples (nr, nt), ``hold`` = 'zoh' or 'linear'."""
+    samples = np.ascontiguousarray(np.atleast_2d(samples), dtype=float)
+    time = np.ascontiguousarray(time, dtype=float)
+    return Drive(time, samples, int(hold == "linear"), np.zeros((samples.shape[0], 0), complex), 0.0, 0)
+
+
+def callback_drive(function, nr: int) -> tuple[Drive, Any]:
+    """External inputs from a function of time returning `nr` values; keep the second return value alive."""
+
+    def call(t, r):
+        values = np.atleast_1d(function(t))
+        if len(values) != nr:
+            raise ValueError(f"the input function must return {nr} values; got {len(values)}.")
+        for i, v in enumerate(values):
+            r[i] = float(v)
+
+    pointer, keep = pointers.callback(call, "input")
+    return Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 0), complex), 0.0, pointer), keep
+
+
+class Engine:
+    """A system compiled to arrays, ready to run from any state.
+
+    Parameters
+    ----------
+    system : block, LTI system or interconnection
+        What to run; see `ctrl_df.simulate.flatten`.
+    """
+
+    def __init__(self, system):
+        self.system = system
+        self._flat = flatten(system)
+        self.nstates = system.nstates or 0
+        self.program, self._modes, self.node_names = pack(self._flat, self.nstates)
+        self._space = driver.workspace(self.program)
+        self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
+
+    def start(self, x0=None, time: float = 0.0) -> State:
+        """Return a fresh state; its modes are settled when the run begins."""
+        x = np.zeros(self.nstates) if x0 is None else np.array(x0, dtype=float)
+        return State(float(time), x, self._modes.copy())
+
+    def run(
+        self,
+        state: State,
+        t_end: float,
+        drive: Drive | None = None,
+        times=None,
+        *,
+        order: int = 8,
+        rtol: float = RTOL,
+        atol: float | None = None,
+        max_step: float = np.inf,
+        locate: bool = True,
+        stop_at_event: bool = False,
+        watch: int = -1,
+        level: float = 0.0,
+        direction: int = 1,
+        height: float | None = None,
+        max_steps: int = 20_000_000,
+        log: int = 4096,
+    ) -> Run:
+        """Run to `t_end`, or to the next event or section.
+
+        Parameters
+        ----------
+        state : State
+            Where to begin; not changed.
+        t_end : float
+            End of the run [s].
+        drive : Drive
+            External inputs; zero by default.
+        times : (nt,) array
+            Times at which outputs and states are recorded.
+        order : {8, 5}
+            Runge-Kutta order; 5 is faster where inputs are sampled finely.
+        rtol, atol : float
+            Error tolerances of a step; atol defaults to rtol/1000.
+        locate : bool
+            False integrates on in the fixed mode, events ignored.
+        stop_at_event : bool
+            Return after every event.
+        watch : int
+            Signal whose passage through `level` in `direction` (+1 upward) ends the run; -1: none.
+        height : float
+            Relative flight below which chatter ends (default rtol/100).
+        max_steps : int
+            Bound on the work.
+        log : int
+            Events kept between returns to Python; all are returned.
+        """
+        atol = 1e-3 * rtol if atol is None else atol
+        height = 1e-2 * rtol if height is None else height
+        if drive is None:
+            drive = constant_drive(np.zeros(self.ninputs))
+        times = np.zeros(0) if times is None else np.ascontiguousarray(times, dtype=float)
+        now = state.copy()
+        ng = int(self.program.ints[layout.H_NG]) + 1
+        scale = now.scale if now.scale is not None else np.full(ng, 1e-3 * rtol)
+        xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
+        clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section)])
+        log_t, log_n, log_k = np.zeros(max(log, 1)), np.zeros(max(log, 1), np.int64), np.zeros(max(log, 1), np.int64)
+        before = now.x.copy()
+        kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        fresh = int(now.fresh)
+        pointers.raised.clear()
+        while True:
+            room = max_steps - int(clock[3])
+            chunk = min(room, 1_000_000)
+            reason = driver.run(
+                self.program, drive, clock, now.x, now.mode, t_end, times, xout, yout, order, rtol, atol, max_step, locate,
+                stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k, before, scale, fresh, self._space,
+            )  # fmt: skip
+            fresh = 0
+            used = min(int(clock[5]), len(log_t))
+            if log > 1 and used:
+                kept.append((log_t[:used].copy(), log_n[:used].copy(), log_k[:used].copy()))
+            if reason == driver.FULL or (reason == driver.STEPS and int(clock[3]) < max_steps):
+                continue
+            break
+        status = _STATUS[reason]
+        if pointers.raised:
+            status = Status.USER_ERROR
+        events = tuple(np.concatenate(c) for c in zip(*kept, strict=True)) if kept else (log_t[:0], log_n[:0], log_k[:0])
+        after = State(
+            float(clock[0]), now.x, now.mode, float(clock[2]), int(clock[6]), clock[7] > 0.5, False, scale
+        )
+        return Run(
+            after, status, reason, yout, xout, int(clock[1]), int(clock[3]), int(clock[4]), events, before
+        )
+
+    def name_events(self, events) -> list[Event]:
+        """Turn the event arrays of a run into `Event` values."""
+        return [
+            Event(float(t), self.node_names[n], EVENT_KINDS[k]) for t, n, k in zip(*events, strict=True)
+        ]

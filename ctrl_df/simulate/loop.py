@@ -1,0 +1,156 @@
+"""Closed loops: a controller around one block, the ideal PID included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+
+from ..blocks.mechanism import Mechanism
+from .sampled import Sampled
+
+
+@dataclass(frozen=True)
+class LoopParts:
+    """What a loop of `closed_loop` was made of; kept on the loop as ``loop.parts``."""
+
+    controller: object
+    block: ct.NonlinearIOSystem
+    dt: float
+
+
+def closed_loop(pid, block, dt=0, *, output=None, name=None) -> ct.InterconnectedSystem:
+    """Close a loop: ``F = pid (r - x)`` drives the block, x is its first output.
+
+    Parameters
+    ----------
+    pid : ct.TransferFunction or ct.StateSpace
+        The controller. One degree of the numerator above the denominator (the ideal PID) is allowed where the block has
+        a velocity output ``v``: the derivative then acts on ``-v``, not on the reference.
+    block : ct.NonlinearIOSystem
+        The plant: one input; a mechanism, a memoryless element, or a block of the user's own.
+    dt : float
+        Sample time of a digital controller with zero-order hold [s]; 0: continuous. The continuous `pid` is then run as
+        ``kp e + I - kd v`` with I summed by the backward rule (any other proper controller: Tustin's rule). A discrete
+        `pid` brings its own dt.
+    output : str or int
+        The output that is fed back, the first by default.
+    name : str
+        Name of the loop.
+
+    Returns
+    -------
+    ct.InterconnectedSystem
+        Input ``r``; outputs the block's output (``x``) and the block's input (``F``).
+
+    Raises
+    ------
+    ValueError
+        MIMO controller, improper controller without a velocity to act on, sample times that differ, algebraic loop.
+    """
+    block = _as_block(block)
+    controller = _as_lti(pid)
+    if controller.isdtime(strict=True):
+        own = float(controller.dt)
+        if dt not in (0, None) and not np.isclose(own, dt):
+            raise ValueError(f"closed_loop got dt={dt} for a controller with dt={own}; leave dt out, or make them equal.")
+        dt = own
+    fed_back = block.output_labels[0] if output is None else _label(block, output)
+    force = block.input_labels[0]
+    kd, proper = split_improper(controller)
+    if kd != 0 and "v" not in block.output_labels:
+        raise ValueError(
+            f"an improper controller needs a block with a velocity output v for its derivative; {block.name} has "
+            f"{', '.join(block.output_labels)}. Filter the derivative: pid(..., tf=...)."
+        )
+    control = _controller(proper, kd, dt, force, name="controller")
+    plant = block._named("plant") if isinstance(block, Mechanism) else block.copy(name="plant")
+    connections = [["controller.e", f"-plant.{fed_back}"], [f"plant.{force}", f"controller.{force}"]]
+    if kd != 0:
+        connections.append(["controller.v", "plant.v"])
+    loop = ct.interconnect(
+        [control, plant],
+        connections=connections,
+        inplist=["controller.e"],
+        inputs=["r"],
+        outlist=[f"plant.{fed_back}", f"controller.{force}"],
+        outputs=[fed_back, force],
+        name=name,
+        warn_duplicate=False,
+        ignore_outputs=[(1, i) for i in range(block.noutputs)],
+    )
+    loop.parts = LoopParts(pid, block, float(dt or 0))
+    return loop
+
+
+def split_improper(controller) -> tuple[float, ct.StateSpace]:
+    """Split ``H = kd s + proper``; returns (kd, proper as state space). ValueError beyond one derivative."""
+    if isinstance(controller, ct.StateSpace):
+        return 0.0, controller
+    num, den = (np.trim_zeros(np.asarray(p[0][0], float), "f") for p in (controller.num, controller.den))
+    if len(num) <= len(den):
+        return 0.0, ct.ss(controller)
+    if len(num) > len(den) + 1 or controller.isdtime(strict=True):
+        raise ValueError(
+            f"a controller may exceed its denominator by one degree (an ideal derivative), in continuous time; got "
+            f"numerator degree {len(num) - 1} over {len(den) - 1}. Filter it: pid(..., tf=...)."
+        )
+    quotient, rest = np.polydiv(num, den)
+    kd, kp = quotient[0], quotient[1] if len(quotient) > 1 else 0.0
+    rest = np.atleast_1d(rest)
+    return float(kd), ct.ss(ct.tf(np.polyadd(kp * den, rest), den))
+
+
+def _controller(proper: ct.StateSpace, kd: float, dt, force: str, name: str):
+    a, b, c, d = (np.asarray(m, float) for m in (proper.A, proper.B, proper.C, proper.D))
+    inputs = ["e", "v"] if kd != 0 else ["e"]
+    if dt in (0, None):
+        if kd != 0:
+            b, d = np.hstack([b, 0 * b]), np.hstack([d, [[-kd]]])
+        return ct.ss(a, b, c, d, inputs=inputs, outputs=[force], name=name)
+    if not proper.isdtime(strict=True):
+        a, b, c, d = _discretized(a, b, c, d, float(dt))
+    if kd != 0:
+        b, d = np.hstack([b, 0 * b]), np.hstack([d, [[-kd]]])
+    return Sampled(a, b, c, d, dt, inputs=inputs, outputs=[force], name=name)
+
+
+def _discretized(a, b, c, d, dt):
+    if a.shape == (1, 1) and a[0, 0] == 0:
+        # the integral of a PID, summed by the backward rule: I[k] = I[k-1] + dt e[k]
+        return np.eye(1), b * dt, c, d + c @ b * dt
+    ss = ct.c2d(ct.ss(a, b, c, d), dt, method="bilinear")
+    return tuple(np.asarray(m, float) for m in (ss.A, ss.B, ss.C, ss.D))
+
+
+def _as_block(block) -> ct.NonlinearIOSystem:
+    if not isinstance(block, ct.NonlinearIOSystem):
+        if callable(block):
+            return ct.NonlinearIOSystem(
+                None, lambda t, x, u, params: np.array([float(block(u[0]))]), inputs=["u"], outputs=["y"], name="nonlinearity"
+            )
+        raise TypeError(f"closed_loop needs a block (ct.NonlinearIOSystem) or a static function; got {block!r}.")
+    if block.ninputs != 1:
+        raise ValueError(f"closed_loop needs a block with one input; {block.name} has {block.ninputs}.")
+    return block
+
+
+def _as_lti(pid):
+    if isinstance(pid, ct.FrequencyResponseData):
+        raise ValueError("closed_loop cannot run measured frequency points (FRD) in time; fit a transfer function first.")
+    if isinstance(pid, int | float):
+        pid = ct.tf([float(pid)], [1.0])
+    if not isinstance(pid, ct.TransferFunction | ct.StateSpace):
+        raise TypeError(f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}.")
+    if not pid.issiso():
+        raise ValueError(f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs.")
+    return pid
+
+
+def _label(block, output) -> str:
+    if isinstance(output, str):
+        if output not in block.output_labels:
+            raise ValueError(f"output must be one of {', '.join(block.output_labels)}; got {output!r}.")
+        return output
+    return block.output_labels[output]

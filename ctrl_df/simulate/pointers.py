@@ -1,0 +1,154 @@
+"""Laws as machine addresses: how one compiled engine runs any effect.
+
+A law is a plain Python function. `address` compiles it (cached beside its file where possible) and returns the
+address of the machine code; the engine, compiled once, calls through that address. What numba cannot compile is
+called back in Python, slower but with the same result.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from collections.abc import Callable
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+_D, _P = types.float64, types.CPointer(types.float64)
+SIGNATURES = {
+    # t, x, v, z, p, dz -> force
+    "force": _D(_D, _D, _D, _P, _P, _P),
+    # moving, direction, speed, base, p -> level
+    "friction": _D(_D, _D, _D, _D, _P),
+    # u, p -> y
+    "smooth": _D(_D, _P),
+}
+_C_D, _C_P = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
+_CALLBACKS = {
+    "force": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_P, _C_P, _C_P),
+    "friction": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_D, _C_P),
+    "smooth": ctypes.CFUNCTYPE(_C_D, _C_D, _C_P),
+    # t, x, u, dx, y, what: 0 outputs, 1 rates
+    "system": ctypes.CFUNCTYPE(None, _C_D, _C_P, _C_P, _C_P, _C_P, ctypes.c_long),
+    # t, r
+    "input": ctypes.CFUNCTYPE(None, _C_D, _C_P),
+}
+
+_compiled: weakref.WeakKeyDictionary[Callable, tuple[int, object]] = weakref.WeakKeyDictionary()
+raised: list[BaseException] = []
+"""Exceptions of laws called back in Python, newest last; the engine sees them as NaN."""
+
+
+def address(law: Callable, kind: str) -> int:
+    """Return the machine address of a law of the given kind (a key of `SIGNATURES`)."""
+    known = _compiled.get(law)
+    if known is None:
+        known = _compiled[law] = _compile(law, kind)
+    return known[0]
+
+
+def _compile(law, kind):
+    for cache in (True, False):
+        try:
+            compiled = numba.cfunc(SIGNATURES[kind], cache=cache)(law)
+            return compiled.address, compiled
+        except RuntimeError:  # no place to keep the cache (a law typed at the prompt)
+            continue
+        except numba.core.errors.NumbaError:
+            break
+    return callback(law, kind)
+
+
+def callback(function: Callable, kind: str) -> tuple[int, object]:
+    """Return (address, keep-alive object) of a Python function called back from the engine."""
+
+    def guarded(*args):
+        try:
+            return function(*args)
+        except BaseException as error:  # noqa: BLE001 - no exception may cross machine code
+            raised.append(error)
+            if kind == "input":
+                args[1][0] = float("nan")
+            elif kind == "system":
+                args[3][0] = args[4][0] = float("nan")
+            return float("nan")
+
+    c = _CALLBACKS[kind](guarded)
+    return ctypes.cast(c, ctypes.c_void_p).value or 0, c
+
+
+def _call(builder, returns, address_value, values, is_pointer):
+    double = ir.DoubleType()
+    kinds = [double.as_pointer() if p else double for p in is_pointer]
+    function = builder.inttoptr(address_value, ir.FunctionType(returns, kinds).as_pointer())
+    args = [builder.inttoptr(v, double.as_pointer()) if p else v for v, p in zip(values, is_pointer, strict=True)]
+    return builder.call(function, args)
+
+
+@intrinsic
+def call_force(typingctx, address, t, x, v, z, p, dz):
+    """Call a force law; z, p, dz are addresses."""
+    sig = types.float64(types.int64, _D, _D, _D, types.int64, types.int64, types.int64)
+
+    def codegen(context, builder, signature, args):
+        return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 0, 1, 1, 1))
+
+    return sig, codegen
+
+
+@intrinsic
+def call_friction(typingctx, address, moving, direction, speed, base, p):
+    """Call a friction law; p is an address."""
+    sig = types.float64(types.int64, _D, _D, _D, _D, types.int64)
+
+    def codegen(context, builder, signature, args):
+        return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 0, 0, 1))
+
+    return sig, codegen
+
+
+@intrinsic
+def call_smooth(typingctx, address, u, p):
+    """Call a static law; p is an address."""
+    sig = types.float64(types.int64, _D, types.int64)
+
+    def codegen(context, builder, signature, args):
+        return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 1))
+
+    return sig, codegen
+
+
+@intrinsic
+def call_system(typingctx, address, t, x, u, dx, y, what):
+    """Call a user-written system; x, u, dx, y are addresses."""
+    sig = types.void(types.int64, _D, types.int64, types.int64, types.int64, types.int64, types.int64)
+
+    def codegen(context, builder, signature, args):
+        double, long = ir.DoubleType(), ir.IntType(64)
+        pointer = double.as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [double, pointer, pointer, pointer, pointer, long])
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        pointers = [builder.inttoptr(a, pointer) for a in args[2:6]]
+        builder.call(function, [args[1], *pointers, args[6]])
+        return context.get_dummy_value()
+
+    return sig, codegen
+
+
+@intrinsic
+def call_input(typingctx, address, t, r):
+    """Call an input function; r is an address."""
+    sig = types.void(types.int64, _D, types.int64)
+
+    def codegen(context, builder, signature, args):
+        pointer = ir.DoubleType().as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType(), pointer])
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        builder.call(function, [args[1], builder.inttoptr(args[2], pointer)])
+        return context.get_dummy_value()
+
+    return sig, codegen
+
+
