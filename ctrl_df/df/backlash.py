@@ -1,8 +1,8 @@
 """Describing functions of two masses with a gap, exact for Newton's law of impact.
 
-Force ``a cos(omega t)`` on the motor M2, position x1 of the load M1. The total momentum integrates in closed form;
-what remains is the place of the motor in the gap, y = (x2 - x1)/h - 1/2, which in the phase tau = omega t is a
-ball between two walls,
+Force ``a cos(omega t)`` on the motor M2, position x1 of the load M1. The total momentum integrates in closed
+form; what remains is the place of the motor in the gap, y = (x2 - x1)/h - 1/2, which in the phase
+tau = omega t is a ball between two walls,
 
     y'' = A cos(tau),  |y| <= 1/2,  y' -> -eps y' at a wall,     A = a/(M2 h omega^2),
 
@@ -10,17 +10,18 @@ so that one dimensionless function gives all: with Y_k the harmonics of y and q 
 
     N = -(1 + q)/((M1 + M2) omega^2),     X_k/a = -(Y_k/A)/((M1 + M2) omega^2),  k != 1.
 
-The load moves by the impulses of the walls alone, hence X_k/a = C_k/(k^2 A (M1 + M2) omega^2) with C_k the harmonics
-of what the walls do to y: no flight is ever integrated.
+The walls alone move the load, hence X_k/a = C_k/(k^2 A (M1 + M2) omega^2) with C_k the harmonics of what the
+walls do to y: no flight is ever integrated. What impacts lose a period is pi a^2 (M1/M2) Im N.
 
-Flights are closed forms, so a motion is a map from wall to wall. It is written in the distance xi in [0, 1] from the
-wall just left and the phase phi in which xi'' = A cos(phi): phi = tau at the lower wall, tau + pi at the upper one.
-Both walls then share one map (phi, w) -> (phi, w), w the speed of leaving, and a half-wave symmetric motion closes
-after half a period.
+Flights are closed forms, so a motion is a map from wall to wall. It is written in the distance xi in [0, 1]
+from the wall just left and the phase phi in which xi'' = A cos(phi): phi = tau at the lower wall, tau + pi at
+the upper one. Both walls then share one map (phi, w) -> (phi, w), w the speed of leaving, and a half-wave
+symmetric motion closes after half a period.
 
-*Chatter* accumulates: flights under a pressing acceleration g shrink geometrically and end after 2w/(g(1 - eps)). When
-that is below `_CHATTER` rad (and g steady to 1 %) the bodies are taken to stay together at once. The area this
-leaves out is at most g _CHATTER^3/12, so q is off by less than 1e-12. Contact lasts until g changes sign.
+*Chatter* accumulates: flights under a pressing acceleration g shrink geometrically and end after
+2w/(g(1 - eps)). When that is below `_CHATTER` rad (and g steady to 1 %) the bodies are taken to stay together
+at once. The area this leaves out is at most g _CHATTER^3/12; N is off by less than 1e-12 (measured 7e-13).
+Contact lasts until g changes sign.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ IMPACT, CONTACT, ASYMMETRIC, SUBHARMONIC, APERIODIC, FREE = range(6)
 _CHATTER = 3e-4  # [rad] remaining time of a chatter below which contact is sustained
 _NEAR = 1e-5  # distance of a recurrence from which Newton's method is tried
 _LONGEST = 1e4  # periods of one flight beyond which the motion counts as free of contact
+_BLOCKS = 8  # an average's spread is estimated from that many parts
 _IMPACTS = 200  # bound on impacts per period of the budget, chatter included
 _RELEASE = -0.5 * math.pi  # phi at which a pressing acceleration changes sign
 # Starts (phi, w in units of 1 + A) tried in turn: from sustained contact, then from impacts of some speed.
@@ -50,9 +52,10 @@ def backlash_family(
 ):
     """Harmonics of the load position of two masses with a gap, under ``F = a cos(omega t)`` on the motor.
 
-    Where several motions coexist the answer is, in this order: the symmetric motion with two impacts a period if
-    it exists and is stable; else the motion that a release from sustained contact leads to; else (no contact
-    remains) those that four impacts of different phase and speed lead to. `backlash_attractors` lists all.
+    Where several motions coexist the answer is, in this order: the symmetric motion with two impacts a
+    period if it exists and is stable; else the motion that a release from sustained contact leads to; else
+    (no contact remains) those that four impacts of different phase and speed lead to. `backlash_attractors`
+    lists all.
 
     Parameters
     ----------
@@ -82,12 +85,14 @@ def backlash_family(
         its whole period, an aperiodic one over `periods` periods. Where contact is lost for good the load
         stands still: all zero.
     regime : int8 array (na, nw)
-        Index into `BACKLASH_REGIMES`: ``impact`` (half-wave symmetric, no sustained contact), ``contact`` (half-wave
-        symmetric, chatter complete), ``asymmetric`` (one period, not symmetric), ``subharmonic`` (two or more
-        periods), ``aperiodic``, ``free`` (no impacting motion was found).
+        Index into `BACKLASH_REGIMES`: ``impact`` (half-wave symmetric, no sustained contact), ``contact``
+        (half-wave symmetric, chatter complete), ``asymmetric`` (one period, not symmetric), ``subharmonic``
+        (two or more periods), ``aperiodic`` (no period found within `transient`), ``free`` (no impacting
+        motion found).
     residual : float array (na, nw)
-        Closing error of the orbit (phase plus relative speed); where ``aperiodic``, the difference of N between the
-        two halves of the average, relative.
+        Closing error of the orbit (phase plus relative speed). Where ``aperiodic``: by how much N of the two
+        halves of the average differ, relative (estimated from eight parts); half of it is the standard error
+        of N. inf, with N NaN, where the bound on impacts (200 a period) ended the average.
 
     Raises
     ------
@@ -239,7 +244,7 @@ def _same(one, other, tol):
     return one.period == other.period and abs(one.q - other.q) <= tol * max(1.0, abs(one.q)) and mirrored
 
 
-# --- the family in dimensionless form --------------------------------------------------------------------
+# --- the family in dimensionless form ---------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -276,7 +281,7 @@ def _name(lap, contact):
     return ASYMMETRIC if lap == 2 else SUBHARMONIC
 
 
-# --- the symmetric motion with two impacts a period --------------------------------------------------------
+# --- the symmetric motion with two impacts a period -------------------------------------------------------
 
 
 @njit(cache=True)
@@ -321,7 +326,7 @@ def _two_impact_harmonics(A, eps, tau, v, out):
         power *= turn * turn
 
 
-# --- one flight ----------------------------------------------------------------------------------------------
+# --- one flight -------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -329,8 +334,8 @@ def _flight(A, c, s, w):
     """Follow the ball from a wall to its next impact: (kind, time, speed).
 
     Left at speed w >= 0 in phase phi, c = cos(phi), s = sin(phi). Kind 0: back on the same wall, 1: on the
-    opposite one, 2: never. The velocity w + A (sin(phi + r) - s) repeats, so that the extremes of xi follow in
-    closed form; between two of them xi is monotone, and no impact, grazing included, escapes.
+    opposite one, 2: never. The velocity w + A (sin(phi + r) - s) repeats, so that the extremes of xi follow
+    in closed form; between two of them xi is monotone, and no impact, grazing included, escapes.
     """
     W = w / A
     reach = c * c + W * (2.0 * s - W)
@@ -442,14 +447,14 @@ def _wrap(phi):
     return phi - 2.0 * math.pi * math.floor(phi / (2.0 * math.pi) + 0.5)
 
 
-# --- settling on an attractor ---------------------------------------------------------------------------------
+# --- settling on an attractor -----------------------------------------------------------------------------
 
 
 @njit(cache=True)
 def _event(A, eps, phi, c, s, w):
     """One flight, the impact, and sustained contact if it follows.
 
-    Returns kind, time of flight, time of contact, then phi, its cosine and sine, and w after, speed of impact.
+    Returns kind, time of flight, time of contact; phi, its cosine and sine, and w after; impact speed.
     """
     kind, time, speed = _flight(A, c, s, w)
     if kind == 2:
@@ -495,7 +500,10 @@ def _settle(A, eps, phi, w, transient):
 
 @njit(cache=True)
 def _polish(A, eps, phi, w, count, lap):
-    """Close a lap of `count` impacts: (stable orbit found, phi, w, contact, largest multiplier, closing error)."""
+    """Close a lap of `count` impacts by Newton's method on the map (phi, w) and its tangent.
+
+    Returns whether a stable orbit was found, phi, w, contact, largest multiplier, closing error.
+    """
     before = np.inf
     for _ in range(15):
         p, c, s, v, total, contact = phi, math.cos(phi), math.sin(phi), w, 0.0, False
@@ -547,7 +555,7 @@ def _polish(A, eps, phi, w, count, lap):
     return False, phi, w, False, 0.0, 0.0
 
 
-# --- harmonics ------------------------------------------------------------------------------------------------
+# --- harmonics --------------------------------------------------------------------------------------------
 
 
 @njit(cache=True)
@@ -574,62 +582,68 @@ def _measure(A, eps, phi, w, count, out):
 
 @njit(cache=True)
 def _average(A, eps, phi, w, periods, out):
-    """Project y on the harmonics over two windows of whole periods; returns their relative difference in N.
+    """Project y on the harmonics over blocks of whole periods; returns the spread of N between half windows.
 
-    Returns -1 if contact is lost for good, inf (and NaN harmonics) if the bound on impacts is reached first.
+    The spread is estimated from all blocks (twice the standard error of their mean), relative. Returns -1 if
+    contact is lost for good, inf (and NaN harmonics) if the bound on impacts is reached first.
     """
     n = out.size
-    half = max(periods // 2, 1)
+    blocks = min(_BLOCKS, periods)
+    length = 2.0 * math.pi * (periods // blocks)
     c, s, side = math.cos(phi), math.sin(phi), -1.0
     tau = phi  # at the lower wall; time counts from here in the forcing phase
     cut = 2.0 * math.pi * math.ceil(tau / (2.0 * math.pi))
     wall = np.zeros(n, dtype=np.complex128)
-    marks = np.zeros((3, n), dtype=np.complex128)
-    area, cuts = 0.0, 0
-    for _ in range(2 * half * _IMPACTS):
+    mark = np.zeros(n, dtype=np.complex128)
+    last = 0j
+    area, cuts, squares = 0.0, 0, 0.0
+    for _ in range(periods * _IMPACTS):
         c0, s0, w0, side0 = c, s, w, side
         kind, time, rest, phi, c, s, w, speed = _event(A, eps, phi, c, s, w)
         if kind == 2:
             return -1.0
-        while cuts < 3 and tau + time > cut:
-            r = cut - tau
-            y = side0 * (0.5 - _place(A, c0, s0, w0, r))
-            rate = -side0 * (w0 + A * (c0 * math.sin(r) - s0 * 2.0 * math.sin(0.5 * r) ** 2))
-            for k in range(1, n):
-                marks[cuts, k] = wall[k] - complex(rate, k * y)
-            marks[cuts, 0] = area + side0 * (0.5 * r - _swept(A, c0, s0, w0, r))
-            cuts += 1
-            cut += 2.0 * math.pi * half
-        area += side0 * (0.5 * time - _swept(A, c0, s0, w0, time))
-        tau += time
         side = -side if kind == 1 else side
-        if cuts < 3 and rest > 0.0 and tau + rest > cut:
-            part = wall.copy()
-            _push(A, eps, side, phi, rest, cut - tau, speed, part)
+        while cuts <= blocks and tau + time + rest > cut:
+            # Integrals up to the cut, e^{-jk tau} = 1 there: int y'' - y' - jk y = (jk)^2 int y.
+            mark[:] = wall
+            if tau + time > cut:
+                r = cut - tau
+                y = side0 * (0.5 - _place(A, c0, s0, w0, r))
+                rate = -side0 * (w0 + A * (c0 * math.sin(r) - s0 * 2.0 * math.sin(0.5 * r) ** 2))
+                mark[0] = area + side0 * (0.5 * r - _swept(A, c0, s0, w0, r))
+            else:
+                part = cut - tau - time
+                y, rate = 0.5 * side, 0.0
+                _push(A, eps, side, phi, rest, part, speed, mark)
+                mark[0] = area + side0 * (0.5 * time - _swept(A, c0, s0, w0, time)) + y * part
             for k in range(1, n):
-                marks[cuts, k] = part[k] - complex(0.0, 0.5 * k * side)
-            marks[cuts, 0] = area + 0.5 * side * (cut - tau)
+                mark[k] -= complex(rate, k * y)
+            if cuts == 0:
+                out[:] = mark
+            else:
+                squares += abs(mark[1] - last) ** 2
+            last = mark[1]
             cuts += 1
-            cut += 2.0 * math.pi * half
-        _push(A, eps, side, phi, rest, rest, speed, wall)
-        area += 0.5 * side * rest
-        tau += rest
-        if cuts == 3:
+            cut += length
+        if cuts > blocks:
             break
-    if cuts < 3:
+        area += side0 * (0.5 * time - _swept(A, c0, s0, w0, time)) + 0.5 * side * rest
+        _push(A, eps, side, phi, rest, rest, speed, wall)
+        tau += time + rest
+    if cuts <= blocks:
         out[:] = complex(np.nan, np.nan)
         return np.inf
-    span = 2.0 * math.pi * half
-    for k in range(1, n):
-        out[k] = (marks[2, k] - marks[0, k]) / (span * A * k * k)
-    out[0] = -(marks[2, 0] - marks[0, 0]) / (2.0 * span * A)
-    first, second = marks[1, 1] - marks[0, 1], marks[2, 1] - marks[1, 1]
-    return 2.0 * abs(second - first) / max(abs(second + first), 1e-300)
+    span = length * blocks
+    for k in range(n):
+        out[k] = (mark[k] - out[k]) * (2.0 / (span * A * k * k) if k > 0 else -1.0 / (span * A))
+    mean = 0.5 * abs(out[1]) * length * A
+    error = max(squares / blocks - mean * mean, 0.0) / (blocks - 1)
+    return 2.0 * math.sqrt(error) / max(mean, 1e-300)
 
 
 @njit(cache=True)
 def _push(A, eps, side, phi, rest, part, speed, wall):
-    """Add what the wall does to y: an impulse, then -A cos(tau) for the first `part` of a contact of length `rest`."""
+    """Add what the wall does to y: an impulse, then -A cos(tau) for the first `part` of a contact."""
     start = phi - rest  # phi of the impact
     # e^{-j tau} with tau = phi at the lower wall (side -1), phi - pi at the upper one
     turn = -side * complex(math.cos(start), -math.sin(start))
