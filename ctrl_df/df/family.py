@@ -1,0 +1,209 @@
+"""The result of a describing-function computation over amplitudes and frequencies."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import control as ct
+import numpy as np
+
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Family:
+    """Harmonics of a block's steady output for ``u = A cos(omega t)`` on a grid of amplitudes and frequencies.
+
+    Attributes
+    ----------
+    amplitudes : ndarray, shape (na,)
+        Peak values of the input, unit of the input.
+    omega : ndarray, shape (nw,)
+        [rad/s]; ``[nan]`` for a memoryless block asked without frequencies.
+    harmonics : ndarray of complex, shape (na, nw, orders + 1)
+        Y_k / A for ``y = Y_0 + Re sum Y_k exp(j k omega t)``; index 0 is the mean.
+    regime : ndarray of str, shape (na, nw)
+        What the motion is: ``slip``, ``stick-slip``, ``stuck``, ``impact``, ``memoryless``, ``asymmetric`` ...
+    residual : ndarray, shape (na, nw)
+        How well each orbit closes, or the estimated error of a quadrature, relative.
+    block : object
+        What was described; None after loading.
+    description : str
+        The block in words.
+    output : str
+        Name of the output described.
+    """
+
+    amplitudes: np.ndarray
+    omega: np.ndarray
+    harmonics: np.ndarray
+    regime: np.ndarray
+    residual: np.ndarray
+    block: Any = None
+    description: str = ""
+    output: str = "y"
+
+    @property
+    def N(self) -> np.ndarray:
+        """Describing function, complex, shape (na, nw); NaN where there is no periodic answer."""
+        return self.harmonics[..., 1]
+
+    @property
+    def minus_inverse(self) -> np.ndarray:
+        """-1/N, complex, shape (na, nw): the curves that cross the Nyquist plot at limit cycles."""
+        return minus_inverse(self.N)
+
+    @property
+    def orders(self) -> int:
+        """Highest harmonic."""
+        return self.harmonics.shape[-1] - 1
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of grid points in each regime."""
+        names, numbers = np.unique(self.regime, return_counts=True)
+        return dict(zip(names.tolist(), numbers.tolist(), strict=True))
+
+    def frd(self, amplitude: float) -> ct.FrequencyResponseData:
+        """Return the frequency response N(amplitude, omega).
+
+        Parameters
+        ----------
+        amplitude : float
+            Within the grid. Off its nodes N is computed anew from the block, or, for a loaded family, interpolated
+            linearly over the logarithm of the amplitude.
+
+        Raises
+        ------
+        ValueError
+            Outside the grid, or a family without frequencies.
+        """
+        if not np.isfinite(self.omega).all():
+            raise ValueError("frd needs frequencies; this family has none. Give omega when computing it.")
+        low, high = self.amplitudes.min(), self.amplitudes.max()
+        if not low * (1 - 1e-12) <= amplitude <= high * (1 + 1e-12):
+            raise ValueError(
+                f"frd needs {low:g} <= amplitude <= {high:g} (the family's grid); got {amplitude!r}. "
+                "Compute a family that reaches it."
+            )
+        row = np.nonzero(np.isclose(self.amplitudes, amplitude, rtol=1e-12, atol=0))[0]
+        if row.size:
+            response = self.N[row[0]]
+        elif self.block is not None:
+            from .describing import describing_function
+
+            name = self.output if self.output in getattr(self.block, "output_labels", ()) else None
+            response = describing_function(self.block, amplitude, self.omega, output=name)
+        else:
+            order = np.argsort(self.amplitudes)
+            grid, table = np.log(self.amplitudes[order]), self.N[order]
+            upper = int(np.clip(np.searchsorted(grid, np.log(amplitude)), 1, grid.size - 1))
+            share = (np.log(amplitude) - grid[upper - 1]) / (grid[upper] - grid[upper - 1])
+            response = (1 - share) * table[upper - 1] + share * table[upper]
+        return ct.frd(np.array(response), self.omega, name=f"N({amplitude:g})")
+
+    def plot(self, **kwargs) -> ct.ControlPlot:
+        """Draw -1/N in the complex plane, at constant amplitude and at constant frequency."""
+        return _drawing("ctrl_df.plot.family").plot_family(self, **kwargs)
+
+    def plot_harmonics(self, **kwargs) -> ct.ControlPlot:
+        """Draw |Y_k| / A over frequency or over amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
+        return _drawing("ctrl_df.plot.family").plot_harmonics(self, **kwargs)
+
+    def save(self, path) -> Path:
+        """Write the family to an ``.npz`` file (no pickle inside), whole or not at all."""
+        return write_arrays(path, _arrays(self))
+
+    def __repr__(self) -> str:
+        regimes = ", ".join(f"{name} {count}" for name, count in self.counts.items())
+        return f"<Family of {self.description or 'a block'}: {self.N.shape[0]} x {self.N.shape[1]} points; {regimes}>"
+
+
+def load_family(path) -> Family:
+    """Read a family written by `Family.save`.
+
+    Raises
+    ------
+    ValueError
+        The file holds no complete family (interrupted work is finished by the call that began it), or needs pickle.
+    """
+    data = read_arrays(path)
+    if not bool(np.all(data.get("done", True))):
+        raise ValueError(
+            f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of {data['done'].size} rows. "
+            "Repeat the call of describing_function_family with the same save= to finish it."
+        )
+    return Family(
+        amplitudes=data["amplitudes"],
+        omega=data["omega"],
+        harmonics=data["harmonics"],
+        regime=data["regime"],
+        residual=data["residual"],
+        description=str(data["description"]),
+        output=str(data["output"]),
+    )
+
+
+def minus_inverse(N) -> np.ndarray:
+    """-1/N; NaN stays NaN, and N = 0 gives minus infinity."""
+    N = np.asarray(N, dtype=complex)
+    with np.errstate(all="ignore"):
+        return np.where(N == 0, complex(-np.inf, 0.0), -1 / np.where(N == 0, 1.0, N))
+
+
+def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
+    """Write arrays as npz through a temporary file beside `path`, so that a break leaves the old file whole."""
+    path = Path(path)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **{k: np.asarray(v) for k, v in arrays.items()})
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    return path
+
+
+def read_arrays(path) -> dict[str, np.ndarray]:
+    """Read an npz file of a family, refusing pickles and strangers."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            data = {key: file[key] for key in file.files}
+    except (ValueError, EOFError, OSError) as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise ValueError(f"a family file must be an npz without pickled objects; {path}: {error}.") from None
+    needed = {"format", "amplitudes", "omega", "harmonics", "regime", "residual", "description", "output"}
+    if not needed <= data.keys():
+        raise ValueError(f"{path} is no family file: it lacks {', '.join(sorted(needed - data.keys()))}.")
+    if int(data["format"]) > FORMAT:
+        raise ValueError(
+            f"{path} was written by a newer ctrl_df (format {int(data['format'])}); update the package."
+        )
+    return data
+
+
+def _arrays(family: Family) -> dict[str, Any]:
+    return dict(
+        format=FORMAT,
+        amplitudes=family.amplitudes,
+        omega=family.omega,
+        harmonics=family.harmonics,
+        regime=np.asarray(family.regime, dtype=str),
+        residual=family.residual,
+        description=family.description,
+        output=family.output,
+    )
+
+
+def _drawing(module: str):
+    """Import the drawing layer, which lies above this one, only when a picture is asked for."""
+    import importlib
+
+    return importlib.import_module(module)
