@@ -12,6 +12,8 @@ from .layout import H_NG, H_NS, H_NX, H_OUT, H_SCRATCH, H_TRACK, KIND, NG, NIN, 
 from .modes import event, sample, settle, track
 from .stepper import inside, prepare5, prepare8, step5, step8
 
+NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
+NODES = NODES + 0.5
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY = range(8)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN, sliding, step
 below the resolution of time."""
@@ -93,6 +95,26 @@ def record(prog, drive, segment, t, x, mode, work, y):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
+def accumulate(prog, drive, segment, t, length, theta, x, mode, work, order, poly, xi, spectrum, omega):
+    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss-Legendre quadrature."""
+    w = work[0]
+    for i in range(NODES.shape[0]):
+        at = theta * NODES[i]
+        time = t + at * length
+        inside(order, at, x, poly, xi)
+        external(prog, drive, time, segment, w)
+        signals(prog, time, xi, mode, w)
+        share = theta * length * WEIGHTS[i]
+        turn = complex(math.cos(omega * time), -math.sin(omega * time))
+        for row in range(spectrum.shape[0]):
+            value = share * combine(prog, prog.ints[prog.ints[H_OUT] + row], w)
+            rotation = complex(1.0, 0.0)
+            for harmonic in range(spectrum.shape[1]):
+                spectrum[row, harmonic] += value * rotation
+                rotation *= turn
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
 def _worst(g, gtol, scale, blocked):
     """Smallest margin, relative to its scale, and its index."""
     value, index = 1.0, -1
@@ -108,13 +130,15 @@ def _worst(g, gtol, scale, blocked):
 def run(
     prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event, watch,
     watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
+    spectrum, omega,
 ):  # fmt: skip
     """Run from clock[0] to t_end; see `ctrl_df.simulate.engine.Engine.run` for the arguments.
 
     ``clock``: [time, next output index, last step size, steps used, events so far, events in this log, segment,
-    on section]. ``before``: state just before the event that stopped the run. ``scale``: running scale of each margin.
+    on section, margin of the last event]. ``before``: state just before the event that stopped the run. ``scale``: running scale of each margin.
     ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
-    Returns the reason (module constants).
+    ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are added; no
+    columns, no integrals. Returns the reason (module constants).
     """
     work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, owner = space
     n, ng = x.shape[0], scale.shape[0]
@@ -265,6 +289,15 @@ def run(
                         xout[index, j] = xi[j]
                     record(prog, drive, segment, tout[index], xi, mode, work, yout[index])
                     index += 1
+            if spectrum.shape[1] > 0:
+                if not prepared:
+                    if order == 8:
+                        prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
+                    else:
+                        prepare5(length, k, poly)
+                accumulate(
+                    prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, order, poly, xi, spectrum, omega
+                )  # fmt: skip
             if theta < 1.0:
                 if theta > 0.0:
                     inside(order, theta, x, poly, x1)
@@ -311,6 +344,7 @@ def run(
             zero_events = 0
             last_event_t = t
         clock[4] += 1
+        clock[8] = at
         if events_here < log_t.shape[0]:
             log_t[events_here] = t
             log_n[events_here] = node

@@ -68,6 +68,7 @@ class Run:
     event_count: int
     events: tuple[np.ndarray, np.ndarray, np.ndarray]  # time, node, kind
     before: np.ndarray  # state just before the event that stopped the run
+    margin: int  # index of the margin that event crossed
 
 
 def constant_drive(values) -> Drive:
@@ -144,6 +145,8 @@ class Engine:
         height: float | None = None,
         max_steps: int = 20_000_000,
         log: int = 4096,
+        spectrum: np.ndarray | None = None,
+        omega: float = 0.0,
     ) -> Run:
         """Run to `t_end`, or to the next event or section.
 
@@ -172,18 +175,21 @@ class Engine:
         max_steps : int
             Bound on the work.
         log : int
-            Events kept between returns to Python; all are returned.
+            Events kept between returns to Python; all are returned. 1: none kept.
+        spectrum : (ny, kmax + 1) complex array
+            Receives (is added) the integrals of the outputs against exp(-j k omega t).
         """
         atol = 1e-3 * rtol if atol is None else atol
         height = 1e-2 * rtol if height is None else height
         if drive is None:
             drive = constant_drive(np.zeros(self.ninputs))
+        spectrum = np.zeros((self.noutputs, 0), complex) if spectrum is None else spectrum
         times = np.zeros(0) if times is None else np.ascontiguousarray(times, dtype=float)
         now = state.copy()
         ng = int(self.program.ints[layout.H_NG]) + 1
         scale = now.scale if now.scale is not None else np.full(ng, 1e-3 * rtol)
         xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
-        clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section)])
+        clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1])
         log_t, log_n, log_k = np.zeros(max(log, 1)), np.zeros(max(log, 1), np.int64), np.zeros(max(log, 1), np.int64)
         before = now.x.copy()
         kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
@@ -195,6 +201,7 @@ class Engine:
             reason = driver.run(
                 self.program, drive, clock, now.x, now.mode, t_end, times, xout, yout, order, rtol, atol, max_step, locate,
                 stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k, before, scale, fresh, self._space,
+                spectrum, omega,
             )  # fmt: skip
             fresh = 0
             used = min(int(clock[5]), len(log_t))
@@ -211,7 +218,7 @@ class Engine:
             float(clock[0]), now.x, now.mode, float(clock[2]), int(clock[6]), clock[7] > 0.5, False, scale
         )
         return Run(
-            after, status, reason, yout, xout, int(clock[1]), int(clock[3]), int(clock[4]), events, before
+            after, status, reason, yout, xout, int(clock[1]), int(clock[3]), int(clock[4]), events, before, int(clock[8])
         )
 
     def name_events(self, events) -> list[Event]:
