@@ -72,13 +72,8 @@ def describing_function(
     _check_omega(method, omega)
     if A.size == 0 or np.prod(shape) == 0:
         return np.zeros(shape, dtype=complex)
-    N = _points(
-        method,
-        np.broadcast_to(A, shape),
-        None if omega is None else np.broadcast_to(omega, shape),
-        zero_check,
-    )
-    return N[()]
+    pairs = np.broadcast_to(A, shape), None if omega is None else np.broadcast_to(omega, shape)
+    return points(method, *pairs, zero_check)[0][()]
 
 
 def describing_function_family(
@@ -143,7 +138,7 @@ def describing_function_family(
 
 
 class _Work:
-    """The rows of a family, done and to do, with the file they are kept in."""
+    """A family in parts, done and to do, with the file they are kept in."""
 
     def __init__(self, F, method: Method, A, omega, orders, save):
         self.F, self.method, self.A, self.omega, self.orders = F, method, A, omega, orders
@@ -151,28 +146,28 @@ class _Work:
         self.harmonics = np.full((*shape, orders + 1), np.nan + 0j)
         self.regime = np.full(shape, "", dtype="U24")
         self.residual = np.full(shape, np.nan)
-        self.done = np.zeros(A.size, dtype=bool)
+        self.by_omega = method.name == "orbit"  # along amplitudes one orbit starts the next: keep columns whole
+        self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
         self.save = None if save is None else Path(save)
         self.saved_at = time.monotonic()
         if self.save is not None and self.save.exists():
             self._resume()
 
     def run(self, executor, progress):
-        rows = np.nonzero(~self.done)[0]
-        if rows.size == 0:
+        lines = np.nonzero(~self.done)[0]
+        if lines.size == 0:
             return
-        quick = self.method.name not in ("orbit", "backlash", "memory")
-        parts = [rows] if quick and executor is None else [rows[i : i + 1] for i in range(rows.size)]
-        bar = _bar(sum(len(p) for p in parts), progress)
+        quick = self.method.name != "orbit" and self.method.name not in ("backlash", "memory")
+        parts = [lines] if quick and executor is None else [lines[i : i + 1] for i in range(lines.size)]
+        bar = _bar(lines.size, progress)
         try:
             if executor is None:
                 for part in parts:
-                    self._take(part, compute_rows(self.method, self.A[part], self.omega, self.orders))
+                    self._take(part, compute_part(self.method, *self._grid(part), self.orders))
                     bar.update(len(part))
             else:
                 pending = [
-                    (part, executor.submit(compute_rows, self.method, self.A[part], self.omega, self.orders))
-                    for part in parts
+                    (part, executor.submit(compute_part, self.method, *self._grid(part), self.orders)) for part in parts
                 ]
                 for part, future in pending:
                     self._take(part, future.result())
@@ -182,8 +177,12 @@ class _Work:
             if self.save is not None and self.done.any():
                 self._write()
 
-    def _take(self, part, rows):
-        self.harmonics[part], self.regime[part], self.residual[part] = rows
+    def _grid(self, part):
+        return (self.A, self._omega[part]) if self.by_omega else (self.A[part], self.omega)
+
+    def _take(self, part, values):
+        where = (slice(None), part) if self.by_omega else part
+        self.harmonics[where], self.regime[where], self.residual[where] = values
         self.done[part] = True
         if self.save is not None and time.monotonic() - self.saved_at > _PARTIAL_EVERY:
             self._write()
@@ -218,7 +217,8 @@ class _Work:
             (self.regime, "regime"),
             (self.residual, "residual"),
         ):
-            mine[done] = data[name][done]
+            where = (slice(None), done) if self.by_omega else done
+            mine[where] = data[name][where]
 
     def _fingerprint(self) -> str:
         text = hashlib.sha256(
@@ -247,8 +247,8 @@ class _Work:
         )
 
 
-def compute_rows(method: Method, A, omega, orders):
-    """Compute a few rows of a family; a plain function, so that it can be sent to another process."""
+def compute_part(method: Method, A, omega, orders):
+    """Compute a few rows or columns of a family; a plain function, so that it can be sent to another process."""
     return method.harmonics(A, omega, orders)
 
 
@@ -267,33 +267,46 @@ def identity(F) -> str:
     return f"{describe(F)}|{numbers}|{getattr(F, 'values', '')}|{getattr(F, 'measured', '')}"
 
 
-def _points(method, A, omega, zero_check):
-    """N at pairs (A, omega), grouped so that grid solvers see grids."""
-    N = np.empty(A.shape, dtype=complex)
-    flat, zero = N.reshape(-1), A.reshape(-1) == 0
-    a = A.reshape(-1)
+def points(method: Method, A, omega, zero_check=False):
+    """N and regime at pairs (A, omega), grouped so that grid solvers see grids.
+
+    Parameters
+    ----------
+    method : Method
+    A, omega : ndarray of one shape; omega may be None for a memoryless block
+    zero_check : bool
+        As in `describing_function`.
+
+    Returns
+    -------
+    N : ndarray of complex
+    regime : ndarray of str
+    """
+    N, regime = np.empty(A.shape, dtype=complex), np.full(A.shape, "", dtype="U24")
+    flat, names, a = N.reshape(-1), regime.reshape(-1), A.reshape(-1)
+    zero = a == 0
     if zero.any():
         flat[zero] = _slope_at_zero(method, a.max(), zero_check)
     live = np.nonzero(~zero)[0]
     if not live.size:
-        return N
+        return N, regime
     levels, row = np.unique(a[live], return_inverse=True)
-    if not method.needs_omega:
-        y, _, _ = method.harmonics(levels, None, 1)
-        flat[live] = y[row, 0, 1]
-        return N
+    if not method.needs_omega or omega is None:
+        y, kind, _ = method.harmonics(levels, None, 1)
+        flat[live], names[live] = y[row, 0, 1], kind[row, 0]
+        return N, regime
     w = omega.reshape(-1)[live]
     frequencies, column = np.unique(w, return_inverse=True)
     if levels.size * frequencies.size <= _RECTANGLE * live.size:
-        y, _, _ = method.harmonics(levels, frequencies, 1)
-        flat[live] = y[row, column, 1]
-        return N
+        y, kind, _ = method.harmonics(levels, frequencies, 1)
+        flat[live], names[live] = y[row, column, 1], kind[row, column]
+        return N, regime
     for k, frequency in enumerate(frequencies):
         mine = np.nonzero(column == k)[0]
         some, where = np.unique(row[mine], return_inverse=True)
-        y, _, _ = method.harmonics(levels[some], np.array([frequency]), 1)
-        flat[live[mine]] = y[where, 0, 1]
-    return N
+        y, kind, _ = method.harmonics(levels[some], np.array([frequency]), 1)
+        flat[live[mine]], names[live[mine]] = y[where, 0, 1], kind[where, 0]
+    return N, regime
 
 
 def _slope_at_zero(method, largest, zero_check):
@@ -380,5 +393,5 @@ def _bar(total: int, progress) -> Any:
 
     disable = None if progress is None else not progress
     return tqdm(
-        total=total, delay=0 if progress else 2, disable=disable, unit="row", desc="describing function"
+        total=total, delay=0 if progress else 2, disable=disable, unit="line", desc="describing function"
     )

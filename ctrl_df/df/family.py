@@ -135,7 +135,7 @@ def load_family(path) -> Family:
     data = read_arrays(path)
     if not bool(np.all(data.get("done", True))):
         raise ValueError(
-            f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of {data['done'].size} rows. "
+            f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of {data['done'].size} parts. "
             "Repeat the call of describing_function_family with the same save= to finish it."
         )
     return Family(

@@ -1,0 +1,226 @@
+"""All zeros of D(a, omega) = 1 + N(a, omega) H(j omega) in a box, in the variables ln a and ln omega.
+
+D has no unit, so nothing here depends on the scale of N, H, a or omega. The box is cut into cells; a cell whose
+corner values may hold a zero in real and imaginary part (with a margin for what lies between) is cut again with exact
+values, and each small cell that still may hold one starts a safeguarded Newton iteration. Converged zeros inside
+the box are collected once each; sign changes that lead to none (jumps of N between coexisting motions) are counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+_MARGIN = 0.3  # of a cell's spread of values, by which a zero may hide beyond its corners
+_CUTS = 4
+_MOST_STARTS = 600
+_STEP = 1e-5  # of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10
+_ACCEPT = 1e-8
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """One zero of D: place, remaining |D|, and the 2 x 2 matrix of its derivatives."""
+
+    amplitude: float
+    omega: float
+    residual: float
+    jacobian: np.ndarray
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What a search found and what it saw on the way."""
+
+    crossings: list[Crossing]
+    cells: int
+    missing: int
+    unresolved: int
+    truncated: bool
+
+
+def find_crossings(D: Callable, log_a, log_w, values, refine=True) -> Scan:
+    """Find the zeros of D on a grid.
+
+    Parameters
+    ----------
+    D : callable
+        ``D(ln a, ln omega)`` for two equally long 1-D arrays; NaN where there is no periodic answer.
+    log_a, log_w : ndarray, shapes (na,), (nw,)
+        Grid, ascending.
+    values : ndarray, shape (na, nw)
+        D on the grid.
+    refine : bool
+        Whether to iterate to convergence; False returns the estimate of one step.
+    """
+    missing = int(np.isnan(values).sum())
+    if min(values.shape) < 2:
+        return Scan([], 0, missing, 0, False)
+    rows, columns = np.nonzero(_may_hold_zero(values))
+    cells = int((values.shape[0] - 1) * (values.shape[1] - 1))
+    if rows.size == 0:
+        return Scan([], cells, missing, 0, False)
+    truncated = rows.size > _MOST_STARTS
+    rows, columns = rows[:_MOST_STARTS], columns[:_MOST_STARTS]
+    p, q, reach = _cut(D, log_a, log_w, rows, columns)
+    if p.size > _MOST_STARTS:
+        truncated = True
+        p, q, reach = p[:_MOST_STARTS], q[:_MOST_STARTS], reach[:_MOST_STARTS]
+    box = (log_a[0], log_a[-1], log_w[0], log_w[-1])
+    found, unresolved = _polish(D, p, q, reach, box, refine)
+    return Scan(found, cells, missing, unresolved, truncated)
+
+
+def jacobian(D: Callable, p, q) -> np.ndarray:
+    """Derivatives of (Re D, Im D) by (ln a, ln omega) at points p, q; shape (n, 2, 2)."""
+    h = _STEP
+    P = np.concatenate([p + h, p - h, p, p])
+    Q = np.concatenate([q, q, q + h, q - h])
+    up, down, right, left = np.split(D(P, Q), 4)
+    by_p, by_q = (up - down) / (2 * h), (right - left) / (2 * h)
+    return np.stack([np.stack([by_p.real, by_q.real], -1), np.stack([by_p.imag, by_q.imag], -1)], -2)
+
+
+def _may_hold_zero(values):
+    """Cells whose corners leave room for a zero; corners without an answer widen the room."""
+    corners = np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]])
+    known = np.isfinite(corners)
+    partial = ~known.all(axis=0)
+    hold = known.any(axis=0)
+    for part in (corners.real, corners.imag):
+        low = np.where(known, part, np.inf).min(axis=0)
+        high = np.where(known, part, -np.inf).max(axis=0)
+        with np.errstate(invalid="ignore"):
+            room = np.where(partial, 1.0, _MARGIN) * (high - low) + np.where(partial, 0.5, 0.0)
+            hold &= (low - room <= 0) & (high + room >= 0)
+    return hold
+
+
+def _cut(D, log_a, log_w, rows, columns):
+    """Cut candidate cells and return the centres of the small cells that may hold a zero, with their reach."""
+    t = np.linspace(0, 1, _CUTS + 1)
+    starts_p, starts_q, reach = [], [], []
+    da, dw = log_a[rows + 1] - log_a[rows], log_w[columns + 1] - log_w[columns]
+    P = np.broadcast_to((log_a[rows][:, None] + da[:, None] * t)[:, :, None], (rows.size, t.size, t.size))
+    Q = np.broadcast_to((log_w[columns][:, None] + dw[:, None] * t)[:, None, :], (rows.size, t.size, t.size))
+    values = D(P.ravel(), Q.ravel()).reshape(P.shape)
+    for i in range(rows.size):
+        r, c = np.nonzero(_may_hold_zero(values[i]))
+        starts_p.append(log_a[rows[i]] + da[i] * (t[r] + 0.5 / _CUTS))
+        starts_q.append(log_w[columns[i]] + dw[i] * (t[c] + 0.5 / _CUTS))
+        reach.append(np.tile([da[i], dw[i]], (r.size, 1)))
+    if not starts_p:
+        return np.zeros(0), np.zeros(0), np.zeros((0, 2))
+    return np.concatenate(starts_p), np.concatenate(starts_q), np.concatenate(reach)
+
+
+def _polish(D, p, q, reach, box, refine):
+    """Newton from every start at once; returns the distinct zeros in the box, and where it found none."""
+    if p.size == 0:
+        return [], 0
+    x = np.stack([p, q], axis=1)
+    start = x.copy()
+    value = D(x[:, 0], x[:, 1])
+    alive = np.isfinite(value)
+    finished = np.zeros(p.size, dtype=bool)
+    for _ in range(40 if refine else 1):
+        active = np.nonzero(alive & ~finished & (np.abs(value) > 1e-14))[0]
+        if active.size == 0:
+            break
+        J = jacobian(D, x[active, 0], x[active, 1])
+        step = _solve(J, value[active])
+        bad = ~np.isfinite(step).all(axis=1)
+        alive[active[bad]] = False
+        active, step = active[~bad], step[~bad]
+        if active.size == 0:
+            break
+        longest = np.maximum(np.abs(step) / reach[active], 1e-300).max(axis=1)
+        step = step * np.minimum(1.0, 1.0 / longest)[:, None]
+        moved = _line_search(D, x, value, active, step)
+        settled = np.abs(step).max(axis=1) < 1e-13
+        finished[active[settled | ~moved]] = True
+        far = np.abs((x - start) / reach).max(axis=1) > 6  # wandered off: another start owns what is there
+        alive &= ~far
+    good = alive & (np.abs(value) <= (_ACCEPT if refine else np.inf))
+    slack = 1e-9
+    inside = (x[:, 0] >= box[0] - slack) & (x[:, 0] <= box[1] + slack)
+    inside &= (x[:, 1] >= box[2] - slack) & (x[:, 1] <= box[3] + slack)
+    keep = np.nonzero(good & inside)[0]
+    found: list[Crossing] = []
+    places: list[np.ndarray] = []
+    for i in keep[np.argsort(np.abs(value[keep]))]:
+        near = 1e-5 if refine else 1.0 * reach[i]
+        if any((np.abs(x[i] - place) < near).all() for place in places):
+            continue
+        places.append(x[i])
+        J = jacobian(D, x[i : i + 1, 0], x[i : i + 1, 1])[0]
+        found.append(Crossing(float(np.exp(x[i, 0])), float(np.exp(x[i, 1])), float(abs(value[i])), J))
+    lost = _neighbourhoods(x[~good], value[~good], reach[~good], places)
+    return sorted(found, key=lambda c: (c.amplitude, c.omega)), lost
+
+
+def _neighbourhoods(x, value, reach, places):
+    """Count the neighbourhoods without a zero whose starts did not converge."""
+    best: list[int] = []
+    order = np.argsort(np.where(np.isfinite(value), np.abs(value), np.inf))
+    for i in order[np.isfinite(value[order])]:
+        others = places + [x[j] for j in best]
+        if not any((np.abs(x[i] - place) < 3 * reach[i]).all() for place in others):
+            best.append(int(i))
+    return len(best)
+
+
+def linear_zeros(log_a, log_w, values, chosen):
+    """Zeros of the linear interpolant in the two triangles of every chosen cell; shape (n, 2).
+
+    Parameters
+    ----------
+    log_a, log_w, values
+        As in `find_crossings`.
+    chosen : ndarray of bool, shape (na - 1, nw - 1)
+        Cells to look at.
+    """
+    zeros = []
+    for i, k in zip(*np.nonzero(chosen), strict=True):
+        da, dw = log_a[i + 1] - log_a[i], log_w[k + 1] - log_w[k]
+        for corner, sign in (((i, k), 1.0), ((i + 1, k + 1), -1.0)):
+            D0 = values[corner]
+            Da = values[i + 1, k] - D0 if sign > 0 else values[i, k + 1] - D0
+            Dw = values[i, k + 1] - D0 if sign > 0 else values[i + 1, k] - D0
+            M = np.array([[Da.real, Dw.real], [Da.imag, Dw.imag]])
+            if not np.isfinite(M).all() or abs(np.linalg.det(M)) < 1e-300:
+                continue
+            s, t = np.linalg.solve(M, [-D0.real, -D0.imag])
+            if s >= 0 and t >= 0 and s + t <= 1:
+                zeros.append((log_a[corner[0]] + sign * s * da, log_w[corner[1]] + sign * t * dw))
+    return np.array(zeros).reshape(-1, 2)
+
+
+def _solve(J, value):
+    """Newton steps; a nearly singular matrix gives the least-squares step."""
+    rhs = -np.stack([value.real, value.imag], axis=1)
+    out = np.full(rhs.shape, np.nan)
+    for i in range(len(rhs)):
+        if np.isfinite(J[i]).all():
+            out[i] = np.linalg.lstsq(J[i], rhs[i], rcond=1e-9)[0]
+    return out
+
+
+def _line_search(D, x, value, active, step):
+    """Halve steps until |D| falls; updates `x` and `value` in place, returns who moved."""
+    moved = np.zeros(active.size, dtype=bool)
+    share = 1.0
+    for _ in range(8):
+        todo = np.nonzero(~moved)[0]
+        if todo.size == 0:
+            break
+        trial = x[active[todo]] + share * step[todo]
+        new = D(trial[:, 0], trial[:, 1])
+        with np.errstate(invalid="ignore"):
+            better = np.abs(new) < np.abs(value[active[todo]])
+        x[active[todo[better]]], value[active[todo[better]]] = trial[better], new[better]
+        moved[todo[better]] = True
+        share *= 0.5
+    return moved

@@ -1,0 +1,156 @@
+"""The linear part of a loop on the imaginary axis: transfer function, state space or measured response."""
+
+from __future__ import annotations
+
+import math
+
+import control as ct
+import numpy as np
+
+_SMOOTH_STEP = 0.5 * math.pi  # largest phase step between data points for which their phase is followed [rad]
+
+
+class LinearPart:
+    """H evaluated at real frequencies.
+
+    Parameters
+    ----------
+    H : TransferFunction, StateSpace, FrequencyResponseData or number
+        One input, one output; continuous, or discrete with a stated sampling time.
+
+    Raises
+    ------
+    TypeError
+        H is no linear system.
+    ValueError
+        H is MIMO, or measured at fewer than two frequencies or with NaN.
+    """
+
+    def __init__(self, H):
+        if isinstance(H, int | float | np.integer | np.floating):
+            H = ct.tf([float(H)], [1.0])
+        if not isinstance(H, ct.TransferFunction | ct.StateSpace | ct.FrequencyResponseData):
+            raise TypeError(
+                f"H must be a linear system (transfer function, state space or FRD); got {type(H).__name__}. "
+                "The nonlinear part is the second argument."
+            )
+        if not H.issiso():
+            raise ValueError(
+                f"H must have one input and one output; got {H.ninputs} inputs, {H.noutputs} outputs. "
+                "Select one channel, H[i, j]."
+            )
+        self.H = H
+        self.measured = isinstance(H, ct.FrequencyResponseData)
+        self.dt = 0.0 if not H.isdtime(strict=True) else (1.0 if H.dt is True else float(H.dt))
+        self.top = math.pi / self.dt if self.dt else math.inf
+        self.bottom = 0.0
+        if self.measured:
+            self._prepare()
+
+    def __call__(self, omega) -> np.ndarray:
+        """H at `omega` [rad/s] (z = exp(j omega dt) if discrete); NaN at a pole; beyond measured data ValueError."""
+        omega = np.asarray(omega, dtype=float)
+        flat = omega.reshape(-1)
+        if self.measured:
+            self._require_inside(flat)
+            return self._interpolate(flat).reshape(omega.shape)
+        s = np.exp(1j * flat * self.dt) if self.dt else 1j * flat
+        with np.errstate(all="ignore"):
+            value = np.asarray(self.H(s, squeeze=False, warn_infinite=False)).reshape(-1).astype(complex)
+        return np.where(np.isfinite(value), value, np.nan).reshape(omega.shape)
+
+    def clamped(self, omega) -> tuple[np.ndarray, np.ndarray]:
+        """Return H at frequencies that may lie beyond measured data (the end value there), and which did."""
+        omega = np.asarray(omega, dtype=float)
+        if not self.measured:
+            return self(omega), np.zeros(omega.shape, dtype=bool)
+        return self(np.clip(omega, self.bottom, self.top)), (omega > self.top) | (omega < self.bottom)
+
+    @property
+    def static_gain(self) -> float:
+        """H at zero frequency, NaN if infinite or not measured."""
+        if self.measured:
+            return math.nan
+        try:
+            gain = complex(np.squeeze(self.H(1.0 if self.dt else 0.0, warn_infinite=False))).real
+        except (ZeroDivisionError, np.linalg.LinAlgError):
+            return math.nan
+        return gain if math.isfinite(gain) else math.nan
+
+    def grid(self, omega=None, points=1000) -> np.ndarray:
+        """Frequencies to scan: those given, the range given as a two-element list, or what the poles suggest.
+
+        Raises
+        ------
+        ValueError
+            Frequencies not positive, above the Nyquist frequency, or outside measured data.
+        """
+        if omega is None:
+            return self._own_grid(points)
+        is_range = isinstance(omega, list | tuple) and len(omega) == 2
+        values = np.unique(np.atleast_1d(np.asarray(omega, dtype=float)))
+        if values.ndim != 1 or values.size == 0:
+            raise ValueError("omega needs at least one frequency [rad/s]; got none. Leave it out to scan by default.")
+        if not np.isfinite(values).all() or (values < 0).any():
+            raise ValueError(f"omega must be positive and finite [rad/s]; got {values.min():g} to {values.max():g}.")
+        if values[0] == 0:  # python-control starts some of its contours at zero, where no cycle can be
+            values = values[1:] if not is_range else np.array([1e-3 * values[-1], values[-1]])
+        if is_range and values.size == 2:
+            values = np.geomspace(values[0], values[1], points)
+        if self.measured:
+            self._require_inside(values)
+        if values.size and values[0] > self.top:
+            raise ValueError(
+                f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[0]:g} rad/s."
+            )
+        return values[values <= self.top * (1 + 1e-12)]
+
+    def _own_grid(self, points):
+        if self.measured:
+            return np.geomspace(self.bottom, self.top, max(points, 4 * self.H.omega.size))
+        features = np.concatenate([self.H.poles(), self.H.zeros()])
+        if self.dt:
+            features = features[np.abs(features) > 1e-12]
+            features = np.log(features) / self.dt
+        size = np.abs(features)
+        size = size[(size > 1e-8 * max(size.max(initial=0.0), 1e-8)) & np.isfinite(size)]
+        low, high = (size.min(), size.max()) if size.size else (1.0, 1.0)
+        top = self.top if self.dt else 100 * high
+        return np.geomspace(min(low / 100, top / 1e4), top, points)
+
+    def _prepare(self):
+        omega = np.asarray(self.H.omega, dtype=float)
+        value = np.asarray(self.H.frdata)[0, 0].astype(complex)
+        keep = np.argsort(omega)
+        omega, value = omega[keep], value[keep]
+        positive = omega > 0
+        omega, value = omega[positive], value[positive]
+        if omega.size < 2 or not np.isfinite(value).all():
+            raise ValueError(
+                f"a measured H needs at least two positive frequencies with finite values; got {omega.size} frequencies. "
+                "Remove points that are NaN."
+            )
+        from scipy.interpolate import Akima1DInterpolator, CubicSpline
+
+        make = CubicSpline if omega.size >= 4 else (lambda x, y: CubicSpline(x, y, bc_type="natural"))
+        self.bottom, top = float(omega[0]), float(omega[-1])
+        self.top = min(self.top, top)
+        x = np.log(omega)
+        smooth = (np.abs(value) > 0).all() and np.abs(np.angle(value[1:] / value[:-1])).max() < _SMOOTH_STEP
+        if smooth:  # magnitude and phase of a physical response run smoothly over log frequency
+            log = make(x, np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value)))
+            self._spline = lambda q: np.exp(log(q))
+        else:
+            self._spline = Akima1DInterpolator(x, value) if omega.size > 2 else make(x, value)
+
+    def _interpolate(self, omega):
+        x = np.clip(np.log(omega), np.log(self.bottom), np.log(self.top))
+        return np.asarray(self._spline(x), dtype=complex)
+
+    def _require_inside(self, omega):
+        slack = 1e-9
+        if omega.size and (omega.min() < self.bottom * (1 - slack) or omega.max() > self.top * (1 + slack)):
+            raise ValueError(
+                f"a measured H is known from {self.bottom:g} to {self.top:g} rad/s only; got omega from {omega.min():g} "
+                f"to {omega.max():g}. Keep omega inside the data, or fit a model to them."
+            )
