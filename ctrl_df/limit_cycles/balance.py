@@ -145,10 +145,10 @@ def _orbits(block, output):
     """Answer of a block with dynamics: its forced periodic orbit under the whole waveform."""
     from .waveform import WaveformOrbit
 
-    solver = WaveformOrbit(block, output, max_steps=30_000)
+    solver = WaveformOrbit(block, output)
 
     def respond(U, omega):
-        return solver.respond(np.where(np.arange(U.size) % 2 == 1, U, 0) if solver.symmetric else U, omega)
+        return solver.respond(U, omega)
 
     return respond
 

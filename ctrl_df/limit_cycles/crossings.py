@@ -16,6 +16,7 @@ import numpy as np
 _MARGIN = 0.3  # of a cell's spread of values, by which a zero may hide beyond its corners
 _CUTS = 4
 _MOST_STARTS = 600
+_MOST_PER_CELL = 4
 _STEP = 1e-5  # of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10
 _ACCEPT = 1e-8
 
@@ -108,6 +109,10 @@ def _cut(D, log_a, log_w, rows, columns):
     values = D(P.ravel(), Q.ravel()).reshape(P.shape)
     for i in range(rows.size):
         r, c = np.nonzero(_may_hold_zero(values[i]))
+        if r.size > _MOST_PER_CELL:  # neighbours of one zero; the nearest few suffice
+            middle = np.abs(values[i][r, c] + values[i][r + 1, c] + values[i][r, c + 1] + values[i][r + 1, c + 1])
+            best = np.argsort(np.where(np.isfinite(middle), middle, np.inf))[:_MOST_PER_CELL]
+            r, c = r[best], c[best]
         starts_p.append(log_a[rows[i]] + da[i] * (t[r] + 0.5 / _CUTS))
         starts_q.append(log_w[columns[i]] + dw[i] * (t[c] + 0.5 / _CUTS))
         reach.append(np.tile([da[i], dw[i]], (r.size, 1)))
@@ -125,7 +130,7 @@ def _polish(D, p, q, reach, box, refine):
     value = D(x[:, 0], x[:, 1])
     alive = np.isfinite(value)
     finished = np.zeros(p.size, dtype=bool)
-    for _ in range(40 if refine else 1):
+    for iteration in range(40 if refine else 1):
         active = np.nonzero(alive & ~finished & (np.abs(value) > 1e-14))[0]
         if active.size == 0:
             break
@@ -141,6 +146,8 @@ def _polish(D, p, q, reach, box, refine):
         moved = _line_search(D, x, value, active, step)
         settled = np.abs(step).max(axis=1) < 1e-13
         finished[active[settled | ~moved]] = True
+        if iteration == 8:  # quadratic convergence shows by now; what has none sits at a jump
+            alive &= np.abs(value) < 1e-3
         far = np.abs((x - start) / reach).max(axis=1) > 6  # wandered off: another start owns what is there
         alive &= ~far
     good = alive & (np.abs(value) <= (_ACCEPT if refine else np.inf))
@@ -212,7 +219,7 @@ def _line_search(D, x, value, active, step):
     """Halve steps until |D| falls; updates `x` and `value` in place, returns who moved."""
     moved = np.zeros(active.size, dtype=bool)
     share = 1.0
-    for _ in range(8):
+    for _ in range(5):
         todo = np.nonzero(~moved)[0]
         if todo.size == 0:
             break

@@ -395,9 +395,8 @@ def _nyquist(linear, omega, warn, check, kwargs):
     elif isinstance(omega, list | tuple) and len(omega) == 2:
         omega = linear.grid(omega, 1000)
     elif omega is not None:
-        omega = np.unique(np.asarray(omega, dtype=float))
-        linear.grid(omega)
-        omega = omega[omega <= linear.top]
+        omega = linear.grid(np.asarray(omega, dtype=float).reshape(-1))
+        omega = _refined_omega(linear, omega, most=1000)  # so that the drawn curve passes through the crossings
     proper = linear.measured or linear.dt or np.isfinite(linear.clamped(np.array([1e300]))[0]).all()
     with warnings.catch_warnings():
         if not warn:

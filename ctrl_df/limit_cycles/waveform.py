@@ -1,45 +1,187 @@
-"""Forced periodic orbits under a waveform that holds more than its fundamental."""
+"""The steady answer of a block with dynamics to a periodic waveform that holds more than its fundamental."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..df.orbits import OrbitSolver, _OutOfWork
-from ..simulate.engine import harmonic_drive
+from ..blocks.mechanism import Mechanism
+from ..simulate.engine import Engine, harmonic_drive
+
+_ANCHORS = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
+_UNSUITED = {"input_delay", "sensor_delay", "drift", "sensor_quantization"}
+_CLOSED = 1e-8  # mismatch after a period, relative to the size of the motion
+RTOL = 1e-9
 
 
-class WaveformOrbit(OrbitSolver):
-    """`OrbitSolver` for the input ``Re sum U_k exp(j k omega t)``; each solution starts the next."""
+class WaveformOrbit:
+    """Forced periodic motions of one block, each started from the one before.
+
+    Parameters
+    ----------
+    block : ct.NonlinearIOSystem
+    output : str
+        Output described.
+    max_steps : int
+        Bound on the work of one motion, in integration steps.
+    """
+
+    def __init__(self, block, output, max_steps=60_000):
+        self.engine = Engine(block)
+        self.row = list(block.output_labels).index(output)
+        self.max_steps = max_steps
+        self.core = block.core if isinstance(block, Mechanism) else None
+        ids = {e.id for e in block.effects} if isinstance(block, Mechanism) else set()
+        self.suited = not ids & _UNSUITED
+        self.adrift = self.core is not None and not ids & _ANCHORS
+        n = self.engine.nstates
+        self.transform, self.kept = np.eye(n), np.arange(n)
+        if self.core is not None and self.core.bodies == 2:
+            self.transform[2, 0] = -1.0  # the stretch x_motor - x repeats, the place of both may be free
+        if self.adrift:
+            self.kept = self.kept[1:]
+        self.inverse = np.linalg.inv(self.transform)
+        self.previous = None
 
     def respond(self, U, omega: float):
-        """Return the output's coefficients Y_k, k = 0..len(U) - 1, or None where no attracting period is found."""
+        """Return Y_k, k = 0..len(U) - 1, for the input ``Re sum U_k exp(j k omega t)``; None if no period is found."""
         U = np.asarray(U, dtype=complex)
-        size = float(abs(U[1]))
-        self.omega, self.period, self.budget = omega, 2 * np.pi / omega, self.max_steps
-        self.drive, self.flipped = harmonic_drive([U], omega), harmonic_drive([-U], omega)
-        try:
-            for state in self._starts(size):
-                state.time, state.fresh = 0.0, True
-                orbit = self._periodic(state)
-                if orbit is not None:
-                    self.previous = orbit[0]
-                    return self._harmonics(orbit[0], size, U.size - 1, 1)[0] * size
-        except _OutOfWork:
-            pass
+        self.omega, self.period, self.left = omega, 2 * np.pi / omega, self.max_steps
+        self.drive = harmonic_drive([U], omega)
+        if not self.suited:
+            return None
+        for state in self._starts(float(abs(U[1]))):
+            orbit = None if state is None else self._close(state)
+            if orbit is not None:
+                self.previous = orbit
+                return self._harmonics(orbit, U.size)
         return None
 
     def _starts(self, size):
-        """States to start from: the last orbit, rest, and for a gap a knock that leaves the motion without contact."""
+        """States to start from: the last motion, rest, and for a gap a knock that leaves the motion without contact."""
         if self.previous is not None:
-            yield self.previous.copy()
+            yield self.previous
             self.previous = None
-        if self.core is None or self.core.gap == 0:
-            yield self._start(size)
-            yield self._follow(self._start(size), 30)
+        gap = 0.0 if self.core is None else self.core.gap
+        if gap == 0:
+            for periods in (3, 30):
+                yield self._follow(self.engine.start(), periods)
             return
         driven = size / (sum(self.core.masses) * self.omega)
-        crossing = self.core.gap * self.omega / np.pi  # one gap in half a period: the two-impact motion
+        crossing = gap * self.omega / np.pi  # one gap in half a period: the two-impact motion
         for speed in (3.0 * driven, crossing, -crossing, 2.0 * crossing, -driven):
             x = np.zeros(self.engine.nstates)
-            x[2], x[3] = 0.5 * self.core.gap, speed
+            x[2], x[3] = 0.5 * gap, speed
             yield self._follow(self.engine.start(x), 20)
+
+    def _follow(self, state, periods):
+        for _ in range(periods):
+            state = self._map(state)
+            if state is None:
+                return None
+        return state
+
+    def _map(self, state):
+        """State after one period, its time set back to zero; None where the run fails or the work is spent."""
+        if self.left <= 0:
+            return None
+        start = state.copy()
+        start.time, start.fresh = 0.0, True
+        run = self.engine.run(
+            start, self.period, self.drive, rtol=RTOL, max_step=self.period / 8, log=1, max_steps=self.left
+        )
+        self.left -= run.steps
+        if not run.status.ok or not np.isfinite(run.state.x).all():
+            return None
+        run.state.time = 0.0
+        return run.state
+
+    def _close(self, state):
+        """Newton on the period map, the Jacobian by differences, kept while it serves."""
+        matrix, best = None, np.inf
+        for _ in range(14):
+            after = self._map(state)
+            if after is None:
+                return None
+            before_y, after_y = self.transform @ state.x, self.transform @ after.x
+            step = (after_y - before_y)[self.kept]
+            size = self._sizes(before_y, after_y)
+            mismatch = np.max(np.abs(step) / size[self.kept], initial=0.0)
+            if mismatch < _CLOSED:
+                return after
+            if mismatch > 0.5 * best:
+                matrix = None
+            best = min(best, mismatch)
+            if matrix is None:
+                matrix = self._differences(state, after_y, size)
+                if matrix is None:
+                    return None
+            change = np.linalg.lstsq(np.eye(step.size) - matrix, step, rcond=1e-7)[0]
+            if not np.isfinite(change).all() or np.any(np.abs(change) > 3 * size[self.kept]):
+                state, matrix = after, None
+                continue
+            target = before_y.copy()
+            target[self.kept] += change
+            state = self._at(target)
+        return None
+
+    def _sizes(self, one, other):
+        """Sizes of the coordinates; speed and position of a body set each other's scale."""
+        size = np.maximum(np.abs(one), np.abs(other))
+        if self.core is not None:
+            bodies = 2 * self.core.bodies
+            drive = np.abs(self.drive.harmonics[0]).max() / (sum(self.core.masses) * self.omega)
+            speed = max(size[1:bodies:2].max(), drive)
+            size[1:bodies:2] = speed
+            size[0:bodies:2] = np.maximum(size[0:bodies:2], speed / self.omega)
+        return np.maximum(size, 1e-6 * size.max(initial=0.0) or 1.0)
+
+    def _differences(self, state, after_y, size):
+        base = self.transform @ state.x
+        columns = []
+        for i in self.kept:
+            y = base.copy()
+            y[i] += 1e-6 * size[i] * (1 if base[i] <= 0 else -1)
+            moved = self._at(y)
+            h = (self.transform @ moved.x)[i] - base[i]
+            after = self._map(moved) if h else None
+            if after is None:
+                return None
+            columns.append((self.transform @ after.x - after_y)[self.kept] / h)
+        return np.array(columns).T
+
+    def _at(self, y):
+        """A fresh state at coordinates y, kept within the gap and the stops."""
+        x = self.inverse @ y
+        if self.core is not None:
+            if self.core.joint == "impact":
+                x[2] = x[0] + min(max(x[2] - x[0], 0.0), self.core.gap)
+            if self.core.stop is not None:
+                low, high = self.core.stop.span
+                b = 2 * self.core.driven
+                x[b] = min(max(x[b], low), high)
+        return self.engine.start(x)
+
+    def _harmonics(self, orbit, count):
+        """Fourier coefficients over one period, free of a steady travel."""
+        start = orbit.copy()
+        start.time, start.fresh = 0.0, True
+        spectrum = np.zeros((self.engine.noutputs, count), complex)
+        ends = np.array([0.0, self.period])
+        run = self.engine.run(
+            start,
+            self.period,
+            self.drive,
+            ends,
+            rtol=RTOL,
+            max_step=self.period / 8,
+            spectrum=spectrum,
+            omega=self.omega,
+            max_steps=self.max_steps,
+        )
+        if not run.status.ok:
+            return None
+        Y = spectrum[self.row] * 2 / self.period
+        travel = run.outputs[-1, self.row] - run.outputs[0, self.row]
+        Y[1:] -= 1j * travel / (np.pi * np.arange(1, count))  # coefficients of the ramp travel t / period
+        Y[0] = 0.0 if self.adrift else Y[0] / 2  # a free mass has no mean position of its own
+        return Y

@@ -1,0 +1,188 @@
+"""The Nyquist picture of a describing-function analysis, with the answer written at each crossing."""
+
+from __future__ import annotations
+
+import warnings
+
+import control as ct
+import numpy as np
+
+from ..limit_cycles.predict import DescribingFunctionResponse, describing_function_response
+from .family import (
+    CROSSING_COLOR,
+    NYQUIST_COLOR,
+    axes_for,
+    draw_curves,
+    draw_single,
+    finish,
+    memoryless,
+    set_view,
+    short,
+    view_of,
+)
+
+_ANALYSIS = (
+    "refine",
+    "warn_nyquist",
+    "output",
+    "orders",
+    "num_points",
+    "try_method",
+    "executor",
+    "save",
+    "progress",
+    "options",
+)
+
+
+def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None, **kwargs) -> ct.ControlPlot:
+    """Nyquist plot of H with the -1/N curves of the block; crossings carry amplitude and frequency.
+
+    Called as ``describing_function_plot(response)`` or ``describing_function_plot(H, F, A[, omega])``; the second
+    form runs `describing_function_response`. A memoryless block has one -1/N curve, drawn over python-control's
+    Nyquist plot. A block with dynamics has a family: solid at constant amplitude, dashed at constant frequency; H is
+    then drawn over the frequencies scanned (continuous Nyquist contours clip and shift what an improper H has to show).
+
+    Parameters
+    ----------
+    *sysdata
+        A response, or H, F, A and optionally omega.
+    point_label : str or None
+        Format of the crossings' labels, two numbers: amplitude and frequency. None: no labels.
+    label : str, False or None
+        Name of the Nyquist curve.
+    ax, title
+        As in ``ct.nyquist_plot``.
+    refine, warn_nyquist, output, orders, num_points, try_method, executor, save, progress, options
+        Passed to `describing_function_response`.
+    **kwargs
+        Line properties of the Nyquist curve; for a memoryless block every keyword of ``ct.nyquist_plot``.
+
+    Returns
+    -------
+    ControlPlot
+        ``lines[0]`` Nyquist curve, ``lines[1]`` describing function, for a family first the curves at constant amplitude.
+
+    Raises
+    ------
+    TypeError
+        Wrong positional arguments, legend keywords.
+    ValueError
+        `label` neither string, False nor None.
+    """
+    if label not in (False, None) and not isinstance(label, str):
+        raise ValueError("label must be formatting string, False, or None")
+    if "warn" in kwargs:
+        warnings.warn("'warn' is replaced by 'warn_nyquist'", FutureWarning, stacklevel=2)
+        kwargs["warn_nyquist"] = kwargs.pop("warn")
+    analysis = {key: kwargs.pop(key) for key in _ANALYSIS if key in kwargs}
+    if len(sysdata) in (3, 4):
+        response = describing_function_response(*sysdata, **analysis)
+    elif len(sysdata) == 1:
+        response = sysdata[0]
+        if not isinstance(response, DescribingFunctionResponse):
+            raise TypeError("data must be DescribingFunctionResponse")
+    else:
+        raise TypeError("1, 3, or 4 position arguments required")
+    for keyword in ("legend_loc", "legend_map", "show_legend"):
+        if keyword in kwargs:
+            raise TypeError(f"unexpected keyword argument '{keyword}'")
+    if memoryless(response.family):
+        return _over_nyquist(response, point_label, label, kwargs)
+    return _family_picture(response, point_label, label, kwargs)
+
+
+def _over_nyquist(response, point_label, label, kwargs):
+    """python-control's Nyquist plot with the single -1/N curve of a memoryless block."""
+    reach = max([15.0, *(3 * abs(p) for p in response.positions)])
+    kwargs.setdefault("max_curve_magnitude", reach)  # its default would bend the curve where the crossing is
+    if isinstance(label, str):
+        kwargs["label"] = label
+    kwargs.setdefault("title", _title(response))
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*tight_layout.*|.*constrained_layout.*")
+        cplt = response.response.plot(**kwargs)
+    ax = cplt.axes[0, 0]
+    lines = np.empty(2, dtype=object)
+    lines[0] = np.concatenate(cplt.lines.flatten()).tolist()
+    curve = np.asarray(response.N_vals)
+    if response.positions:
+        _keep_in_view(ax, response.positions)
+    amplitudes = response.family.amplitudes
+    lines[1] = [draw_single(ax, amplitudes, curve[-amplitudes.size :], color="#b3541e")]
+    _mark(ax, response, point_label)
+    return ct.ControlPlot(lines, cplt.axes, cplt.figure)
+
+
+def _family_picture(response, point_label, label, kwargs):
+    fig, ax = axes_for(kwargs.pop("ax", None))
+    title = kwargs.pop("title", None)
+    family, H = response.family, response.response
+    w = np.abs(np.asarray(H.contour).imag) if not H.dt else np.angle(H.contour) / H.dt
+    seen = (w >= family.omega.min() * (1 - 1e-9)) & (w <= family.omega.max() * (1 + 1e-9))
+    curve = np.asarray(H.response)[seen]
+    include = response.positions or ()
+    set_view(ax, view_of(np.concatenate([family.minus_inverse.ravel(), curve]), include))
+    solid, dashed = draw_curves(ax, family)
+    lines = np.empty(2, dtype=object)
+    options = {"color": NYQUIST_COLOR, "lw": 2.2, "label": label or None, **kwargs}
+    lines[0] = ax.plot(curve.real, curve.imag, **options)
+    lines[1] = solid + dashed
+    _name_curve(ax, curve, label if isinstance(label, str) else "H(jω)")
+    _mark(ax, response, point_label)
+    finish(ax, _title(response) if title is None else title)
+    return ct.ControlPlot(lines, np.array([[ax]]), fig)
+
+
+def _name_curve(ax, curve, name):
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    inside = (curve.real > left) & (curve.real < right) & (curve.imag > bottom) & (curve.imag < top)
+    index = np.nonzero(inside)[0]
+    if index.size:
+        place = curve[index[int(0.93 * (index.size - 1))]]
+        ax.annotate(
+            name, (place.real, place.imag), xytext=(6, 0), textcoords="offset points", color=NYQUIST_COLOR, fontsize=10
+        )
+
+
+def _mark(ax, response, point_label):
+    """Mark the crossings: filled where Loeb calls the cycle stable, open otherwise."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    taken: list[tuple[float, float]] = []
+    for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
+        fill = CROSSING_COLOR if cycle.stable else "white"
+        ax.plot(position.real, position.imag, "o", ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
+        if not point_label:
+            continue
+        x, y = (position.real - left) / (right - left), (position.imag - bottom) / (top - bottom)
+        shift = -14 if any(abs(x - u) < 0.25 and abs(y - v) < 0.06 for u, v in taken) else 6
+        taken.append((x, y))
+        aside = (-8, "right") if x > 0.72 else (8, "left")
+        ax.annotate(
+            (point_label % (cycle.amplitude, cycle.omega)).strip(),
+            (position.real, position.imag),
+            xytext=(aside[0], shift),
+            textcoords="offset points",
+            ha=aside[1],
+            color=CROSSING_COLOR,
+            fontsize=10,
+            fontweight="bold",
+            bbox=dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85),
+            zorder=7,
+        )
+
+
+def _keep_in_view(ax, positions):
+    """Widen the limits of a Nyquist plot so that every crossing lies well inside."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    x = [p.real for p in positions if np.isfinite(p)]
+    y = [p.imag for p in positions if np.isfinite(p)]
+    pad_x, pad_y = 0.1 * (right - left), 0.1 * (top - bottom)
+    ax.set_xlim(min([left, *(v - pad_x for v in x)]), max([right, *(v + pad_x for v in x)]))
+    ax.set_ylim(min([bottom, *(v - pad_y for v in y)]), max([top, *(v + pad_y for v in y)]))
+
+
+def _title(response):
+    count = len(response.limit_cycles)
+    found = {0: "no limit cycle predicted", 1: "one limit cycle predicted"}.get(count, f"{count} limit cycles predicted")
+    return f"{short(response.family.description)}: {found}"

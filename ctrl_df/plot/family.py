@@ -1,0 +1,298 @@
+"""Pictures of a describing-function family: -1/N curves and harmonic content."""
+
+from __future__ import annotations
+
+import re
+
+import control as ct
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib import ticker
+
+AMPLITUDE_COLOR, OMEGA_COLOR, NYQUIST_COLOR, CROSSING_COLOR = "#1f5a99", "#b3541e", "#222222", "#a3123a"
+_HARMONIC_STYLES = (("-", "o"), ("--", "s"), ("-", "^"), ("--", "v"), ("-.", "D"), (":", "x"))
+
+
+def plot_family(family, *, ax=None, title=None, amplitudes=5, frequencies=5, **kwargs) -> ct.ControlPlot:
+    """Draw -1/N in the complex plane, at constant amplitude (solid) and at constant frequency (dashed).
+
+    Parameters
+    ----------
+    family : Family
+    ax : matplotlib Axes, optional
+        Where to draw; default a new figure, or the current one if it is empty.
+    title : str, optional
+    amplitudes, frequencies : int
+        Number of curves of each kind.
+    **kwargs
+        Line properties.
+
+    Returns
+    -------
+    ControlPlot
+        ``lines[0]`` curves at constant amplitude (or the one curve of a memoryless block), ``lines[1]`` at constant
+        frequency.
+    """
+    fig, ax = axes_for(ax)
+    lines = np.empty(2, dtype=object)
+    if memoryless(family):
+        curve = family.minus_inverse[:, 0]
+        set_view(ax, view_of(curve))
+        lines[0] = [draw_single(ax, family.amplitudes, curve, **kwargs)]
+        lines[1] = []
+    else:
+        set_view(ax, view_of(family.minus_inverse))
+        lines[0], lines[1] = draw_curves(ax, family, amplitudes, frequencies, **kwargs)
+    finish(ax, title or f"-1/N of {short(family.description)}")
+    return ct.ControlPlot(lines, np.array([[ax]]), fig)
+
+
+def plot_harmonics(family, *, ax=None, title=None, orders=None, amplitude=None, omega=None, **kwargs) -> ct.ControlPlot:
+    """Draw |Y_k| / A over frequency (left) and over amplitude (right), both axes logarithmic.
+
+    Parameters
+    ----------
+    family : Family
+    ax : matplotlib Axes or pair of Axes, optional
+        One axes draws over frequency if the family has several, else over amplitude.
+    title : str, optional
+    orders : sequence of int, optional
+        Harmonics drawn; default 1 to 5.
+    amplitude, omega : float, optional
+        Where the cuts are made, nearest grid value; default the middle of the grid.
+    **kwargs
+        Line properties.
+
+    Returns
+    -------
+    ControlPlot
+    """
+    orders = [k for k in (orders or range(1, 6)) if k <= family.orders]
+    i = _nearest(family.amplitudes, amplitude)
+    k = _nearest(family.omega, omega)
+    over_w, over_a = family.omega.size > 1 and not memoryless(family), family.amplitudes.size > 1
+    panels = [name for name, wanted in (("omega", over_w), ("amplitude", over_a)) if wanted] or ["amplitude"]
+    if ax is None:
+        fig = plt.figure(figsize=(4.9 * len(panels), 3.9), layout="constrained")
+        axes = np.atleast_1d(fig.subplots(1, len(panels), sharey=True))
+    else:
+        axes = np.atleast_1d(ax)
+        panels, fig = panels[: axes.size], axes[0].figure
+    lines = np.empty((1, axes.size), dtype=object)
+    for j, panel in enumerate(panels):
+        if panel == "omega":
+            x, y, where = family.omega, np.abs(family.harmonics[i]), f"A = {family.amplitudes[i]:.3g}"
+            axes[j].set_xlabel(r"$\omega$ [rad/s]")
+        else:
+            at = "" if memoryless(family) else rf"$\omega$ = {family.omega[k]:.3g} rad/s"
+            x, y, where = family.amplitudes, np.abs(family.harmonics[:, k]), at
+            axes[j].set_xlabel("input amplitude A")
+        lines[0, j] = _draw_harmonics(axes[j], x, y, orders, where, kwargs)
+    axes[0].set_ylabel(r"$|Y_k|\,/\,A$")
+    fig.suptitle(title or f"Harmonic content of {short(family.description)}", fontsize=10)
+    return ct.ControlPlot(lines, axes.reshape(1, -1), fig)
+
+
+def _draw_harmonics(ax, x, y, orders, where, kwargs):
+    top = np.nanmax(y[:, orders[0]]) if np.isfinite(y[:, orders[0]]).any() else 1.0
+    drawn, silent, places = [], [], []
+    for k in orders:
+        live = np.isfinite(y[:, k]) & (y[:, k] > 1e-9 * top)
+        if not live.any():
+            silent.append(k)
+            continue
+        style, marker = _HARMONIC_STYLES[(k - 1) % len(_HARMONIC_STYLES)]
+        shade = plt.get_cmap("viridis")(min(0.85, 0.17 * (k - 1)))
+        values = np.where(live, y[:, k], np.nan)
+        options = {"color": shade, "ls": style, "marker": marker, "ms": 3.2, "lw": 1.5, **kwargs}
+        options.setdefault("markevery", max(1, x.size // 8))
+        drawn += ax.loglog(x, values, **options)
+        last = np.nonzero(live)[0][-1]
+        places.append((k, x[last], values[last], shade))
+    for k, px, py, shade in places:
+        ax.annotate(f"{k}", (px, py), xytext=(5, 0), textcoords="offset points", color=shade, va="center", fontsize=9)
+    note = where + (f"\nharmonics {', '.join(map(str, silent))}: none" if silent else "")
+    ax.text(0.03, 0.04, note, transform=ax.transAxes, fontsize=8.5, color="0.3", va="bottom")
+    ax.grid(True, which="major", color="0.9", lw=0.7)
+    ax.margins(x=0.08)
+    log_ticks(ax.xaxis, x.min(), x.max())
+    _plain_spines(ax)
+    return drawn
+
+
+# --- shared with the Nyquist picture ---------------------------------------------------------------------------
+
+
+def memoryless(family) -> bool:
+    """Whether N does not change with frequency in this family."""
+    first, N = family.N[:, :1], family.N
+    same = np.isclose(N, first, rtol=1e-12, atol=0, equal_nan=True)
+    return bool(N.shape[1] == 1 or same.all())
+
+
+def axes_for(ax):
+    """Return (figure, axes): those given, an empty current figure's, or a new figure's."""
+    if ax is not None:
+        ax = np.asarray(ax, dtype=object).reshape(-1)[0]
+        return ax.figure, ax
+    fig = plt.gcf()
+    if fig.axes:
+        fig = plt.figure()
+    return fig, fig.add_subplot()
+
+
+def view_of(values, include=()) -> tuple[float, float, float, float]:
+    """Limits (left, right, bottom, top) that show the bulk of complex values, and all of `include`."""
+    z = np.asarray(values).ravel()
+    z = z[np.isfinite(z)]
+    include = np.asarray(list(include), dtype=complex)
+    if include.size:
+        size = 0.75 * np.abs(include).max()
+        low = complex(min(include.real) - size, min(include.imag) - size)
+        high = complex(max(include.real) + size, max(include.imag) + size)
+    elif z.size:
+        reach = np.quantile(np.abs(z), 0.8)
+        z = z[np.abs(z) <= reach * 1.001]
+        low, high = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
+    else:
+        low, high = -1 - 1j, 1 + 1j
+    left, right = min(low.real, 0.0), max(high.real, 0.0)
+    bottom, top = min(low.imag, 0.0), max(high.imag, 0.0)
+    width, height = max(right - left, 1e-12), max(top - bottom, 1e-12)
+    height, width = max(height, 0.25 * width), max(width, 0.25 * height)
+    mid_x, mid_y = 0.5 * (left + right), 0.5 * (bottom + top)
+    return mid_x - 0.58 * width, mid_x + 0.58 * width, mid_y - 0.58 * height, mid_y + 0.58 * height
+
+
+def set_view(ax, view):
+    """Fix the limits of the picture."""
+    ax.set_xlim(view[0], view[1])
+    ax.set_ylim(view[2], view[3])
+
+
+def draw_single(ax, amplitudes, curve, *, ticks=4, **kwargs):
+    """Draw the one -1/N curve of a memoryless block, with a few amplitudes marked; return the line."""
+    options = {"color": AMPLITUDE_COLOR, "lw": 1.8, **kwargs}
+    finite = np.where(np.isfinite(curve), curve, np.nan)
+    line = ax.plot(finite.real, finite.imag, **options)[0]
+    inside = np.nonzero(_inside(ax, finite))[0]
+    if inside.size:
+        chosen = inside[np.unique(np.linspace(0, inside.size - 1, ticks).round().astype(int))]
+        ax.plot(finite[chosen].real, finite[chosen].imag, ".", color=line.get_color(), ms=5)
+        taken: list = []
+        for i in chosen:
+            text = f"{'A = ' if i == chosen[0] else ''}{amplitudes[i]:.3g}"
+            _label(ax, finite[i], text, line.get_color(), taken, offset=(2, -12))
+    return line
+
+
+def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):
+    """Draw -1/N at a few constant amplitudes (solid) and constant frequencies (dashed), each labelled at its end."""
+    z = family.minus_inverse
+    shown = _inside(ax, z)
+    rows, columns = _chosen(shown.any(axis=1), amplitudes), _chosen(shown.any(axis=0), frequencies)
+    solid, dashed, taken = [], [], []
+    for n, i in enumerate(rows):
+        options = {"color": AMPLITUDE_COLOR, "lw": 1.1, "alpha": 0.9, **kwargs}
+        curve = unbroken(z[i], family.regime[i])
+        solid += ax.plot(curve.real, curve.imag, **options)
+        _end_label(ax, z[i], f"{'A = ' if n == 0 else ''}{family.amplitudes[i]:.3g}", AMPLITUDE_COLOR, taken)
+    for n, k in enumerate(columns):
+        options = {"color": OMEGA_COLOR, "lw": 1.1, "ls": (0, (4, 2)), "alpha": 0.9, **kwargs}
+        curve = unbroken(z[:, k], family.regime[:, k])
+        dashed += ax.plot(curve.real, curve.imag, **options)
+        _end_label(
+            ax, z[:, k], f"{'ω = ' if n == 0 else ''}{family.omega[k]:.3g}", OMEGA_COLOR, taken, from_start=True
+        )
+    return solid, dashed
+
+
+def finish(ax, title):
+    """Axes through the origin, labels and title."""
+    ax.axhline(0, color="0.75", lw=0.8, zorder=0)
+    ax.axvline(0, color="0.75", lw=0.8, zorder=0)
+    ax.set_xlabel("Real part")
+    ax.set_ylabel("Imaginary part")
+    ax.set_title(title, fontsize=10)
+    _plain_spines(ax)
+
+
+def short(text: str, most=46) -> str:
+    """Shorten a description so that it fits a title: numbers go first, then the tail."""
+    text = re.sub(r"\.with_effect\((\w+\([^()]*\))\)", r" + \1", text)
+    if len(text) > most:
+        text = re.sub(r"\([^()]*\)", "", text)
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def unbroken(curve, regime):
+    """Cut a curve (by NaN) where it jumps between different motions: no motion lies on the line between."""
+    step = np.abs(np.diff(curve))
+    size = np.maximum(np.abs(curve[1:]), np.abs(curve[:-1]))
+    with np.errstate(invalid="ignore"):
+        jump = (step > 4 * np.nanmedian(step)) & (step > 0.25 * size) & (regime[1:] != regime[:-1])
+    return np.insert(curve.astype(complex), np.nonzero(jump)[0] + 1, np.nan)
+
+
+def log_ticks(axis, low, high):
+    """Ticks at 1, 2, 5 with plain numbers over a short span, powers of ten over a long one."""
+    if high / low < 150:
+        axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0), numticks=20))
+        axis.set_major_formatter(ticker.FuncFormatter(lambda v, _: f"{v:g}"))
+    axis.set_minor_formatter(ticker.NullFormatter())
+
+
+def _plain_spines(ax):
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+
+
+def _chosen(has, count):
+    """Evenly spread indices among those that have something in view."""
+    index = np.nonzero(has)[0]
+    if index.size <= count:
+        return index
+    return index[np.unique(np.linspace(0, index.size - 1, count).round().astype(int))]
+
+
+def _inside(ax, z):
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    with np.errstate(invalid="ignore"):
+        return np.isfinite(z) & (z.real >= left) & (z.real <= right) & (z.imag >= bottom) & (z.imag <= top)
+
+
+def _end_label(ax, curve, text, color, taken, from_start=False):
+    inside = np.nonzero(_inside(ax, curve))[0]
+    order = inside if from_start else inside[::-1]
+    for index in order:
+        if _label(ax, curve[index], text, color, taken):
+            return
+
+
+def _label(ax, place, text, color, taken, offset=(3, 3)) -> bool:
+    """Write a label unless another one is near; return whether it was written."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    x, y = (place.real - left) / (right - left), (place.imag - bottom) / (top - bottom)
+    if not (0.01 < x < 0.93 and 0.01 < y < 0.96):
+        return False
+    if any(abs(x - u) < 0.10 and abs(y - v) < 0.05 for u, v in taken):
+        return False
+    taken.append((x, y))
+    ax.annotate(
+        text,
+        (place.real, place.imag),
+        xytext=offset,
+        textcoords="offset points",
+        color=color,
+        fontsize=8.5,
+        bbox=dict(boxstyle="round,pad=0.1", fc="white", ec="none", alpha=0.75),
+        zorder=4,
+        annotation_clip=True,
+    )
+    return True
+
+
+def _nearest(grid, value):
+    if value is None:
+        return grid.size // 2
+    return int(np.abs(np.log(grid) - np.log(value)).argmin())
