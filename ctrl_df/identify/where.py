@@ -1,0 +1,358 @@
+"""Where the error is: its share by time, direction, speed, position, load, amplitude, frequency.
+
+A region is a set of samples (or a band of frequencies). Under the null hypothesis the residual is stationary
+noise of the colour it is seen to have, so that a region's share of the squared error is its share of the
+samples. The p-values allow for that colour: neighbouring samples of a smooth residual say nearly the same
+thing, and count as few. All are adjusted for the number of regions looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .residual_tests import autocorrelation
+
+KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
+
+
+@dataclass(frozen=True)
+class Region:
+    """One region and its part in the error.
+
+    Attributes
+    ----------
+    kind : str
+        One of `KINDS`.
+    label : str
+        Such as ``v > 0`` or ``0.2 to 0.4 s``.
+    share, expected_share : float
+        Of the squared error; of the samples (for a band of frequencies: what its neighbours suggest).
+    p_value : float
+        Probability of a share this large by chance, adjusted for the number of regions.
+    bias, bias_p_value : float
+        Mean residual in the region over the rms of the whole residual; probability of one that large by
+        chance.
+    span : (float, float)
+        Its limits, in the unit of its kind (s, m/s, m, N, Hz).
+    sentence : str
+        The same in words.
+    """
+
+    kind: str
+    label: str
+    share: float
+    expected_share: float
+    p_value: float
+    bias: float
+    bias_p_value: float
+    span: tuple[float, float]
+    sentence: str = ""
+
+    @property
+    def excess(self) -> float:
+        """Share of the error beyond the share expected."""
+        return self.share - self.expected_share
+
+
+class Regions(tuple[Region, ...]):
+    """Regions, worst first."""
+
+    @property
+    def significant(self) -> Regions:
+        """Those whose share of the error is beyond chance (p < 0.01)."""
+        return Regions(r for r in self if r.p_value < 0.01)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """One sentence per significant region, or one that says there is none."""
+        return tuple(r.sentence for r in self.significant) or (
+            "The error is spread evenly: no region stands out.",
+        )
+
+    def of(self, kind: str) -> Regions:
+        """Return the regions of one kind, in their natural order."""
+        if kind not in KINDS:
+            raise ValueError(f"a kind of region must be one of {', '.join(KINDS)}; got {kind!r}.")
+        return Regions(sorted((r for r in self if r.kind == kind), key=lambda r: r.span))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds with a significant region, the worst first."""
+        return tuple(dict.fromkeys(r.kind for r in self.significant))
+
+    def table(self, rows: int = 12) -> str:
+        """Return the worst `rows` regions as text."""
+        lines = [f"{'kind':<15} {'region':<28} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"]
+        for r in self[:rows]:
+            lines.append(
+                f"{r.kind:<15} {r.label:<28} {r.share:>7.1%} {r.expected_share:>8.1%} {_p(r.p_value):>8} "
+                f"{r.bias:>+6.2f}"
+            )
+        return "\n".join(lines)
+
+
+def error_regions(t, residual, *, position=None, velocity=None, force=None, bins=8) -> Regions:
+    """Return every region's share of the squared error, worst first.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Times [s], evenly spaced.
+    residual : array_like, shape (n,)
+        Measured minus simulated. A position error remembers: what went wrong at one place stays visible until
+        corrected. The error of force or acceleration shows the place itself.
+    position, velocity, force : array_like or None, shape (n,)
+        Signals that divide the record; those missing leave their regions out.
+    bins : int
+        Parts of the record in time and in position.
+
+    Returns
+    -------
+    Regions
+        Significant ones first, by excess of error.
+
+    Raises
+    ------
+    ValueError
+        Unequal lengths, NaN, fewer than 50 samples.
+    """
+    t, r = _checked(t, residual)
+    signals = {}
+    for name, values in dict(position=position, velocity=velocity, force=force).items():
+        if values is not None:
+            signals[name] = _checked(t, values, name)[1]
+    total = float(np.sum(r * r))
+    if total == 0:
+        return Regions()
+    null = _Null(r)
+    found = [null.region(*part) for part in _parts(t, bins, **signals)]
+    found += _bands(t, r)
+    found.sort(key=lambda region: region.p_value)
+    count, worst, worst_bias = len(found), 0.0, 0.0
+    adjusted = []
+    for i, region in enumerate(found):  # Holm's step-down adjustment
+        worst = max(worst, min(region.p_value * (count - i), 1.0))
+        worst_bias = min(region.bias_p_value * count, 1.0)
+        adjusted.append(replace(region, p_value=worst, bias_p_value=worst_bias))
+    adjusted.sort(key=lambda region: (region.p_value >= 0.01, -region.excess))
+    return Regions(replace(region, sentence=_sentence(region)) for region in adjusted)
+
+
+# --- dividing the record --------------------------------------------------------------------------
+
+
+def _parts(t, bins, position=None, velocity=None, force=None) -> Iterator[tuple]:
+    """Yield (kind, label, mask, span) of every region of samples."""
+    edges = np.linspace(t[0], t[-1], bins + 1)
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        yield "time", f"{a:.3g} to {b:.3g} s", (t >= a) & ((t < b) | (b == edges[-1])), (a, b)
+    if velocity is not None:
+        yield from _by_velocity(t, velocity, position)
+    if position is not None:
+        yield from _quantiles("position", "m", position, bins)
+    if force is not None:
+        yield from _quantiles("load", "N", np.abs(force), 4, "|F| ")
+
+
+def _by_velocity(t, velocity, position):
+    fast = float(np.quantile(np.abs(velocity), 0.95))
+    low = 0.1 * fast
+    yield "direction", "v > 0", velocity > low, (low, math.inf)
+    yield "direction", "v < 0", velocity < -low, (-math.inf, -low)
+    speed = np.abs(velocity)
+    yield "low_speed", f"|v| < {low:.2g} m/s", speed < low, (0.0, low)
+    yield (
+        "low_speed",
+        f"{low:.2g} < |v| < {0.6 * fast:.2g} m/s",
+        (speed >= low) & (speed < 0.6 * fast),
+        (low, 0.6 * fast),
+    )
+    yield "low_speed", f"|v| > {0.6 * fast:.2g} m/s", speed >= 0.6 * fast, (0.6 * fast, math.inf)
+    turns = reversals(velocity, low)
+    if len(turns) < 3:
+        return
+    since = time_since(t, turns)
+    usual = float(np.median(np.diff(t[turns])))
+    first = 0.15 * usual
+    yield "after_reversal", f"within {first:.2g} s", since < first, (0.0, first)
+    middle = 0.5 * usual
+    yield (
+        "after_reversal",
+        f"{first:.2g} to {middle:.2g} s after",
+        (since >= first) & (since < middle),
+        (first, middle),
+    )
+    yield "after_reversal", f"later than {middle:.2g} s", since >= middle, (middle, math.inf)
+    if position is not None:
+        yield from _quantiles("amplitude", "m", swing(position, turns), 3)
+
+
+def _quantiles(kind, unit, values, count, prefix=""):
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, count + 1)))
+    for i, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        inside = (values >= a) & ((values < b) | (i == len(edges) - 2))
+        yield kind, f"{prefix}{a:.3g} to {b:.3g} {unit}", inside, (float(a), float(b))
+
+
+def reversals(velocity, threshold) -> np.ndarray:
+    """Return the samples where the velocity changes sign for good, that is, goes on to pass `threshold`."""
+    v = np.asarray(velocity, float)
+    state = np.where(v > threshold, 1, np.where(v < -threshold, -1, 0))
+    moving = np.flatnonzero(state)
+    change = np.flatnonzero(state[moving[1:]] != state[moving[:-1]])
+    turns = []
+    for before, after in zip(moving[change], moving[change + 1], strict=True):
+        crossing = np.flatnonzero(v[before : after + 1] * state[after] > 0)
+        turns.append(before + int(crossing[0]))
+    return np.array(turns, dtype=int)
+
+
+def time_since(t, events) -> np.ndarray:
+    """Return the time since the last event [s]; infinite before the first."""
+    t = np.asarray(t, float)
+    last = np.searchsorted(np.asarray(events), np.arange(len(t)), "right") - 1
+    return np.where(last >= 0, t - t[np.asarray(events)[np.maximum(last, 0)]], math.inf)
+
+
+def swing(position, turns) -> np.ndarray:
+    """Return, for every sample, half the stroke of the swing (between two reversals) it belongs to."""
+    x = np.asarray(position, float)
+    edges = np.concatenate(([0], turns, [len(x)]))
+    half = np.empty(len(x))
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        half[a:b] = 0.5 * np.ptp(x[a:b]) if b > a else 0.0
+    return half
+
+
+# --- what chance alone would do -------------------------------------------------------------------
+
+
+class _Null:
+    """Shares and means of a stationary Gaussian residual of the colour seen."""
+
+    def __init__(self, r):
+        n = len(r)
+        self.r, self.n, self.power = r, n, float(np.mean(r * r))
+        lags = n // 2
+        rho = autocorrelation(r, lags)
+        # Lags whose correlation is within three standard errors of none add noise only.
+        rho = np.where(rho**2 > 9 / n, rho, 0.0)
+        rho[0] = 1.0
+        self.lags = lags
+        self.rho = rho * (1 - np.arange(lags + 1) / n)
+
+    def independent(self, mask) -> tuple[float, float]:
+        """Effective number of samples of a region, for its mean square and for its mean."""
+        m = mask.astype(float)
+        size = 1 << (2 * self.n - 1).bit_length()
+        pairs = np.fft.irfft(np.abs(np.fft.rfft(m, size)) ** 2, size)[: self.lags + 1]
+        pairs[1:] *= 2
+        count = float(m.sum())
+        square = float(pairs @ self.rho**2)
+        mean = float(pairs @ self.rho)
+        return count**2 / max(square, count), min(count**2 / max(mean, 1e-3 * count), count)
+
+    def region(self, kind, label, mask, span) -> Region:
+        from scipy.special import ndtr
+        from scipy.stats import f as f_distribution
+
+        count = int(mask.sum())
+        share, expected = float(np.sum(self.r[mask] ** 2)) / (self.n * self.power), count / self.n
+        if count < 8 or self.n - count < 8:
+            return Region(kind, label, share, expected, 1.0, 0.0, 1.0, span)
+        inside, mean_count = self.independent(mask)
+        outside, _ = self.independent(~mask)
+        ratio = share / max(1 - share, 1e-300) * (1 - expected) / expected
+        p = float(f_distribution.sf(ratio, inside, outside))
+        bias = float(np.mean(self.r[mask])) / math.sqrt(self.power)
+        z = bias * math.sqrt(mean_count)
+        return Region(kind, label, share, expected, p, bias, float(2 * ndtr(-abs(z))), span)
+
+
+def _bands(t, r) -> list[Region]:
+    """Third-octave bands that stand out from their neighbours."""
+    from scipy.stats import f as f_distribution
+
+    n, dt = len(r), (t[-1] - t[0]) / (len(r) - 1)
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft((r - r.mean()) * window)) ** 2
+    f = np.fft.rfftfreq(n, dt)
+    total = float(power[1:].sum())
+    edges = [2.5 / (n * dt)]
+    while edges[-1] < f[-1]:
+        edges.append(edges[-1] * 2 ** (1 / 3))
+    where = np.searchsorted(f, edges)
+    bands = [(a, b) for a, b in zip(where[:-1], where[1:], strict=True) if b - a >= 2]
+    if total == 0 or len(bands) < 6:
+        return []
+    density = np.array([power[a:b].mean() for a, b in bands])
+    found = []
+    for i, (a, b) in enumerate(bands):
+        near = [j for j in (i - 2, i - 1, i + 1, i + 2) if 0 <= j < len(bands)]
+        # A line leaks into one neighbour; the next but one still shows the background.
+        background = math.exp(np.mean([math.log(max(density[j], 1e-300)) for j in near]))
+        background = min(background, float(np.median(density[near])) * 2)
+        widths = sum(bands[j][1] - bands[j][0] for j in near)
+        ratio = density[i] / max(background, 1e-300)
+        # The Hann window halves the number of independent lines.
+        p = float(f_distribution.sf(ratio, b - a, widths))
+        share = float(power[a:b].sum()) / total
+        span = (float(f[a]), float(f[b - 1]))
+        expected = min(share, background * (b - a) / total)
+        found.append(
+            Region("frequency", f"{span[0]:.3g} to {span[1]:.3g} Hz", share, expected, p, 0.0, 1.0, span)
+        )
+    return found
+
+
+# --- words ----------------------------------------------------------------------------------------
+
+_PLACE = {
+    "time": "the time from {label}",
+    "direction": "motion with {label}",
+    "low_speed": "speeds {label}",
+    "after_reversal": "the time after reversals, {label}",
+    "position": "positions from {label}",
+    "load": "forces {label}",
+    "amplitude": "swings of half stroke {label}",
+    "frequency": "the band {label}",
+}
+
+
+def _sentence(region: Region) -> str:
+    place = _PLACE[region.kind].format(label=region.label)
+    of = "its neighbours suggest" if region.kind == "frequency" else "of the samples"
+    text = (
+        f"{region.share:.0%} of the squared error lies in {place}, against {region.expected_share:.0%} {of}"
+    )
+    if region.p_value >= 0.01:
+        return f"{text}: no more than chance (p = {_p(region.p_value)})."
+    text += f" (p {_p(region.p_value)})"
+    if region.bias_p_value < 0.01:
+        side = "above" if region.bias > 0 else "below"
+        text += (
+            f"; the measured output lies {side} the model there, by {abs(region.bias):.2g} of the rms error"
+        )
+    return text + "."
+
+
+def _p(p: float) -> str:
+    return "< 1e-6" if p < 1e-6 else f"{p:.2g}"
+
+
+def _checked(t, values, name="residual"):
+    t, x = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+    if t.shape != x.shape or t.ndim != 1 or len(t) < 50:
+        raise ValueError(
+            f"error_regions needs 1-D arrays of equal length, 50 samples or more; t has shape {t.shape} and "
+            f"{name} {x.shape}."
+        )
+    if not np.all(np.isfinite(x)):
+        raise ValueError(
+            f"error_regions needs finite numbers; {name} has NaN or infinity. Has the simulation diverged?"
+        )
+    return t, x
