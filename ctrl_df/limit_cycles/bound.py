@@ -2,7 +2,99 @@
 
 from __future__ import annotations
 
+import control as ct
+import numpy as np
 
-def mees_bergen(F, method, linear, amplitude, omega):
-    """Placeholder until the bound is written."""
-    return None, ""
+from ..blocks.primitives import PiecewiseAffine
+
+_HARMONICS = np.arange(3, 62, 2)
+_WINDOWS = (0.1, 0.4, 1.2)  # half widths tried, in ln a and ln omega
+_POINTS = 161
+
+
+def mees_bergen(method, linear, crossing, others):
+    """Return ((a low, a high), (omega low, omega high)) that holds a true cycle, and a remark; or None and why not.
+
+    For an odd memoryless block with slopes between alpha and beta, c = (alpha + beta)/2, r = (beta - alpha)/2, and
+    rho(omega) = min |c + 1/H(jk omega)| over k = 3, 5, ..., the harmonics can move the crossing no farther than
+
+        |N(a) + 1/H(j omega)| <= r^2 / (rho - r),    wherever rho > r.
+
+    If the connected set of (a, omega) that satisfies this around the crossing is bounded, holds no other crossing, and
+    the curves are not tangent, it holds a half-wave symmetric cycle. The set is found on a grid.
+
+    Parameters
+    ----------
+    method : Method
+    linear : LinearPart
+    crossing : Crossing
+    others : sequence of Crossing
+
+    References
+    ----------
+    Mees & Bergen (1975), IEEE Trans. Automatic Control 20(4); Khalil (2002), Nonlinear Systems, sec. 7.2.
+    """
+    slopes = slope_bounds(method)
+    if slopes is None:
+        return None, "no rigorous bound: Mees & Bergen need an odd memoryless block of bounded slope"
+    if linear.dt or linear.measured or not _strictly_proper(linear.H):
+        return None, "no rigorous bound: Mees & Bergen need a continuous, strictly proper H"
+    for half in _WINDOWS:
+        box = _component(method, linear, crossing, slopes, half)
+        if box == "open":
+            continue
+        if box is None:
+            break
+        (a_low, a_high), (w_low, w_high) = box
+        for other in others:
+            if other is not crossing and a_low <= other.amplitude <= a_high and w_low <= other.omega <= w_high:
+                return None, "no rigorous bound: the error set of Mees & Bergen holds two crossings"
+        text = f"proven (Mees & Bergen): a cycle with a in {a_low:.4g}..{a_high:.4g}, omega in {w_low:.4g}..{w_high:.4g}"
+        return box, text
+    return None, "no rigorous bound: the error set of Mees & Bergen is not closed here"
+
+
+def slope_bounds(method) -> tuple[float, float] | None:
+    """Least and greatest slope of an odd, continuous, memoryless broken line; None for anything else."""
+    line = getattr(method.subject, "primitive", None)
+    if method.name != "element" or not isinstance(line, PiecewiseAffine) or line.hysteretic:
+        return None
+    corners = np.array(line.corners)
+    left = np.array(line.intercept[:-1]) + np.array(line.slope[:-1]) * np.array(line.high[:-1])
+    right = np.array(line.intercept[1:]) + np.array(line.slope[1:]) * np.array(line.low[1:])
+    probe = np.concatenate([corners, corners + 0.37 * (1 + np.abs(corners)), [0.0]])
+    size = np.abs(line.value(probe)).max() + 1e-300
+    continuous = np.allclose(left, right, atol=1e-12 * size)
+    odd = np.allclose(line.value(probe), -line.value(-probe), atol=1e-12 * size)
+    return (min(line.slope), max(line.slope)) if continuous and odd else None
+
+
+def _component(method, linear, crossing, slopes, half):
+    """Box around the part of the error set that holds the crossing; ``open`` if it reaches the window's edge."""
+    from scipy.ndimage import label
+
+    p = np.log(crossing.amplitude) + np.linspace(-half, half, _POINTS)
+    q = np.log(crossing.omega) + np.linspace(-half, half, _POINTS)
+    c, r = 0.5 * (slopes[0] + slopes[1]), 0.5 * (slopes[1] - slopes[0])
+    w = np.exp(q)
+    with np.errstate(all="ignore"):
+        rho = np.abs(c + 1 / linear(_HARMONICS[:, None] * w[None, :])).min(axis=0)
+        sigma = np.where(rho > r, r**2 / (rho - r), np.inf)
+        N = method.harmonics(np.exp(p), None, 1)[0][:, 0, 1]
+        inside = np.abs(N[:, None] + 1 / linear(w)[None, :]) <= sigma[None, :]
+    parts, _ = label(inside, structure=np.ones((3, 3)))
+    mine = parts == parts[_POINTS // 2, _POINTS // 2]
+    if not inside[_POINTS // 2, _POINTS // 2]:
+        return None
+    rows, columns = np.nonzero(mine.any(axis=1))[0], np.nonzero(mine.any(axis=0))[0]
+    ends = rows[0], rows[-1], columns[0], columns[-1]
+    if min(ends) == 0 or max(ends) == _POINTS - 1:
+        return "open"
+    a, w = np.exp(p), np.exp(q)  # one grid step of margin on each side
+    return (float(a[rows[0] - 1]), float(a[rows[-1] + 1])), (float(w[columns[0] - 1]), float(w[columns[-1] + 1]))
+
+
+def _strictly_proper(H) -> bool:
+    if isinstance(H, ct.StateSpace):
+        return not np.any(H.D)
+    return len(np.trim_zeros(H.num[0][0], "f")) < len(np.trim_zeros(H.den[0][0], "f"))

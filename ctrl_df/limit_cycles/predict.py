@@ -296,7 +296,7 @@ class _Assessor:
             notes.append((1, "the block keeps its own memory and could only be sampled"))
         if self._neighbour(crossing):
             notes.append((1, "another solution lies close by, where the curves nearly touch"))
-        bound, remark = mees_bergen(self.F, self.method, self.linear, a, w)
+        bound, remark = mees_bergen(self.method, self.linear, crossing, self.scan.crossings)
         notes.append((0, remark))
         grade, why = graded(
             distortion=distortion, sensitivity=sense, spread=spread, stable=stable, regime=regime, notes=notes

@@ -73,7 +73,7 @@ def plot_harmonics(family, *, ax=None, title=None, orders=None, amplitude=None, 
     over_w, over_a = family.omega.size > 1 and not memoryless(family), family.amplitudes.size > 1
     panels = [name for name, wanted in (("omega", over_w), ("amplitude", over_a)) if wanted] or ["amplitude"]
     if ax is None:
-        fig = plt.figure(figsize=(4.9 * len(panels), 3.9), layout="constrained")
+        fig = plt.figure(figsize=(1.8 + 4 * len(panels), 3.9), layout="constrained")
         axes = np.atleast_1d(fig.subplots(1, len(panels), sharey=True))
     else:
         axes = np.atleast_1d(ax)
