@@ -276,7 +276,7 @@ class Measurement:
     def decimate(self, factor) -> Measurement:
         """Return every `factor`-th sample.
 
-        Output, velocity and channels pass a zero-phase low-pass at 80 % of the new Nyquist frequency first.
+        Output, velocity and channels pass a zero-phase low-pass at 70 % of the new Nyquist frequency first.
         A held input is averaged over each new interval, which keeps its impulse; a linear one is filtered
         like the output.
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-INDEX = "(index)"
+INDEX = "index of the frame"
 _UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
 

@@ -237,40 +237,56 @@ class _Null:
     def __init__(self, r):
         n = len(r)
         self.r, self.n, self.power = r, n, float(np.mean(r * r))
-        lags = n // 2
-        rho = autocorrelation(r, lags)
-        # Lags whose correlation is within three standard errors of none add noise only.
-        rho = np.where(rho**2 > 9 / n, rho, 0.0)
-        rho[0] = 1.0
-        self.lags = lags
-        self.rho = rho * (1 - np.arange(lags + 1) / n)
+        self.lags = n // 2
+        self.size = 1 << (2 * n - 1).bit_length()
+        self.rho = self._colour(r)
 
-    def independent(self, mask) -> tuple[float, float]:
-        """Effective number of samples of a region, for its mean square and for its mean."""
-        m = mask.astype(float)
-        size = 1 << (2 * self.n - 1).bit_length()
-        pairs = np.fft.irfft(np.abs(np.fft.rfft(m, size)) ** 2, size)[: self.lags + 1]
+    def _colour(self, r):
+        rho = autocorrelation(r, self.lags)
+        # Lags whose correlation is within three standard errors of none add noise only.
+        rho = np.where(rho**2 > 9 / self.n, rho, 0.0)
+        rho[0] = 1.0
+        return rho
+
+    def _pairs(self, mask):
+        """Number of pairs of samples of the region at each distance in time."""
+        spectrum = np.fft.rfft(mask.astype(float), self.size)
+        pairs = np.fft.irfft(np.abs(spectrum) ** 2, self.size)[: self.lags + 1]
         pairs[1:] *= 2
-        count = float(m.sum())
-        square = float(pairs @ self.rho**2)
-        mean = float(pairs @ self.rho)
-        return count**2 / max(square, count), min(count**2 / max(mean, 1e-3 * count), count)
+        return pairs
 
     def region(self, kind, label, mask, span) -> Region:
-        from scipy.special import ndtr
         from scipy.stats import f as f_distribution
+        from scipy.stats import t as t_distribution
 
         count = int(mask.sum())
         share, expected = float(np.sum(self.r[mask] ** 2)) / (self.n * self.power), count / self.n
         if count < 8 or self.n - count < 8:
             return Region(kind, label, share, expected, 1.0, 0.0, 1.0, span)
-        inside, mean_count = self.independent(mask)
-        outside, _ = self.independent(~mask)
+        inside, outside = self._pairs(mask), self._pairs(~mask)
+        squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
         ratio = share / max(1 - share, 1e-300) * (1 - expected) / expected
-        p = float(f_distribution.sf(ratio, inside, outside))
-        bias = float(np.mean(self.r[mask])) / math.sqrt(self.power)
-        z = bias * math.sqrt(mean_count)
-        return Region(kind, label, share, expected, p, bias, float(2 * ndtr(-abs(z))), span)
+        p = float(f_distribution.sf(ratio, *squares))
+        # A step between the region and the rest colours the residual by itself: without it the test is sharper,
+        # where enough independent samples remain to know the two means.
+        mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
+        rest = self.r - np.where(mask, mean_in, mean_out)
+        colour, power = self._colour(rest), float(np.mean(rest * rest))
+        means = [_independent(pairs, np.maximum(colour, 0)) for pairs in (inside, outside)]
+        if min(means) < 60:
+            colour, power = self.rho, self.power
+            means = [_independent(pairs, np.maximum(colour, 0)) for pairs in (inside, outside)]
+        z = mean_in / math.sqrt(max(power, 1e-30 * self.power) / means[0])
+        bias_p = float(2 * t_distribution.sf(abs(z), max(means[0] - 1, 1)))
+        if share > expected:  # more error than its part: by its spread, or by its mean
+            p = min(1.0, 2 * min(p, bias_p))
+        return Region(kind, label, share, expected, p, mean_in / math.sqrt(self.power), bias_p, span)
+
+
+def _independent(pairs, correlation) -> float:
+    """Effective number of samples of a region: its size over the correlated samples that come with each."""
+    count = float(pairs[0])
+    return count**2 / max(float(pairs @ correlation), count)
 
 
 def _bands(t, r) -> list[Region]:
