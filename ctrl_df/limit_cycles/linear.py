@@ -77,6 +77,13 @@ class LinearPart:
             return math.nan
         return gain if math.isfinite(gain) else math.nan
 
+    @property
+    def proper(self) -> bool:
+        """Whether H stays bounded at high frequency, as far as its form tells."""
+        if not isinstance(self.H, ct.TransferFunction):
+            return True
+        return len(np.trim_zeros(self.H.num[0][0], "f")) <= len(np.trim_zeros(self.H.den[0][0], "f"))
+
     def grid(self, omega=None, points=1000) -> np.ndarray:
         """Frequencies to scan: those given, the range given as a two-element list, or what the poles suggest.
 
