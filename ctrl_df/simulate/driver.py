@@ -10,7 +10,7 @@ from numba import njit
 from .flow import combine, external, input_rates, rates, signals
 from .layout import H_NG, H_NS, H_NX, H_OUT, H_SCRATCH, H_TRACK, KIND, NG, NIN, NOUT, NX, PAR, SAMPLED, G
 from .modes import event, sample, settle, track
-from .stepper import inside, prepare5, prepare8, step5, step8
+from .stepper import inside, prepare5, prepare8, roughness, step5, step8
 
 NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
 NODES = NODES + 0.5
@@ -248,26 +248,32 @@ def run(
             if truncated:
                 h_next = max(h_next, h)
             # --- events
-            prepared = False
             last = 6 if order == 5 else 12
+            suspect = False
             if locate:
                 if watch >= 0 or has_tracked:
                     margins(
                         prog, drive, segment, t + length, x1, mode, work, dx, g, 1e-4 * length, watch, watch_level,
                         watch_sign,
                     )  # fmt: skip
-                suspect = False
                 for i in range(ng):
+                    if abs(g[i]) < math.inf:
+                        scale[i] = max(scale[i], abs(g[i]))
                     if i != blocked and (g[i] + gtol[i] < 0.0 or lowest[i] + gtol[i] < 0.0):
                         suspect = True
                 if has_tracked or watch >= 0:
                     suspect = True
+            needed = suspect or spectrum.shape[1] > 0 or (index < tout.shape[0] and tout[index] < t + length)
+            if needed:
+                if order == 8:
+                    prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
+                    rough = roughness(x1, size, rtol, atol, poly)
+                    if rough > 1.0:
+                        h = length * max(0.3, 0.9 * rough ** (-0.125))
+                        continue
+                else:
+                    prepare5(length, k, poly)
                 if suspect:
-                    if order == 8:
-                        prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
-                    else:
-                        prepare5(length, k, poly)
-                    prepared = True
                     theta, at = _locate(
                         prog, drive, segment, t, length, x, mode, work, order, poly, xi, dx, g, lowest, gtol, scale,
                         blocked, watch, watch_level, watch_sign, has_tracked or watch >= 0,
@@ -277,12 +283,6 @@ def run(
             reached = t + theta * length if theta < 1.0 else (limit if truncated else t + length)
             # --- outputs inside the step
             if index < tout.shape[0] and tout[index] < reached:
-                if not prepared:
-                    if order == 8:
-                        prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
-                    else:
-                        prepare5(length, k, poly)
-                    prepared = True
                 while index < tout.shape[0] and tout[index] < reached:
                     inside(order, (tout[index] - t) / length, x, poly, xi)
                     for j in range(n):
@@ -290,11 +290,6 @@ def run(
                     record(prog, drive, segment, tout[index], xi, mode, work, yout[index])
                     index += 1
             if spectrum.shape[1] > 0:
-                if not prepared:
-                    if order == 8:
-                        prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
-                    else:
-                        prepare5(length, k, poly)
                 accumulate(
                     prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, order, poly, xi, spectrum, omega
                 )  # fmt: skip
@@ -340,7 +335,7 @@ def run(
             scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
         if not settle(prog, drive, segment, t, x, mode, work, dx):
             zero_events += 100
-        if t - last_event_t > 1e-12 * max(abs(t), 1e-3):
+        if t - last_event_t > 1e-9 * max(abs(t), 1e-3):
             zero_events = 0
             last_event_t = t
         clock[4] += 1
@@ -435,7 +430,7 @@ def _locate(
             break
         # Illinois: a secant that cannot hang on one side, with a bisection now and then
         theta = left + width * weight_left / (weight_left - weight_right)
-        if iteration % 10 == 9 or not left < theta < right:
+        if iteration % 5 == 4 or not left < theta < right:
             theta = 0.5 * (left + right)
         inside(order, theta, x, poly, xi)
         margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)

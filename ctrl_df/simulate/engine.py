@@ -171,7 +171,7 @@ class Engine:
         watch : int
             Signal whose passage through `level` in `direction` (+1 upward) ends the run; -1: none.
         height : float
-            Relative flight below which chatter ends (default rtol/100).
+            Relative flight below which chatter ends (default rtol, at least 1e-10).
         max_steps : int
             Bound on the work.
         log : int
@@ -180,7 +180,7 @@ class Engine:
             Receives (is added) the integrals of the outputs against exp(-j k omega t).
         """
         atol = 1e-3 * rtol if atol is None else atol
-        height = 1e-2 * rtol if height is None else height
+        height = max(rtol, 1e-10) if height is None else height
         if drive is None:
             drive = constant_drive(np.zeros(self.ninputs))
         spectrum = np.zeros((self.noutputs, 0), complex) if spectrum is None else spectrum

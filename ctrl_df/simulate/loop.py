@@ -78,7 +78,7 @@ def closed_loop(pid, block, dt=0, *, output=None, name=None) -> ct.Interconnecte
         outputs=[fed_back, force],
         name=name,
         warn_duplicate=False,
-        ignore_outputs=[(1, i) for i in range(block.noutputs)],
+        check_unused=False,
     )
     loop.parts = LoopParts(pid, block, float(dt or 0))
     return loop

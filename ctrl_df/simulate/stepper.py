@@ -17,6 +17,8 @@ E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
 A8X, C8X, D8 = DOP853.A_EXTRA.copy(), DOP853.C_EXTRA.copy(), DOP853.D.copy()
 A5, C5 = np.zeros((7, 6)), np.append(RK45.C, 1.0)
 A5[:6, :5], A5[6] = RK45.A, RK45.B
+# share of the interpolant's last term that stands for its error
+ROUGH = 0.1
 E5_5, P5 = RK45.E.copy(), RK45.P.copy()
 
 
@@ -96,6 +98,19 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
             for m in range(16):
                 value += D8[i, m] * k[m, j]
             poly[3 + i, j] = h * value
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def roughness(x1, size, rtol, atol, poly):
+    """Error of the 7th-order interpolant relative to tolerance, judged by its last term.
+
+    A long step can be right at its end and poor inside; events and outputs are taken from inside.
+    """
+    worst = 0.0
+    for j in range(x1.shape[0]):
+        # 0.0084 is the largest value of the last basis function, theta^4 (1 - theta)^3
+        worst = max(worst, 0.0084 * abs(poly[6, j]) / (atol + rtol * max(size[j], abs(x1[j]))))
+    return ROUGH * worst
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -1,0 +1,172 @@
+"""One period of an event-driven orbit and its linearization, saltation matrices included.
+
+Between events the perturbation of a state is carried by the flow of the mode, differentiated here by central
+differences (exact to rounding where the flow is linear). At an event it is carried by the saltation matrix
+``S = R + (f+ - R f-) n^T / (n f-)`` with f the rates before and after, R the derivative of the reset (impact, or the loss
+of a velocity to sticking) and n the gradient of the event's margin (Leine & Nijmeijer 2004, ch. 7). S loses rank where
+a body sticks, and is singular where the margin is grazed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..simulate import driver, layout, modes
+from ..simulate.engine import Drive, Engine, State, constant_drive
+from ..simulate.flow import rates
+from ..status import Status
+
+RTOL = 1e-11
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of one mode: its start, its length, and the event that ends it."""
+
+    start: State
+    length: float
+    event: str
+    node: str
+    saltation: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Period:
+    """One lap: end state, linearization (n, n), the segments, total time."""
+
+    end: State
+    monodromy: np.ndarray
+    segments: tuple[Segment, ...]
+    status: Status
+    grazing: float  # smallest |n f-| relative to |n||f-|: 0 at grazing
+
+
+class Tracer:
+    """Follows orbits of one engine and differentiates them."""
+
+    def __init__(self, engine: Engine, drive: Drive | None = None, max_events: int = 5000):
+        self.engine = engine
+        self.drive = drive if drive is not None else constant_drive(np.zeros(engine.ninputs))
+        self.max_events = max_events
+        self.n = engine.nstates
+        self._work, *_ = driver.workspace(engine.program)
+        self._g = np.zeros(int(engine.program.ints[layout.H_NG]) + 1)
+
+    def settle(self, state: State) -> State:
+        """Return the state with its modes in line (no time passes)."""
+        return self.engine.run(state, state.time, self.drive, rtol=RTOL).state
+
+    def rate(self, t, x, mode, margins=False):
+        """Rates of a state in a mode; with `margins` the event margins too."""
+        dx = np.zeros(self.n)
+        rates(self.engine.program, self.drive, 0, t, x, mode, self._work, dx, self._g, margins)
+        if margins and self.engine.program.ints[layout.H_TRACK]:
+            driver.margins(
+                self.engine.program, self.drive, 0, t, x, mode, self._work, dx, self._g, 1e-6, -1, 0.0, 1
+            )
+        return (dx, self._g.copy()) if margins else dx
+
+    def lap(self, state: State, length: float, differentiate: bool = True, size=None) -> Period:
+        """Follow the orbit for `length` seconds from `state`."""
+        t_end = state.time + length
+        now = self.settle(state) if state.fresh else state.copy()
+        phi = np.eye(self.n)
+        segments, grazing = [], 1.0
+        status = Status.CONVERGED
+        size = np.maximum(np.abs(now.x), 1e-9) if size is None else size
+        while now.time < t_end:
+            if len(segments) >= self.max_events:
+                status = Status.WORK_LIMIT
+                break
+            run = self.engine.run(now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=1, max_steps=200_000)
+            if not run.status.ok:
+                status = run.status
+                break
+            span = run.state.time - now.time
+            if differentiate and span > 0:
+                phi = self._flow_derivative(now, span, size) @ phi
+            saltation = None
+            kind = node = ""
+            if run.reason == driver.EVENT:
+                kind = layout.EVENT_KINDS[int(run.events[2][0])] if len(run.events[2]) else "event"
+                node = self.engine.node_names[self._owner(run.margin)]
+                if differentiate:
+                    saltation, transversal = self._saltation(run, now.mode, size)
+                    grazing = min(grazing, transversal)
+                    phi = saltation @ phi
+            segments.append(Segment(now, span, kind, node, saltation))
+            now = run.state
+        return Period(now, phi, tuple(segments), status, grazing)
+
+    def _owner(self, margin):
+        for i, node in enumerate(self.engine.program.nodes):
+            if node[layout.G] <= margin < node[layout.G] + node[layout.NG]:
+                return i
+        return 0
+
+    def _flow_derivative(self, state, span, size):
+        columns = []
+        for j in range(self.n):
+            h = 1e-5 * size[j]
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = state.copy()
+                moved.x[j] += sign * h
+                ends.append(
+                    self.engine.run(moved, state.time + span, self.drive, rtol=RTOL, locate=False, log=1).state.x
+                )
+            columns.append((ends[0] - ends[1]) / (2 * h))
+        return np.array(columns).T
+
+    def _saltation(self, run, mode, size):
+        t, before, after = run.state.time, run.before, run.state
+        f_minus = self.rate(t, before, mode)
+        f_plus = self.rate(t, after.x, after.mode)
+        margin = run.margin
+        normal = np.zeros(self.n)
+        for j in range(self.n):
+            h = 1e-6 * size[j]
+            values = []
+            for sign in (1.0, -1.0):
+                x = before.copy()
+                x[j] += sign * h
+                values.append(self.rate(t, x, mode, margins=True)[1][margin])
+            normal[j] = (values[0] - values[1]) / (2 * h)
+        # rate of the margin along the flow, its own dependence on time included
+        h = 1e-6 * max(np.min(size / np.maximum(np.abs(f_minus), 1e-300)), 1e-9)
+        ahead = self.rate(t + h, before + h * f_minus, mode, margins=True)[1][margin]
+        behind = self.rate(t - h, before - h * f_minus, mode, margins=True)[1][margin]
+        speed = (ahead - behind) / (2 * h)
+        reset = self._reset(run, mode, size)
+        scale = np.linalg.norm(normal * size) * np.linalg.norm(f_minus / size)
+        transversal = abs(speed) / scale if scale > 0 else 0.0
+        if speed == 0.0:
+            return reset, 0.0
+        return reset + np.outer(f_plus - reset @ f_minus, normal) / speed, transversal
+
+    def _reset(self, run, mode, size):
+        """Derivative of the jump at the event, by differences of the engine's own event map."""
+        columns = []
+        for j in range(self.n):
+            h = 1e-6 * size[j]
+            ends = []
+            for sign in (1.0, -1.0):
+                x = run.before.copy()
+                x[j] += sign * h
+                ends.append(self._jump(run, mode, x))
+            columns.append((ends[0] - ends[1]) / (2 * h))
+        return np.array(columns).T
+
+    def _jump(self, run, mode, x):
+        program, mode = self.engine.program, mode.copy()
+        node = self._owner(run.margin)
+        x = x.copy()
+        dx = np.zeros(self.n)
+        slot = run.margin - int(program.nodes[node, layout.G])
+        rates(program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, False)
+        modes.event(
+            program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, node, slot, 1e-10
+        )
+        return x
