@@ -18,15 +18,17 @@ def run(n=400, dt=1e-3, seed=0):
     return t, np.sin(20 * t) + 0.1 * rng.standard_normal(n), 0.02 * np.cos(20 * t)
 
 
-# --- units --------------------------------------------------------------------------------------------
+# --- units -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("unit", "factor", "si"),
     [
         ("mm", 1e-3, "m"), ("um", 1e-6, "m"), ("µm", 1e-6, "m"), ("kN", 1e3, "N"), ("mN", 1e-3, "N"),
-        ("deg", math.pi / 180, "rad"), ("rpm", math.pi / 30, "rad/s"), ("ms", 1e-3, "s"), ("mm/s", 1e-3, "m/s"),
-        ("deg/s^2", math.pi / 180, "rad/s^2"), ("N/mm", 1e3, "N/m"), ("m/min", 1 / 60, "m/s"), ("Nm", 1, "N m"),
+        ("deg", math.pi / 180, "rad"), ("rpm", math.pi / 30, "rad/s"), ("ms", 1e-3, "s"),
+        ("mm/s", 1e-3, "m/s"),
+        ("deg/s^2", math.pi / 180, "rad/s^2"), ("N/mm", 1e3, "N/m"), ("m/min", 1 / 60, "m/s"),
+        ("Nm", 1, "N m"),
         ("mrad", 1e-3, "rad"), ("V", 1, "V"), ("mm/s²", 1e-3, "m/s^2"), ("rev", 2 * math.pi, "rad"),
     ],
 )  # fmt: skip
@@ -37,7 +39,8 @@ def test_units(unit, factor, si):
 def test_units_convert_every_channel_and_nothing_twice():
     t, u, y = run()
     m = Measurement(
-        1e3 * t, u, 1e3 * y, input_unit="kN", output_unit="mm", time_unit="ms", velocity=y, velocity_unit="mm/s",
+        1e3 * t, u, 1e3 * y, input_unit="kN", output_unit="mm", time_unit="ms", velocity=y,
+        velocity_unit="mm/s",
         channels={"current": (u, "mA"), "raw": u},
     )  # fmt: skip
     assert np.allclose(m.t, t) and np.allclose(m.u, 1e3 * u) and np.allclose(m.y, y)
@@ -64,7 +67,7 @@ def test_a_measurement_is_a_value():
     assert "400 samples" in repr(m) and "zoh" in repr(m)
 
 
-# --- refusals ----------------------------------------------------------------------------------------------
+# --- refusals --------------------------------------------------------------------------------------
 
 
 def spoil(change):
@@ -79,7 +82,7 @@ def spoil(change):
         (lambda t, u, y: (t, np.where(t > 0.3, np.inf, u), y), "u has .* infinite"),
         (lambda t, u, y: (t[::-1], u, y), "increasing times"),
         (lambda t, u, y: (np.where(t == t[9], t[8], t), u, y), "each time once.*sample 9"),
-        (lambda t, u, y: (np.delete(t, range(100, 120)), u[20:], y[20:]), r"gap.*0.099 to 0.12 s \(21 intervals\)"),
+        (lambda t, u, y: (np.delete(t, range(100, 120)), u[20:], y[20:]), r"gap.*0.099 to 0.12 s \(21 int"),
         (lambda t, u, y: (np.delete(t, 100), u[1:], y[1:]), r"gap.*\(2 intervals\)"),
         (lambda t, u, y: (t, u[:-1], y), "equal length; t has 400 samples and u 399"),
         (lambda t, u, y: (t, 0 * u + 3, y), "input that varies; u is 3"),
@@ -122,7 +125,7 @@ def test_irregular_sampling_is_accepted(seed):
     assert len(Measurement(jitter, np.sin(t * 30), np.cos(t * 30))) == 300
 
 
-# --- sources -----------------------------------------------------------------------------------------------
+# --- sources ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mark", [",", ";", "\t", " "])
@@ -210,7 +213,7 @@ def test_responses_of_python_control():
         Measurement.from_response(response, output=5)
 
 
-# --- parts ---------------------------------------------------------------------------------------------------
+# --- parts -----------------------------------------------------------------------------------------
 
 
 @given(st.floats(0.05, 0.5), st.floats(0, 0.8), st.integers(0, 100))
@@ -295,7 +298,7 @@ def test_noise_floor_of_an_encoder(step):
     assert Measurement(t, np.sin(t), y).noise_floor() == pytest.approx(step / math.sqrt(12), rel=0.3)
 
 
-# --- frequency responses ------------------------------------------------------------------------------------------
+# --- frequency responses ---------------------------------------------------------------------------
 
 
 def test_frequency_measurements(tmp_path):

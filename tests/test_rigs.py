@@ -39,7 +39,7 @@ def test_smooth_forces_agree_with_dop853(seed):
     rng = np.random.default_rng(seed)
     m, b, c, d = rng.uniform(1, 5), rng.uniform(1, 5), rng.uniform(1, 5), rng.uniform(-1, 1)
     k, k3, a, wave, lag = rng.uniform(5, 20), rng.uniform(50, 200), rng.uniform(0.5, 2), 0.05, 0.01
-    u = force(rng, 800, 6.0)
+    u = force(rng, 350, 6.0)
 
     def rates(t, s, f):
         x, v, z = s
@@ -52,14 +52,14 @@ def test_smooth_forces_agree_with_dop853(seed):
     )  # fmt: skip
     x = physics.run(p, u, substeps=5)["x"]
     reference = smooth(rates, u, [0, 0, 0])[:, 0]
-    assert np.max(np.abs(x - reference)) < 1e-8 * np.ptp(reference)  # seen: 4e-10
+    assert np.max(np.abs(x - reference)) < 1e-10 * np.ptp(reference)  # seen: 8e-13
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_elastic_joint_agrees_with_dop853(seed):
     rng = np.random.default_rng(seed)
     m1, m0, k, c = rng.uniform(1, 5), rng.uniform(1, 5), rng.uniform(500, 5000), rng.uniform(1, 10)
-    u = force(rng, 800, 6.0)
+    u = force(rng, 350, 6.0)
 
     def rates(t, s, f):
         joint = k * (s[2] - s[0]) + c * (s[3] - s[1])
@@ -68,7 +68,7 @@ def test_elastic_joint_agrees_with_dop853(seed):
     p = physics.numbers(MOTOR=m1, LOAD=m0, JOINT=physics.ELASTIC, JOINT_K=k, JOINT_C=c, VISCOUS=2)
     x = physics.run(p, u, substeps=5)["x"]
     reference = smooth(rates, u, [0, 0, 0, 0])[:, 0]
-    assert np.max(np.abs(x - reference)) < 1e-7 * np.ptp(reference)  # seen: 6e-9
+    assert np.max(np.abs(x - reference)) < 1e-10 * np.ptp(reference)  # seen: 1.2e-11
 
 
 def stick_slip(m, b, kinetic, static, u, stribeck=None):
@@ -109,12 +109,12 @@ def test_stick_slip_agrees_with_located_events(stribeck):
     rng = np.random.default_rng(5)
     m, b, kinetic = rng.uniform(1, 5), rng.uniform(1, 5), rng.uniform(2, 4)
     static = kinetic * rng.uniform(1.2, 1.8)
-    u = force(rng, 900, 5.0)
+    u = force(rng, 600, 5.0)
     given = dict(STATIC=static) if stribeck is None else dict(STRIBECK=static, STRIBECK_V=stribeck)
     run = physics.run(physics.numbers(MOTOR=m, VISCOUS=b, COULOMB=kinetic, **given), u, substeps=10)
     reference = stick_slip(m, b, kinetic, static, u, stribeck)
-    assert np.count_nonzero(run["v"] == 0) > 20  # it does stick
-    assert np.max(np.abs(run["x"] - reference)) < 1e-7 * np.ptp(reference)  # seen: 2e-9
+    assert np.count_nonzero(run["v"] == 0) > 5  # it does stick
+    assert np.max(np.abs(run["x"] - reference)) < 1e-12 * np.ptp(reference)  # seen: 6e-15
 
 
 @pytest.mark.parametrize("restitution", [0.2, 0.7])
@@ -146,8 +146,8 @@ def test_impacts_agree_with_ballistic_flight(restitution):
         motor.append(x1 + v1 * s + a1 * s * s / 2)
         load.append(x0 + v0 * s + a0 * s * s / 2)
     assert together  # the bounces die out into contact
-    assert np.max(np.abs(run["x_motor"] - motor)) < 1e-9  # seen: 1e-13
-    assert np.max(np.abs(run["x"] - load)) < 1e-9
+    assert np.max(np.abs(run["x_motor"] - motor)) < 1e-12  # seen: 1.2e-14
+    assert np.max(np.abs(run["x"] - load)) < 1e-12
 
 
 def test_hard_stop_bounces_with_newtons_restitution_and_rests():
@@ -177,7 +177,7 @@ def test_bristle_agrees_with_an_implicit_solver():
         )
         states.append(sol.y[:, -1])
     reference = np.array(states)[:, 0]
-    assert np.max(np.abs(run["x"] - reference)) < 1e-6 * np.ptp(reference)  # seen: 8e-9
+    assert np.max(np.abs(run["x"] - reference)) < 5e-8 * np.ptp(reference)  # seen: 5e-9, the solver's own
 
 
 def test_delays_shift_and_static_elements_clip():

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
 
 KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
@@ -130,7 +131,7 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
         return Regions()
     null = _Null(r)
     found = [null.region(*part) for part in _parts(t, bins, **signals)]
-    found += _bands(t, r)
+    found += _bands(t, r, signals.values())
     found.sort(key=lambda region: region.p_value)
     count, worst, worst_bias = len(found), 0.0, 0.0
     adjusted = []
@@ -198,36 +199,6 @@ def _quantiles(kind, unit, values, count, prefix=""):
         yield kind, f"{prefix}{a:.3g} to {b:.3g} {unit}", inside, (float(a), float(b))
 
 
-def reversals(velocity, threshold) -> np.ndarray:
-    """Return the samples where the velocity changes sign for good, that is, goes on to pass `threshold`."""
-    v = np.asarray(velocity, float)
-    state = np.where(v > threshold, 1, np.where(v < -threshold, -1, 0))
-    moving = np.flatnonzero(state)
-    change = np.flatnonzero(state[moving[1:]] != state[moving[:-1]])
-    turns = []
-    for before, after in zip(moving[change], moving[change + 1], strict=True):
-        crossing = np.flatnonzero(v[before : after + 1] * state[after] > 0)
-        turns.append(before + int(crossing[0]))
-    return np.array(turns, dtype=int)
-
-
-def time_since(t, events) -> np.ndarray:
-    """Return the time since the last event [s]; infinite before the first."""
-    t = np.asarray(t, float)
-    last = np.searchsorted(np.asarray(events), np.arange(len(t)), "right") - 1
-    return np.where(last >= 0, t - t[np.asarray(events)[np.maximum(last, 0)]], math.inf)
-
-
-def swing(position, turns) -> np.ndarray:
-    """Return, for every sample, half the stroke of the swing (between two reversals) it belongs to."""
-    x = np.asarray(position, float)
-    edges = np.concatenate(([0], turns, [len(x)]))
-    half = np.empty(len(x))
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
-        half[a:b] = 0.5 * np.ptp(x[a:b]) if b > a else 0.0
-    return half
-
-
 # --- what chance alone would do -------------------------------------------------------------------
 
 
@@ -249,7 +220,7 @@ class _Null:
         return rho
 
     def _pairs(self, mask):
-        """Number of pairs of samples of the region at each distance in time."""
+        """Count the pairs of samples of the region at each distance in time."""
         spectrum = np.fft.rfft(mask.astype(float), self.size)
         pairs = np.fft.irfft(np.abs(spectrum) ** 2, self.size)[: self.lags + 1]
         pairs[1:] *= 2
@@ -267,8 +238,8 @@ class _Null:
         squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
         ratio = share / max(1 - share, 1e-300) * (1 - expected) / expected
         p = float(f_distribution.sf(ratio, *squares))
-        # A step between the region and the rest colours the residual by itself: without it the test is sharper,
-        # where enough independent samples remain to know the two means.
+        # A step between the region and the rest colours the residual by itself: without it the test is
+        # sharper, where enough independent samples remain to know the two means.
         mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
         rest = self.r - np.where(mask, mean_in, mean_out)
         colour, power = self._colour(rest), float(np.mean(rest * rest))
@@ -289,40 +260,49 @@ def _independent(pairs, correlation) -> float:
     return count**2 / max(float(pairs @ correlation), count)
 
 
-def _bands(t, r) -> list[Region]:
-    """Third-octave bands that stand out from their neighbours."""
+def _bands(t, r, signals) -> list[Region]:
+    """Third-octave bands that stand out from their neighbours, and not because the signals do so there."""
     from scipy.stats import f as f_distribution
 
     n, dt = len(r), (t[-1] - t[0]) / (len(r) - 1)
-    window = np.hanning(n)
-    power = np.abs(np.fft.rfft((r - r.mean()) * window)) ** 2
     f = np.fft.rfftfreq(n, dt)
-    total = float(power[1:].sum())
     edges = [2.5 / (n * dt)]
     while edges[-1] < f[-1]:
         edges.append(edges[-1] * 2 ** (1 / 3))
     where = np.searchsorted(f, edges)
     bands = [(a, b) for a, b in zip(where[:-1], where[1:], strict=True) if b - a >= 2]
+    power = _periodogram(r)
+    total = float(power[1:].sum())
     if total == 0 or len(bands) < 6:
         return []
-    density = np.array([power[a:b].mean() for a, b in bands])
+    density = np.array([power[a:b].mean() for a, b in bands]) + 1e-30 * total
+    references = [np.array([_periodogram(x)[a:b].mean() for a, b in bands]) for x in signals]
+    relative = [density / (x + 1e-12 * x.max()) for x in references if x.max() > 0]
     found = []
     for i, (a, b) in enumerate(bands):
         near = [j for j in (i - 2, i - 1, i + 1, i + 2) if 0 <= j < len(bands)]
-        # A line leaks into one neighbour; the next but one still shows the background.
-        background = math.exp(np.mean([math.log(max(density[j], 1e-300)) for j in near]))
-        background = min(background, float(np.median(density[near])) * 2)
         widths = sum(bands[j][1] - bands[j][0] for j in near)
-        ratio = density[i] / max(background, 1e-300)
-        # The Hann window halves the number of independent lines.
-        p = float(f_distribution.sf(ratio, b - a, widths))
+        # An excited line of the input shows in every residual: it must also stand out beside the signals.
+        ratio = min(values[i] / _background(values, near) for values in (density, *relative))
+        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann window halves the independent lines
         share = float(power[a:b].sum()) / total
         span = (float(f[a]), float(f[b - 1]))
-        expected = min(share, background * (b - a) / total)
-        found.append(
-            Region("frequency", f"{span[0]:.3g} to {span[1]:.3g} Hz", share, expected, p, 0.0, 1.0, span)
-        )
+        expected = min(share, _background(density, near) * (b - a) / total)
+        label = f"{span[0]:.3g} to {span[1]:.3g} Hz"
+        found.append(Region("frequency", label, share, expected, p, 0.0, 1.0, span))
     return found
+
+
+def _background(values, near) -> float:
+    """Level that the neighbours suggest: the second highest, as a line near an edge leaks into one of them.
+
+    On a slope, and at the corner of a filter, this is above the band itself: only peaks stand out.
+    """
+    return float(np.sort(values[near])[-2])
+
+
+def _periodogram(x):
+    return np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2
 
 
 # --- words ----------------------------------------------------------------------------------------
