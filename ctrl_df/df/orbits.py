@@ -42,7 +42,7 @@ no dry friction and no contact; the state runs away (NaN); the bound on work was
 steadily besides swinging (its mean motion is no part of the harmonics); a load that is never touched."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
-RTOL = 1e-10
+RTOL = 1e-9
 _COARSE = 1e-7  # tolerance while a transient is followed
 _LONGEST = 12  # periods of a subharmonic motion that is recognised
 _BLOCKS = 8  # an average's spread is estimated from that many parts
@@ -209,7 +209,8 @@ class OrbitSolver:
         """Solve consecutive points, compiled as long as they close, one by one where they do not."""
         orders, n = harmonics.shape[-1] - 1, len(A)
         out = np.zeros((n, self.row + 1, orders + 1), complex)
-        ends, miss, kinds = np.zeros((n, 2, self.row + 1)), np.zeros(n), np.zeros(n, np.int64)
+        ends, miss = np.zeros((n, 2, self.row + 1)), np.zeros(n)
+        kinds, still = np.zeros(n, np.int64), np.zeros(n, np.int64)
         samples, scratch = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros((1, 2), complex)
         power, past = self.symmetries.power, np.zeros((4, max(self.engine.nstates, 1)))
         p = 0
@@ -226,13 +227,14 @@ class OrbitSolver:
             mode = self.previous.mode.copy()
             done, _, _ = sweep(
                 self.shot, samples, scratch, A[p:], omega[p:], power, self.inertia, past, mode, 1, self.mirrored, RTOL,
-                self._hmax(orders), self.max_steps, out[p:], ends[p:], miss[p:], kinds[p:],
+                self._hmax(orders), self.max_steps, out[p:], ends[p:], miss[p:], kinds[p:], still[p:],
             )  # fmt: skip
             self._raise_if_raised()
             for q in range(p, p + done):
                 self._aim(A[q], omega[q])
                 y = self._coefficients(out[q, self.row], ends[q, :, self.row], 1, self.mirrored)
-                name = self._name(int(kinds[q]), y, ends[q, :, self.row], miss[q])
+                self.kinds, self.still = int(kinds[q]), bool(still[q])
+                name = self._name(y, ends[q, :, self.row], miss[q])
                 if name in ("stuck", "free"):  # these need a second look
                     done = q - p
                     break
@@ -283,7 +285,7 @@ class OrbitSolver:
             return self._unperiodic(state, orders)
         self.previous = orbit[0]
         y = self._coefficients(self.integrals, self.ends, 1, self.mirrored)
-        return y, self._name(self.kinds, y, self.ends, orbit[1]), orbit[1]
+        return y, self._name(y, self.ends, orbit[1]), orbit[1]
 
     def _start(self, A):
         """At rest, a joint off its faces; the sizes of the states from the motion of a free inertia."""
@@ -359,7 +361,8 @@ class OrbitSolver:
             return None
         if self.quantized:  # the harmonics of the centred motion
             self._shoot(state.copy(), RTOL, periods, spectrum)
-        self.integrals, self.ends, self.kinds = spectrum[self.row], shot.ends[:, self.row].copy(), int(shot.tally[2])
+        self.integrals, self.ends = spectrum[self.row], shot.ends[:, self.row].copy()
+        self.kinds, self.still = int(shot.tally[2]), bool(shot.tally[5])
         return state, miss
 
     def _touching(self, orders):
@@ -409,7 +412,7 @@ class OrbitSolver:
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1
                     c = self._coefficients(self.integrals, self.ends, periods, False)
-                    name = "subharmonic" if periods > 1 else self._name(self.kinds, c, self.ends, orbit[1])
+                    name = "subharmonic" if periods > 1 else self._name(c, self.ends, orbit[1])
                     return c, name, orbit[1]
         length = self.averages // _BLOCKS
         parts = []
@@ -470,13 +473,12 @@ class OrbitSolver:
     def _finished(self, y, name):
         return np.full(len(y), np.nan + 0j) if name == "stuck" else self._turned(y) / self.A
 
-    def _name(self, kinds, y, ends, miss):
+    def _name(self, y, ends, miss):
         """Regime of a motion of one period."""
-        shot, s = self.shot, self.symmetries
-        moving = kinds & ~(_BIT["corner"] | _BIT["switch"])
-        if self.mechanisms and not moving and not np.any(np.abs(y[1:]) > 0) and not self._moves():
+        s, kinds = self.symmetries, self.kinds
+        if self.still and not kinds & ~(_BIT["corner"] | _BIT["switch"]):
             return "stuck"
-        if self.gap and not kinds & _TOUCH and not self._in_contact():
+        if self.gap and not kinds & _TOUCH:
             return "free"
         drift = abs(ends[1] - ends[0]) if not self.mirrored else 0.0
         if drift > 1e-6 * abs(y[1]) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
@@ -496,15 +498,6 @@ class OrbitSolver:
     def _elastic(self):
         prog = self.engine.program
         return any(prog.ints[n[layout.AUX] + layout.A_JOINT] == layout.J_ELASTIC for n in self.mechanisms)
-
-    def _moves(self):
-        """Whether any state moved in the last shot."""
-        return bool(np.any(self.shot.trial[1] != 0.0)) or bool(
-            np.any(self.shot.trial[3][self.symmetries.power == 1] != 0.0)
-        )
-
-    def _in_contact(self):
-        return False
 
     # --- how a search can fail --------------------------------------------------------------------------------
 

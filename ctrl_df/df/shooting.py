@@ -35,6 +35,7 @@ from ..simulate.layout import (
     PWA,
     QUANTIZER,
     RATE,
+    STUCK,
     WALL,
     Drive,
     X,
@@ -45,7 +46,7 @@ from .native import call_native, native_address
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome of `close_orbit`: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
 
-TOLERANCE = 1e-10  # closing error of an orbit, relative to its size
+TOLERANCE = 1e-9  # error of an orbit's state, relative to its size
 _CHATTER_ROOM = 60  # runs go on where the event log is full
 
 
@@ -82,7 +83,7 @@ class Shot(NamedTuple):
     matrix: np.ndarray  # (3, nf, nf) scratch
     shifts: np.ndarray  # (ns, n) directions of free position
     ends: np.ndarray  # (2, ny) outputs at the start and at the end of the last shot with a spectrum
-    tally: np.ndarray  # shots, steps, bits of event kinds, Jacobians, reason of the last run
+    tally: np.ndarray  # shots, steps, event kinds (bits), Jacobians, reason of the last run, whether it ended stuck
 
 
 def make_shot(engine, symmetries, rows: int) -> Shot:
@@ -101,7 +102,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
         native_address(run, arguments), 0, engine.program, engine._space, np.full(ng, 1e-13), np.zeros(9), np.zeros(n), log_t,
         log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse, s.offset, s.free.astype(np.int64),
         s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n), np.full((nf, nf), np.nan), np.zeros((8, max(n, 1))),
-        np.zeros((3, nf, nf)), np.array(s.shifts, float).reshape(-1, n), np.zeros((2, rows)), np.zeros(5, np.int64),
+        np.zeros((3, nf, nf)), np.array(s.shifts, float).reshape(-1, n), np.zeros((2, rows)), np.zeros(6, np.int64),
     )  # fmt: skip
     return shot._replace(
         shoot=native_address(shoot, (shot, drive, 1.0, vector, modes, True, 1e-9, 1e-12, 1.0, no_spectrum, 1))
@@ -146,11 +147,25 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     shot.tally[1] += int(clock[3])
     shot.tally[2] = kinds
     shot.tally[4] = reason
+    shot.tally[5] = _stuck(prog, mode)
     if wanted:
         _outputs(shot, drive, time, x, mode, 1)
     if mirrored:
         mirror(shot, x, mode)
     return reason
+
+
+@njit(cache=True, error_model="numpy")
+def _stuck(prog, mode):
+    """1 where every body is held by friction or at a stop."""
+    bodies = 0
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == MECHANISM:
+            for b in range(prog.ints[prog.nodes[n, AUX]]):
+                bodies += 1
+                if mode[prog.nodes[n, MODE] + b] != STUCK:
+                    return 0
+    return 1 if bodies > 0 else 0
 
 
 @njit(cache=True, error_model="numpy")
@@ -270,21 +285,27 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
     """
     n, nf = x.shape[0], shot.free.shape[0]
     y0, y1, change, x0 = shot.trial[0], shot.trial[1], shot.trial[2], shot.trial[3]
-    last = shot.trial[7]
+    last, end = shot.trial[7], shot.trial[6]
     jacobian, m0 = shot.jacobian, mode.copy()
     fresh_jacobian = False
     moved = False  # `change` is the step that led to the present point, `last` the closing error before it
     previous, best = math.inf, math.inf
     jacobians = 0
     take = eager
+    expected = 1e-2  # closing error of the shot to come
     for _ in range(shots):
         copy(x, x0)
         m0[:] = mode
         coordinates(shot, x, y0)
+        # far from the orbit coarse shots do
+        loose = 1.0 if take else max(1.0, min(1e-3 * expected, 1e-7) / rtol)
         reason = call_native(
             shot.shoot,
-            (shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum if take else shot.no_spectrum, budget),
-        )
+            (
+                shot, drive, time, x, mode, mirrored, loose * rtol, loose * atol, hmax,
+                spectrum if take else shot.no_spectrum, budget,
+            ),
+        )  # fmt: skip
         budget -= int(shot.clock[3])
         if reason != driver.DONE:
             copy(x0, x)
@@ -292,43 +313,49 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
         if budget <= 0:
             return SPENT, best
         coordinates(shot, x, y1)
+        copy(y1, end)
         miss = _mismatch(shot, y0, y1)
         best = min(best, miss)
-        if miss < TOLERANCE or (miss < 100 * TOLERANCE and miss > 0.2 * previous and fresh_jacobian):
-            if take:
-                if miss > 0.0 and nf > 0:
-                    stable = _attracts(shot, jacobian)
-                    if not stable and not fresh_jacobian:
-                        # Broyden's matrix is no proof: differentiate before judging
-                        copy(x0, shot.trial[5])
-                        if not _differentiate(shot, drive, time, shot.trial[5], m0, y1, mirrored, rtol, atol, hmax, budget):
-                            return OPEN, miss
-                        stable = _attracts(shot, jacobian)
-                    if not stable:
-                        copy(x0, x)
-                        mode[:] = m0
-                        return UNSTABLE, miss
-                copy(x0, x)
-                mode[:] = m0
-                if mirrored:
-                    _center(shot, y1, x)
-                return CLOSED, miss
-            take = True
-            copy(x0, x)
-            mode[:] = m0
-            previous = math.inf
-            moved = False
-            continue
+        rests = False  # a body at rest at the end of the shot is at rest, not nearly so
+        for f in range(nf):
+            i = shot.free[f]
+            if end[i] == 0.0 and y0[i] != 0.0:
+                rests = True
         if moved:
             _broyden(shot, jacobian, change, last, y1)
+        error = miss  # of the state: what Newton's step would still change
+        known = nf > 0 and not math.isnan(jacobian[0, 0])
+        if known and miss > 0.0:
+            error = math.inf
+            if _newton_step(shot, jacobian, y1, change):
+                error = 0.0
+                for f in range(nf):
+                    error = max(error, abs(change[f]) / shot.size[shot.free[f]])
         stale = miss > 0.5 * previous
+        if not rests and (
+            error < TOLERANCE or (miss < TOLERANCE and error < 100 * TOLERANCE and stale and fresh_jacobian)
+        ):
+            copy(x0, x)
+            mode[:] = m0
+            if not take:
+                take, moved, previous = True, False, math.inf
+                continue
+            if known and miss > 0.0 and not _attracts(shot, jacobian):
+                if not fresh_jacobian:
+                    # Broyden's matrix is no proof: differentiate before judging
+                    if not _differentiate(shot, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget):
+                        return OPEN, error
+                if not _attracts(shot, jacobian):
+                    return UNSTABLE, error
+            if mirrored:
+                _center(shot, y1, x)
+            return CLOSED, error
         if nf == 0:
             return OPEN, miss
-        if math.isnan(jacobian[0, 0]) or (stale and not fresh_jacobian):
+        if not known or (stale and not fresh_jacobian):
             if jacobians == 3:
                 return OPEN, best
-            copy(x0, shot.trial[5])
-            if not _differentiate(shot, drive, time, shot.trial[5], m0, y1, mirrored, rtol, atol, hmax, budget):
+            if not _differentiate(shot, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget):
                 return FAILED, best
             jacobians += 1
             fresh_jacobian = True
@@ -351,7 +378,10 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
         for i in range(n):
             last[i] = y1[i]
         for f in range(nf):
-            y0[shot.free[f]] += change[f]
+            i = shot.free[f]
+            if end[i] == 0.0:
+                change[f] = -y0[i]
+            y0[i] += change[f]
         copy(y0, y1)
         mode[:] = m0
         place(shot, y0, x, mode)
@@ -361,7 +391,8 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
             if y0[i] != y1[i]:
                 moved = False  # clipped
         previous = miss
-        take = take or miss < 1e-4
+        expected = 1e-2 * miss
+        take = take or expected < 1e-6
     return OPEN, best
 
 
@@ -521,7 +552,7 @@ def _attracts(shot, jacobian):
 @njit(cache=True, error_model="numpy")
 def sweep(
     shot, samples, coefficients, amplitudes, omegas, power, inertia, past, past_mode, known, mirrored, rtol, hmax, budget,
-    out, ends, miss, kinds,
+    out, ends, miss, kinds, still,
 ):  # fmt: skip
     """Close the orbits of consecutive points, each started from those before; stops at the first that does not close.
 
@@ -561,6 +592,7 @@ def sweep(
             return p, outcome, known
         eager = shot.tally[0] <= 2
         kinds[p] = shot.tally[2]
+        still[p] = shot.tally[5]
         ends[p] = shot.ends
         for j in range(n):
             past[2, j] = past[1, j]
