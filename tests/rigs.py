@@ -74,6 +74,9 @@ class Rig:
         Error of the refitted true-structure base model over the noise, on the training record.
     controller : tuple or None
         ``(kp, ki, kd, tf, limit)`` of the sampled PID in closed loop.
+    slack : float
+        ``x_motor - x`` at the start of every record [m], where there is a gap. Records start at rest, the
+        measured body at x = 0.
     """
 
     name: str
@@ -90,6 +93,7 @@ class Rig:
     ratio: float = 0.0
     snr_db: float = 60.0
     controller: tuple[float, ...] | None = None
+    slack: float = 0.0
 
 
 # --- drawing --------------------------------------------------------------------------------------
@@ -187,6 +191,7 @@ def _attempt(setup, name, seed, ratio, velocity, off):
         equivalents={i: EQUIVALENT.get(i, frozenset()) for i in setup.ids},
         regions=OUTSIDE[setup.outside].regions if setup.outside else (), ratio=achieved, snr_db=setup.snr_db,
         controller=setup.controller,
+        slack=setup.slack * truth.get("backlash.gap", 0.0),
     )  # fmt: skip
 
 
