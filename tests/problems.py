@@ -1,7 +1,8 @@
 """Named problems with exact answers and where those come from.
 
-``Problem.cycle`` is the exact cycle (fundamental amplitude at the block's input, frequency); None where there is none
-near the prediction. ``Problem.predicted`` is the describing function's own exact solution where it is known.
+``Problem.cycle`` is the exact cycle (fundamental amplitude at the block's input, frequency); None where
+there is none near the prediction. ``Problem.predicted`` is the describing function's own exact solution
+where it is known.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ class Problem:
 def tsypkin_relay(H, level=1.0, hysteresis=0.0, low=0.05, high=50.0, harmonics=20_001):
     """Exact symmetric cycle of a relay loop: (fundamental amplitude, omega), by Tsypkin's condition.
 
-    The relay's output is a square wave, so the loop's signal is known but for omega. At the upward switching, t = 0, the
-    relay's input equals the hysteresis: -(4 level/pi) sum over odd k of Im H(jk omega)/k = hysteresis.
+    The relay's output is a square wave, so the loop's signal is known but for omega. At the upward
+    switching, t = 0, the relay's input equals the hysteresis: -(4 level/pi) sum over odd k of Im H(jk
+    omega)/k = hysteresis.
     """
     k = np.arange(1, harmonics, 2)
 
@@ -117,7 +119,7 @@ PROBLEMS = [
         "Tsypkin (1984)",
     ),
     Problem(
-        "relay with hysteresis, first-order plant",  # T = 2 ln((1 + h)/(1 - h)); the describing function misses it
+        "relay with hysteresis, first-order plant",  # has a cycle, T = 2 ln((1 + h)/(1 - h)), that N misses
         ct.tf([1], [1, 1]),
         relay_with_hysteresis(1, 0.1),
         np.geomspace(0.05, 5, 20),

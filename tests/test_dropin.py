@@ -1,4 +1,4 @@
-"""ctrl_df in python-control's place: its own describing-function tests pass, and its known faults are right here."""
+"""ctrl_df in python-control's place: its own tests pass, and its known faults are right here."""
 
 import importlib.util
 import os
@@ -65,7 +65,7 @@ def test_python_controls_own_tests_pass(tmp_path):
     assert "failed" not in outcome.stdout and "passed" in outcome.stdout
 
 
-# --- the faults of python-control 0.10.2, each with the exact case -------------------------------------------------
+# --- the faults of python-control 0.10.2, each with the exact case ------------------------------------------
 
 
 def only(response):
@@ -74,7 +74,9 @@ def only(response):
 
 
 def test_crossing_survives_scaling_of_H():
-    cycle = only(describing_function_response(1e-4 * H, lambda u: 1e4 * np.clip(u, -1, 1), np.linspace(1, 4, 10)))
+    cycle = only(
+        describing_function_response(1e-4 * H, lambda u: 1e4 * np.clip(u, -1, 1), np.linspace(1, 4, 10))
+    )
     assert cycle.amplitude == pytest.approx(A_EXACT, rel=1e-9)
     assert cycle.omega == pytest.approx(W_EXACT, rel=1e-9)
 
@@ -112,7 +114,9 @@ def test_zero_amplitude_gives_the_slope(slope):
 def test_no_crossing_lost_or_doubled_on_coarse_or_fine_grids(points):
     A = np.linspace(1, 4, points)
     omega = np.logspace(-1, 2, points)
-    assert only(describing_function_response(H, saturation(1), A, omega)).amplitude == pytest.approx(A_EXACT, rel=1e-9)
+    assert only(describing_function_response(H, saturation(1), A, omega)).amplitude == pytest.approx(
+        A_EXACT, rel=1e-9
+    )
 
 
 def test_measured_H_is_accepted_and_not_extrapolated():

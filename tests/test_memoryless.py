@@ -46,7 +46,14 @@ kind = [e.kind for e in STATIC]
 def by_quad(f, a, corners, k):
     cuts = sorted({0.0, np.pi, *(float(np.arccos(c / a)) for c in corners if abs(c) < a)})
     parts = [
-        quad(lambda t: f(a * np.cos(t)) * np.cos(k * t), lo + 1e-13, hi - 1e-13, epsabs=1e-11, epsrel=1e-11, limit=200)[0]
+        quad(
+            lambda t: f(a * np.cos(t)) * np.cos(k * t),
+            lo + 1e-13,
+            hi - 1e-13,
+            epsabs=1e-11,
+            epsrel=1e-11,
+            limit=200,
+        )[0]
         for lo, hi in zip(cuts[:-1], cuts[1:], strict=True)
     ]
     return sum(parts) * (1 if k == 0 else 2) / np.pi / a
@@ -88,7 +95,9 @@ def sampled(element, a, n=200_000):
     return np.exp(-1j * np.outer(k, theta[n:])) @ out[n:] * 2 / n / a
 
 
-@pytest.mark.parametrize("element, a, tol", [(play(0.2), 0.15, 1e-9), (play(0.2), 3, 1e-9), (MEMORY[1], 0.7, 2e-4)])
+@pytest.mark.parametrize(
+    "element, a, tol", [(play(0.2), 0.15, 1e-9), (play(0.2), 3, 1e-9), (MEMORY[1], 0.7, 2e-4)]
+)
 def test_hysteresis_against_stepping(element, a, tol):
     got = describing_function_family(element, [a]).harmonics[0, 0, 1:]
     assert np.abs(got - sampled(element, a)).max() < tol  # a jump between two of 2e5 samples: 5e-5
@@ -108,7 +117,9 @@ def test_rate_limiter_against_stepping(excess):
 
 
 def test_rate_limiter_triangle():
-    N = describing_function(rate_limiter(2.0), 5.0, 3.0)  # far above: a triangle of N = (4/pi)(R/a w) e^-j acos(pi R/2aw)
+    N = describing_function(
+        rate_limiter(2.0), 5.0, 3.0
+    )  # far above: a triangle of N = (4/pi)(R/a w) e^-j acos(pi R/2aw)
     ratio = 2.0 / 15.0
     assert N == pytest.approx(4 / np.pi * ratio * np.exp(-1j * np.arccos(np.pi * ratio / 2)), rel=1e-13)
     with pytest.raises(ValueError, match="give omega"):
@@ -120,7 +131,9 @@ def test_rate_limiter_triangle():
 def test_play_depends_on_the_ratio_and_loses_its_loop_area(a, gap):
     N = complex(describing_function(play(gap), a))
     assert N == pytest.approx(complex(describing_function(play(1.0), a / gap)), rel=1e-9, abs=1e-12)
-    area = max(2 * gap * (2 * a - gap), 0.0) if a > gap / 2 else 0.0  # parallelogram: gap wide, 2a - gap high, both flanks
+    area = (
+        max(2 * gap * (2 * a - gap), 0.0) if a > gap / 2 else 0.0
+    )  # parallelogram: gap wide, 2a - gap high, both flanks
     assert -np.pi * a**2 * N.imag == pytest.approx(area / 2, rel=1e-9, abs=1e-12 * a * a)
 
 
@@ -137,7 +150,9 @@ def test_odd_laws_have_odd_harmonics(steps, a):
 
 @pytest.mark.parametrize("element", STATIC + MEMORY, ids=kind + ["play", "relay_h", "rate"])
 def test_elements_are_values(element):
-    assert isinstance(element, ct.NonlinearIOSystem) and isinstance(element, ct.DescribingFunctionNonlinearity)
+    assert isinstance(element, ct.NonlinearIOSystem) and isinstance(
+        element, ct.DescribingFunctionNonlinearity
+    )
     again = pickle.loads(pickle.dumps(element))
     assert again == element and hash(again) == hash(element) and again.name == element.name
     for name, p in element.parameters.items():
@@ -147,11 +162,15 @@ def test_elements_are_values(element):
         element.values["x"] = 1
 
 
-@pytest.mark.parametrize("element", [play(0.1), relay_with_hysteresis(1, 0.3), rate_limiter(1.0), saturation(1)])
+@pytest.mark.parametrize(
+    "element", [play(0.1), relay_with_hysteresis(1, 0.3), rate_limiter(1.0), saturation(1)]
+)
 def test_elements_run_in_python_control(element):
     t = np.linspace(0, 12, 1201)
     fine = {"max_step": 2e-3}
-    response = ct.input_output_response(element, t, np.sin(t), 0 if element.nstates else None, solve_ivp_kwargs=fine)
+    response = ct.input_output_response(
+        element, t, np.sin(t), 0 if element.nstates else None, solve_ivp_kwargs=fine
+    )
     if element.nstates == 0:
         assert np.allclose(response.outputs, np.clip(np.sin(t), -1, 1))
     elif element.kind == "rate_limiter":
@@ -246,10 +265,15 @@ def test_family_saves_loads_and_makes_frd(tmp_path):
     family = describing_function_family(block, [4.0, 8.0, 10.0, 12.0, 16.0], [5.0, 10.0, 20.0])
     assert family.regime[0, 0] == "stuck" and np.isnan(family.N[0, 0])
     back = load_family(family.save(tmp_path / "f.npz"))
-    assert np.array_equal(back.harmonics, family.harmonics, equal_nan=True) and (back.regime == family.regime).all()
+    assert (
+        np.array_equal(back.harmonics, family.harmonics, equal_nan=True)
+        and (back.regime == family.regime).all()
+    )
     assert np.allclose(family.frd(11.0).frdata[0, 0], describing_function(block, 11.0, family.omega))
     assert np.array_equal(back.frd(8.0).frdata[0, 0], family.N[1])
-    assert back.frd(11.0).frdata[0, 0, 0] == pytest.approx(family.frd(11.0).frdata[0, 0, 0], rel=0.02)  # interpolated
+    assert back.frd(11.0).frdata[0, 0, 0] == pytest.approx(
+        family.frd(11.0).frdata[0, 0, 0], rel=0.02
+    )  # interpolated
     with pytest.raises(ValueError, match="<= amplitude <="):
         family.frd(40.0)
     np.savez(tmp_path / "bad.npz", a=np.array([{}], dtype=object))

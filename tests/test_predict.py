@@ -1,4 +1,4 @@
-"""Predicted limit cycles: converged to the equation's solutions, honest about the truth, graded with a reason."""
+"""Predicted limit cycles: converged to the equation's solutions, honest, graded with a reason."""
 
 import math
 from dataclasses import replace
@@ -103,7 +103,7 @@ def test_rigorous_bound_holds_the_exact_cycle(responses):
 
 
 def test_second_friction_prediction_is_called_spurious(responses):
-    """The describing function's stable cycle at 13.05 rad/s does not exist; kept harmonics lead it to the other one."""
+    """The stable cycle predicted at 13.05 rad/s does not exist; kept harmonics lead it to the other one."""
     low, high = responses["friction mass under PID"].limit_cycles
     assert low.amplitude == pytest.approx(9.535886, rel=1e-6) and low.grade == "unreliable"
     assert "hardly a cycle of its own" in low.why
@@ -122,7 +122,9 @@ def test_backlash_prediction_is_doubted_and_corrected(responses):
 @pytest.mark.parametrize("scale", [1e-6, 1e5])
 def test_units_change_nothing(scale):
     """Force in other units: N scales, H scales back, the cycle scales."""
-    base = describing_function_response(pid(2000, 44250, 130), friction_mass(9, 5, 0.5), [6, 8, 12, 20, 40], [5, 40])
+    base = describing_function_response(
+        pid(2000, 44250, 130), friction_mass(9, 5, 0.5), [6, 8, 12, 20, 40], [5, 40]
+    )
     block = friction_mass(9 * scale, 5 * scale, 0.5 * scale)
     other = describing_function_response(
         pid(2000 * scale, 44250 * scale, 130 * scale), block, scale * np.array([6, 8, 12, 20, 40]), [5, 40]
@@ -156,7 +158,9 @@ def test_every_crossing_of_a_delayed_loop():
     count = 0
     phase_H, phase_N = np.unwrap(L.imag), minus.imag
     for turn in range(-12, 13):  # |H| at the frequency where its phase meets that of -1/N(a)
-        meet = np.interp(-(phase_N + 2 * np.pi * turn), -phase_H, np.arange(w.size), left=np.nan, right=np.nan)
+        meet = np.interp(
+            -(phase_N + 2 * np.pi * turn), -phase_H, np.arange(w.size), left=np.nan, right=np.nan
+        )
         gap = np.interp(meet, np.arange(w.size), L.real) - minus.real
         count += int(np.nansum(np.sign(gap[1:]) * np.sign(gap[:-1]) < 0))
     assert len(found) == count == 2
@@ -182,20 +186,38 @@ def test_state_space_discrete_and_static_H():
 @pytest.mark.parametrize(
     "call, error, words",
     [
-        (lambda: describing_function_response(ct.ss([[-1]], [[1, 1]], [[1]], 0), saturation(1), [1, 2]), ValueError, "one input"),
-        (lambda: describing_function_response(saturation(1), saturation(1), [1, 2]), TypeError, "linear system"),
+        (
+            lambda: describing_function_response(ct.ss([[-1]], [[1, 1]], [[1]], 0), saturation(1), [1, 2]),
+            ValueError,
+            "one input",
+        ),
+        (
+            lambda: describing_function_response(saturation(1), saturation(1), [1, 2]),
+            TypeError,
+            "linear system",
+        ),
         (lambda: describing_function_response(H3, saturation(1), [0.0]), ValueError, "amplitude > 0"),
         (lambda: describing_function_response(H3, saturation(1), [1, -2]), ValueError, "cannot evaluate"),
         (lambda: describing_function_response(H3, saturation(1), [1, 2], [np.nan, 1]), ValueError, "finite"),
-        (lambda: describing_function_response(H3, saturation(1), [1, 2], np.array([])), ValueError, "at least one"),
-        (lambda: describing_function_response(H3, saturation(1), [1, 2], unknown=1), TypeError, "unrecognized keyword"),
+        (
+            lambda: describing_function_response(H3, saturation(1), [1, 2], np.array([])),
+            ValueError,
+            "at least one",
+        ),
+        (
+            lambda: describing_function_response(H3, saturation(1), [1, 2], unknown=1),
+            TypeError,
+            "unrecognized keyword",
+        ),
         (
             lambda: describing_function_response(ct.tf([1], [1, -0.5], 0.1), saturation(1), [1, 2], [40, 50]),
             ValueError,
             "Nyquist frequency",
         ),
         (
-            lambda: describing_function_response(ct.tf([1], [1, -0.5], 0.1), friction_mass(9, 5), [6, 9], [1, 9]),
+            lambda: describing_function_response(
+                ct.tf([1], [1, -0.5], 0.1), friction_mass(9, 5), [6, 9], [1, 9]
+            ),
             ValueError,
             "one timebase",
         ),
@@ -218,7 +240,11 @@ def test_measured_controller_and_extrapolated_harmonics():
 
 def test_results_carry_what_made_them_and_do_not_change():
     response = describing_function_response(H3, saturation(1), np.linspace(1, 4, 10), np.logspace(-1, 2, 50))
-    assert response.H is H3 and response.block == saturation(1) and isinstance(response, ct.DescribingFunctionResponse)
+    assert (
+        response.H is H3
+        and response.block == saturation(1)
+        and isinstance(response, ct.DescribingFunctionResponse)
+    )
     assert response.family.N.shape == (10, 50) and response.N_vals.shape == (10,)
     (cycle,) = response.limit_cycles
     with pytest.raises(AttributeError):
@@ -227,7 +253,7 @@ def test_results_carry_what_made_them_and_do_not_change():
     assert cycle.period == pytest.approx(2 * np.pi / cycle.omega)
 
 
-# --- pictures: what was drawn ---------------------------------------------------------------------------------------
+# --- pictures: what was drawn -------------------------------------------------------------------------------
 
 
 def texts(ax):
@@ -239,25 +265,38 @@ def test_picture_of_a_memoryless_loop():
     ax = cplt.axes[0, 0]
     assert isinstance(cplt, ct.ControlPlot) and len(cplt.lines[0]) == 5 and len(cplt.lines[1]) == 1
     assert "3.3 @ 1.4" in texts(ax)
-    marks = [line for line in ax.lines if line.get_marker() == "o" and len(line.get_xdata()) == 1 and line.get_ms() == 7]
+    marks = [
+        line
+        for line in ax.lines
+        if line.get_marker() == "o" and len(line.get_xdata()) == 1 and line.get_ms() == 7
+    ]
     assert complex(marks[0].get_xdata()[0], marks[0].get_ydata()[0]) == pytest.approx(-8 / 3, abs=1e-6)
     assert "one limit cycle" in ax.get_title() + cplt.figure.get_suptitle()
 
 
 def test_picture_of_a_mechanism():
     response = describing_function_response(
-        pid(1800, 19500, 100), backlash_masses(1, 8, 0.018, 0.2), np.geomspace(5, 60, 15), np.geomspace(8, 40, 15)
+        pid(1800, 19500, 100),
+        backlash_masses(1, 8, 0.018, 0.2),
+        np.geomspace(5, 60, 15),
+        np.geomspace(8, 40, 15),
     )
     cplt = response.plot(point_label="%.4g @ %.4g")
     ax = cplt.axes[0, 0]
-    assert "17.75 @ 14.84" in texts(ax) and any("A = " in t for t in texts(ax)) and any("ω = " in t for t in texts(ax))
+    assert (
+        "17.75 @ 14.84" in texts(ax)
+        and any("A = " in t for t in texts(ax))
+        and any("ω = " in t for t in texts(ax))
+    )
     assert np.allclose(cplt.lines[0][0].get_xdata(), 1800)  # the ideal PID's real part, unclipped
     assert 4 <= len(cplt.lines[1]) <= 10
     assert len(describing_function_plot(response, point_label=None).axes[0, 0].texts) < len(ax.texts)
 
 
 def test_pictures_of_families():
-    family = describing_function_family(friction_mass(9, 5, 0.5), np.geomspace(6, 50, 12), np.geomspace(2, 50, 12))
+    family = describing_function_family(
+        friction_mass(9, 5, 0.5), np.geomspace(6, 50, 12), np.geomspace(2, 50, 12)
+    )
     cplt = family.plot()
     assert len(cplt.lines[0]) == 5 and len(cplt.lines[1]) == 5
     cplt = family.plot_harmonics(amplitude=10)

@@ -35,9 +35,9 @@ def play(gap, *, name=None) -> Element:
         ---+-/--/--- u      (horizontal width = gap)
            |/--/
 
-    The state is the output's position. In the compliant form it trails a moving input by ``follow_time`` times
-    the input's speed, while the output itself stays exactly within the gap: what remains is an error at each
-    reversal of about ``follow_time**2`` times the input's acceleration.
+    The state is the output's position. In the compliant form it trails a moving input by ``follow_time``
+    times the input's speed, while the output itself stays exactly within the gap: what remains is an error
+    at each reversal of about ``follow_time**2`` times the input's acceleration.
 
     Parameters
     ----------
@@ -71,8 +71,8 @@ def relay_with_hysteresis(level, hysteresis, *, name=None) -> Element:
         ---+--+--+--- u      (switches at -hysteresis and +hysteresis)
         ---.  |
 
-    The state is the branch, -1 to 1; a start at 0 or above is on the upper branch. In the compliant form the output
-    crosses from level to level with the time constant ``follow_time``.
+    The state is the branch, -1 to 1; a start at 0 or above is on the upper branch. In the compliant form the
+    output crosses from level to level with the time constant ``follow_time``.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ import numpy as np
 from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonlinearity
 
 from .parameter import Parameter, checked
-from .primitives import PiecewiseAffine, Primitive, Quantizer, Smooth
+from .primitives import PiecewiseAffine, Quantizer, Smooth
 
 
 class DescribingFunctionNonlinearity(_PythonControlNonlinearity):
@@ -56,7 +56,7 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
         self._kind: str = kind
         self._values = MappingProxyType(dict(values))
         self._specs: dict = specs or {}
-        self._primitive: Primitive = primitive
+        self._primitive: Any = primitive
         super().__init__(
             None if self._static else self._updfcn,
             self._outfcn,
@@ -83,7 +83,7 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
         return self._values
 
     @property
-    def primitive(self) -> Primitive:
+    def primitive(self) -> Any:
         """The element as plain data, for the event engine."""
         return self._primitive
 
@@ -102,17 +102,21 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
         return build(self._kind, {**self._values, **values})
 
     def __reduce__(self):
+        """Pickle as kind and arguments."""
         return build, (self._kind, dict(self._values), self.name)
 
     def __eq__(self, other: Any) -> bool:
+        """Compare by kind and arguments."""
         if not isinstance(other, Element):
             return NotImplemented
         return (self._kind, self._values) == (other._kind, other._values)
 
     def __hash__(self) -> int:
+        """Hash of kind and arguments."""
         return hash((self._kind, tuple(self._values.items())))
 
     def __repr__(self) -> str:
+        """Return the call that builds it."""
         return f"{self._kind}({', '.join(f'{k}={v!r}' for k, v in self._values.items())})"
 
     # --- the dialect of python-control -----------------------------------------------------------------
@@ -128,11 +132,11 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
         return self._static
 
     def describing_function(self, A, omega=None):
-        """Return N at amplitude `A` (> = 0), a complex number; `omega` [rad/s] matters to a rate limiter only."""
+        """Return N at amplitude `A` >= 0; `omega` [rad/s] matters to a rate limiter only."""
         # The drop-in contract wants the method here; the mathematics lives one layer up, in ctrl_df.df.
         return importlib.import_module("ctrl_df.df.describing").describing_function(self, A, omega)
 
-    def _primitive_for(self, params) -> Primitive:
+    def _primitive_for(self, params) -> Any:
         changed = (
             {k: params[k] for k in self._specs if k in params and params[k] != self._values[k]}
             if params
@@ -156,7 +160,7 @@ _BUILDERS: dict[str, Callable[..., Element]] = {}
 
 
 def builder(function):
-    """Decorator: make `build` know a factory by its name."""
+    """Make `build` know a factory by its name (a decorator)."""
     _BUILDERS[function.__name__] = function
     return function
 
@@ -459,8 +463,8 @@ class saturation_nonlinearity(Element):
     ub : float
         Upper level.
     lb : float or None
-        Lower level; None: ``-abs(ub)`` to ``abs(ub)``. Unequal levels warn, as python-control's class does: the
-        output then has a mean, which a loop analysis by the first harmonic leaves out.
+        Lower level; None: ``-abs(ub)`` to ``abs(ub)``. Unequal levels warn, as python-control's class does:
+        the output then has a mean, which a loop analysis by the first harmonic leaves out.
     """
 
     def __init__(self, ub=1, lb=None):

@@ -21,10 +21,11 @@ _RECTANGLE = (
 def describing_function(
     F, A, omega=None, num_points=100, zero_check=True, try_method=True, output=None, **options
 ):
-    """Describing function N(A, omega) of a block, for the input ``A cos(omega t)``.
+    """Return the describing function N(A, omega) of a block, for the input ``A cos(omega t)``.
 
-    Memoryless elements and simple hysteretic ones have closed forms; any other static law is integrated to 1e-10,
-    split at its corners; mechanisms have closed forms where those exist, else their forced periodic orbit is found.
+    Memoryless elements and simple hysteretic ones have closed forms; any other static law is integrated to
+    1e-10, split at its corners; mechanisms have closed forms where those exist, else their forced periodic
+    orbit is found.
 
     Parameters
     ----------
@@ -35,13 +36,13 @@ def describing_function(
     omega : array_like, optional
         Frequencies [rad/s], > 0; broadcast against `A`. May be left out where N does not depend on it.
     num_points : int
-        As in python-control; here the least number of calls a period for a callable that keeps a memory of its own.
-        No other law is sampled on a fixed grid.
+        As in python-control; here the least number of calls a period for a callable that keeps a memory of
+        its own. No other law is sampled on a fixed grid.
     zero_check : bool
         Whether a static law must vanish at zero when A = 0 is asked.
     try_method : bool
-        Whether to use the object's own ``describing_function`` method. ctrl_df's elements and python-control's own
-        classes are exact either way.
+        Whether to use the object's own ``describing_function`` method. ctrl_df's elements and
+        python-control's own classes are exact either way.
     output : str or int, optional
         Output to describe; default the first.
     **options
@@ -62,7 +63,8 @@ def describing_function(
     if isinstance(
         num_points, bool | np.bool_
     ):  # python-control's order: F, A, num_points, zero_check, try_method
-        num_points, zero_check, try_method, omega = omega, num_points, zero_check, None
+        shifted = 100 if omega is None else int(omega)
+        num_points, zero_check, try_method, omega = shifted, bool(num_points), zero_check, None
     A = _amplitudes(A)
     omega = None if omega is None else _frequencies(omega)
     shape = A.shape if omega is None else np.broadcast_shapes(A.shape, omega.shape)
@@ -102,11 +104,13 @@ def describing_function_family(
     orders : int
         Highest harmonic, >= 1.
     executor : concurrent.futures.Executor, optional
-        Computes amplitudes in parallel; anything with ``submit(f, *args).result()``. F must then be picklable.
+        Computes amplitudes in parallel; anything with ``submit(f, *args).result()``. F must then be
+        picklable.
     output : str or int, optional
         Output to describe; default the first.
     save : path, optional
-        ``.npz`` file the result goes to; long work saves its finished part there, and the same call resumes it.
+        ``.npz`` file the result goes to; long work saves its finished part there, and the same call resumes
+        it.
     progress : bool, optional
         Progress bar; default: only on a terminal and only after two seconds.
     try_method, num_points, **options
@@ -146,7 +150,9 @@ class _Work:
         self.harmonics = np.full((*shape, orders + 1), np.nan + 0j)
         self.regime = np.full(shape, "", dtype="U24")
         self.residual = np.full(shape, np.nan)
-        self.by_omega = method.name == "orbit"  # along amplitudes one orbit starts the next: keep columns whole
+        self.by_omega = (
+            method.name == "orbit"
+        )  # along amplitudes one orbit starts the next: keep columns whole
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
         self.save = None if save is None else Path(save)
         self.saved_at = time.monotonic()
@@ -167,7 +173,8 @@ class _Work:
                     bar.update(len(part))
             else:
                 pending = [
-                    (part, executor.submit(compute_part, self.method, *self._grid(part), self.orders)) for part in parts
+                    (part, executor.submit(compute_part, self.method, *self._grid(part), self.orders))
+                    for part in parts
                 ]
                 for part, future in pending:
                     self._take(part, future.result())
@@ -248,7 +255,7 @@ class _Work:
 
 
 def compute_part(method: Method, A, omega, orders):
-    """Compute a few rows or columns of a family; a plain function, so that it can be sent to another process."""
+    """Compute a few lines of a family; a plain function, so that it can be sent to another process."""
     return method.harmonics(A, omega, orders)
 
 
@@ -313,7 +320,8 @@ def _slope_at_zero(method, largest, zero_check):
     """Limit of N for A -> 0: the slope at the origin, infinite across a jump."""
     if method.needs_omega:
         raise ValueError(
-            "a dynamic block has no describing function at A = 0; got A=0. Leave zero out, or use ct.linearize."
+            "a dynamic block has no describing function at A = 0; got A=0. Leave zero out, or use "
+            "ct.linearize."
         )
     if method.own_method is not None:
         return complex(method.own_method(0.0))
@@ -371,7 +379,8 @@ def _axis(name, values, unit) -> np.ndarray:
     values = np.array(np.atleast_1d(values))
     if values.ndim != 1 or values.size == 0:
         raise ValueError(
-            f"a family needs {name} as a 1-D array with at least one value [{unit}]; got shape {values.shape}."
+            f"a family needs {name} as a 1-D array with at least one value [{unit}]; got shape "
+            f"{values.shape}."
         )
     return values
 

@@ -58,7 +58,7 @@ class Method:
         return self.name not in ("element", "law", "memory")
 
     def harmonics(self, A, omega, orders):
-        """Return harmonics (na, nw, orders + 1), regime (na, nw) and residual (na, nw) at positive A and omega."""
+        """Return harmonics (na, nw, orders + 1), regime and residual (na, nw) at positive A and omega."""
         if not self.needs_omega:
             y, regime, residual = self._static(A, orders)
             shape = (A.size, 1 if omega is None else omega.size)
@@ -162,7 +162,7 @@ def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, opt
     ValueError
         Several inputs, an unknown output.
     """
-    F = _translated(F)
+    F = translated(F)
     options = options or {}
     if isinstance(F, Element):
         return Method("rate" if F.kind == "rate_limiter" else "element", F)
@@ -196,7 +196,7 @@ def named(code, names) -> np.ndarray:
     return code.astype(str) if code.dtype.kind in "US" else np.array(names, dtype=str)[code]
 
 
-def _translated(F):
+def translated(F):
     """Put the exact element in the place of python-control's own nonlinearities."""
     own = getattr(type(F), "describing_function", None)
     if isinstance(F, _SATURATION) and own is _SATURATION.describing_function:
@@ -223,20 +223,21 @@ def _for_mechanism(block, output, options) -> Method:
 def _output_name(system, output) -> str:
     if system.ninputs != 1:
         raise ValueError(
-            f"a describing function needs one input; {system.name} has {system.ninputs}. Fix the others inside the block."
+            f"a describing function needs one input; {system.name} has {system.ninputs}. Fix the others "
+            f"inside the block."
         )
     labels = list(system.output_labels)
     if output is None:
         return labels[0]
     if isinstance(output, int | np.integer) and 0 <= output < len(labels):
-        return labels[output]
+        return labels[int(output)]
     if output in labels:
-        return output
+        return str(output)
     raise ValueError(f"output must be one of {', '.join(labels)}; got {output!r}.")
 
 
 def _static_law(system, index):
-    """The law of a static ``ct.NonlinearIOSystem``, for one number or many."""
+    """Return the law of a static ``ct.NonlinearIOSystem``, for one number or many."""
     if isinstance(system, ct.InterconnectedSystem) or system.outfcn is None:
         return lambda u: np.asarray(system(u)).reshape(-1)[index]
 

@@ -17,7 +17,7 @@ FORMAT = 1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Family:
-    """Harmonics of a block's steady output for ``u = A cos(omega t)`` on a grid of amplitudes and frequencies.
+    """Harmonics of a block's steady output for ``u = A cos(omega t)`` on a grid of A and omega.
 
     Attributes
     ----------
@@ -28,7 +28,8 @@ class Family:
     harmonics : ndarray of complex, shape (na, nw, orders + 1)
         Y_k / A for ``y = Y_0 + Re sum Y_k exp(j k omega t)``; index 0 is the mean.
     regime : ndarray of str, shape (na, nw)
-        What the motion is: ``slip``, ``stick-slip``, ``stuck``, ``impact``, ``memoryless``, ``asymmetric`` ...
+        What the motion is: ``slip``, ``stick-slip``, ``stuck``, ``impact``, ``memoryless``, ``asymmetric``
+        ...
     residual : ndarray, shape (na, nw)
         How well each orbit closes, or the estimated error of a quadrature, relative.
     block : object
@@ -75,8 +76,8 @@ class Family:
         Parameters
         ----------
         amplitude : float
-            Within the grid. Off its nodes N is computed anew from the block, or, for a loaded family, interpolated
-            linearly over the logarithm of the amplitude.
+            Within the grid. Off its nodes N is computed anew from the block, or, for a loaded family,
+            interpolated linearly over the logarithm of the amplitude.
 
         Raises
         ------
@@ -120,8 +121,10 @@ class Family:
         return write_arrays(path, _arrays(self))
 
     def __repr__(self) -> str:
+        """Return what was described, its size and regimes."""
         regimes = ", ".join(f"{name} {count}" for name, count in self.counts.items())
-        return f"<Family of {self.description or 'a block'}: {self.N.shape[0]} x {self.N.shape[1]} points; {regimes}>"
+        size = f"{self.N.shape[0]} x {self.N.shape[1]} points"
+        return f"<Family of {self.description or 'a block'}: {size}; {regimes}>"
 
 
 def load_family(path) -> Family:
@@ -130,12 +133,14 @@ def load_family(path) -> Family:
     Raises
     ------
     ValueError
-        The file holds no complete family (interrupted work is finished by the call that began it), or needs pickle.
+        The file holds no complete family (interrupted work is finished by the call that began it), or needs
+        pickle.
     """
     data = read_arrays(path)
     if not bool(np.all(data.get("done", True))):
         raise ValueError(
-            f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of {data['done'].size} parts. "
+            f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of "
+            f"{data['done'].size} parts. "
             "Repeat the call of describing_function_family with the same save= to finish it."
         )
     return Family(
@@ -157,7 +162,7 @@ def minus_inverse(N) -> np.ndarray:
 
 
 def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
-    """Write arrays as npz through a temporary file beside `path`, so that a break leaves the old file whole."""
+    """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
     path = Path(path)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     try:

@@ -4,9 +4,10 @@ Every routine returns the Fourier coefficients of the steady output y(theta) for
 
     y = Y_0 + Re sum_k Y_k exp(j k theta),
 
-divided by ``a``, as a complex array of shape (na, orders + 1). Laws made of straight lines (saturation, relays,
-dead zone, quantizer, play, rate limiter ...) are arcs ``c0 + c1 cos(theta) + c2 theta`` between switching
-angles and integrate in closed form; any other law goes through adaptive quadrature split at its corners.
+divided by ``a``, as a complex array of shape (na, orders + 1). Laws made of straight lines (saturation,
+relays, dead zone, quantizer, play, rate limiter ...) are arcs ``c0 + c1 cos(theta) + c2 theta`` between
+switching angles and integrate in closed form; any other law goes through adaptive quadrature split at its
+corners.
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ def element_harmonics(element, amplitudes, omega=None, orders: int = 9):
     harmonics : ndarray of complex, shape (na, orders + 1)
         Y_k / a, the mean first. NaN where the output depends on history (relay inside its hysteresis).
     regime : list of str
-        ``memoryless``, ``asymmetric`` (a mean or even harmonics), ``hysteresis``, ``stuck`` (the output rests),
-        ``linear`` or ``rate-limited``.
+        ``memoryless``, ``asymmetric`` (a mean or even harmonics), ``hysteresis``, ``stuck`` (the output
+        rests), ``linear`` or ``rate-limited``.
     residual : ndarray, shape (na,)
         Estimated error of the harmonics, relative to a.
     """
@@ -73,7 +74,7 @@ def static_regimes(y) -> list[str]:
     return ["asymmetric" if e else "memoryless" for e in even]
 
 
-# --- arcs between switching angles ------------------------------------------------------------------------------
+# --- arcs between switching angles --------------------------------------------------------------------------
 
 
 def arcs_harmonics(arcs, orders: int) -> np.ndarray:
@@ -181,7 +182,7 @@ def _hysteretic(line: PiecewiseAffine, a: float, orders: int):
     return arcs_harmonics(arcs, orders) / a
 
 
-# --- play and rate limiter --------------------------------------------------------------------------------------
+# --- play and rate limiter ----------------------------------------------------------------------------------
 
 
 def _stuck_below(a, half):
@@ -189,7 +190,7 @@ def _stuck_below(a, half):
 
 
 def _play(a, half, orders):
-    """Friction-driven backlash: held from the peak until the gap is crossed, then driven (half-wave symmetric)."""
+    """Friction-driven backlash: held from the peak until the gap is crossed, then driven."""
     y = np.zeros((a.size, orders + 1), dtype=complex)
     for i, v in enumerate(a):
         if v <= half:
@@ -235,7 +236,7 @@ def _rate_limiter(excess: float, orders: int):
         def ahead(theta):
             return math.cos(leave) - slope * (theta - leave) - math.cos(theta)
 
-        meet = brentq(ahead, math.pi / 2, leave + math.pi, xtol=1e-15, rtol=1e-15)
+        meet = brentq(ahead, math.pi / 2, leave + math.pi, xtol=1e-15, rtol=np.float64(1e-15))
         arcs = [
             (leave, meet, math.cos(leave) + slope * leave, 0.0, -slope),
             (meet, leave + math.pi, 0.0, 1.0, 0.0),
@@ -246,7 +247,7 @@ def _rate_limiter(excess: float, orders: int):
     return 2 * half
 
 
-# --- anything callable ------------------------------------------------------------------------------------------
+# --- anything callable --------------------------------------------------------------------------------------
 
 
 def callable_harmonics(f, amplitudes, orders: int = 9):
@@ -266,9 +267,9 @@ def callable_harmonics(f, amplitudes, orders: int = 9):
 def swept_harmonics(f, amplitudes, orders: int = 9, samples: int = 4096):
     """Return harmonics, regimes and residual of a callable that keeps its own memory.
 
-    It is called in the order of time: one period to settle, one to measure, `samples` calls each. A jump falls
-    between two samples, so the error is about its height over `samples`; `residual` estimates it. A block that
-    holds its memory as a state (`play`, `relay_with_hysteresis`) is exact instead.
+    It is called in the order of time: one period to settle, one to measure, `samples` calls each. A jump
+    falls between two samples, so the error is about its height over `samples`; `residual` estimates it. A
+    block that holds its memory as a state (`play`, `relay_with_hysteresis`) is exact instead.
     """
     amplitudes = np.asarray(amplitudes, dtype=float)
     theta = (np.arange(samples) + 0.5) * 2 * np.pi / samples

@@ -43,7 +43,8 @@ X = np.concatenate([-_NODES[:-1], _NODES[::-1]])
 WK = np.concatenate([_KRONROD[:-1], _KRONROD[::-1]])
 WG = np.zeros(15)
 WG[1::2] = np.concatenate([_GAUSS[:-1], _GAUSS[::-1]])
-# What polynomials up to degree 11 leave of 15 samples: a jump shows here even where both rules agree by chance.
+# What polynomials up to degree 11 leave of 15 samples: a jump shows here even where both rules agree by
+# chance.
 _NULL = np.linalg.qr(np.polynomial.legendre.legvander(X, 14))[0][:, 12:]
 
 _DEPTH = 52
@@ -54,9 +55,9 @@ _MOST_CORNERS = 600
 def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
     """Harmonics of ``y = f(a cos theta)`` for every amplitude, divided by the amplitude.
 
-    A static law makes y even in theta, so Y_k = (2/pi) integral over half a period of f(a cos theta) cos(k theta).
-    Corners and jumps of `f`, found once for all amplitudes, split the interval; one that escapes costs bisections,
-    not accuracy.
+    A static law makes y even in theta, so Y_k = (2/pi) integral over half a period of f(a cos theta) cos(k
+    theta). Corners and jumps of `f`, found once for all amplitudes, split the interval; one that escapes
+    costs bisections, not accuracy.
 
     Parameters
     ----------
@@ -167,7 +168,7 @@ class Law:
 
 
 def find_corners(law, smallest: float, largest: float, points: int = 401) -> np.ndarray:
-    """Locate kinks and jumps of `law` on [-largest, largest], as far as a scan of `points` a side shows them."""
+    """Locate kinks and jumps of `law` on [-largest, largest], as far as a scan shows them."""
     fine = np.geomspace(max(smallest, 1e-6 * largest), largest, points // 4)
     side = np.unique(np.concatenate([fine, np.linspace(largest / points, largest, points)]))
     u = np.concatenate([-side[::-1], [0.0], side])
@@ -210,7 +211,7 @@ def _first_intervals(amplitudes, corners):
 
 
 def sample_error(y) -> float:
-    """Error of a uniform Fourier sum of samples with jumps: half the total of the largest steps, over the count."""
+    """Estimate the error of a uniform Fourier sum over samples with jumps between them."""
     steps = np.abs(np.diff(np.concatenate([y, y[:1]])))
     jumps = steps[steps > 10 * np.median(steps) + 1e-300]
     return float(2 * jumps.sum() / y.size + np.ptp(y) / y.size**2)

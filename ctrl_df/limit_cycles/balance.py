@@ -1,9 +1,9 @@
 """Harmonic balance with the harmonics that return: how far a describing function's solution is off.
 
-The describing function keeps the fundamental alone. Here the harmonics that H returns to the block's input are kept
-too, u = a cos(omega t) + Re sum U_k exp(j k omega t) with U_k = -H(j k omega) Y_k(u), and the cycle is solved for
-again from the prediction. What that moves is the error of the prediction. The exact orbit is another matter
-(`ctrl_df.find_limit_cycle`): this is the same approximation with more terms.
+The describing function keeps the fundamental alone. Here the harmonics that H returns to the block's input
+are kept too, u = a cos(omega t) + Re sum U_k exp(j k omega t) with U_k = -H(j k omega) Y_k(u), and the cycle
+is solved for again from the prediction. What that moves is the error of the prediction. The exact orbit is
+another matter (`ctrl_df.find_limit_cycle`): this is the same approximation with more terms.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def balance(respond: Callable, harmonics: int, linear, amplitude, omega, jacobia
     Parameters
     ----------
     respond : callable
-        ``respond(U, omega) -> Y``: coefficients k = 0..harmonics of the block's steady output for those of its input;
-        None where the block has no periodic answer.
+        ``respond(U, omega) -> Y``: coefficients k = 0..harmonics of the block's steady output for those of
+        its input; None where the block has no periodic answer.
     harmonics : int
     linear : LinearPart
     amplitude, omega : float
@@ -217,7 +217,7 @@ def _played(u, half):
 
 
 def _switched(u, loop: PiecewiseAffine):
-    """Relay with hysteresis: the branch last forced, filled forward over two periods; switchings between samples."""
+    """Relay with hysteresis: the branch last forced, filled forward; switchings lie between samples."""
     n = u.size
     twice = np.concatenate([u, u])
     forced = np.where(twice > loop.high[0], 1, np.where(twice < loop.low[1], 0, -1))
@@ -228,7 +228,9 @@ def _switched(u, loop: PiecewiseAffine):
     edge = np.where(after == 1, loop.high[0], loop.low[1])
     span = np.roll(u, -1) - u
     with np.errstate(all="ignore"):
-        share = np.where(before == after, 1.0, np.clip((edge - u) / span, 0, 1))  # of the cell on the old branch
+        share = np.where(
+            before == after, 1.0, np.clip((edge - u) / span, 0, 1)
+        )  # of the cell on the old branch
     slope, intercept = np.array(loop.slope), np.array(loop.intercept)
     middle = 0.5 * (u + np.roll(u, -1))
     old, new = (intercept[i] + slope[i] * middle for i in (before, after))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import control as ct
 import numpy as np
 
@@ -13,15 +15,17 @@ _POINTS = 161
 
 
 def mees_bergen(method, linear, crossing, others):
-    """Return ((a low, a high), (omega low, omega high)) that holds a true cycle, and a remark; or None and why not.
+    """Return ((a low, a high), (omega low, omega high)) that holds a cycle, or None; and a remark.
 
-    For an odd memoryless block with slopes between alpha and beta, c = (alpha + beta)/2, r = (beta - alpha)/2, and
-    rho(omega) = min |c + 1/H(jk omega)| over k = 3, 5, ..., the harmonics can move the crossing no farther than
+    For an odd memoryless block with slopes between alpha and beta, c = (alpha + beta)/2, r = (beta -
+    alpha)/2, and rho(omega) = min |c + 1/H(jk omega)| over k = 3, 5, ..., the harmonics can move the
+    crossing no farther than
 
         |N(a) + 1/H(j omega)| <= r^2 / (rho - r),    wherever rho > r.
 
-    If the connected set of (a, omega) that satisfies this around the crossing is bounded, holds no other crossing, and
-    the curves are not tangent, it holds a half-wave symmetric cycle. The set is found on a grid.
+    If the connected set of (a, omega) that satisfies this around the crossing is bounded, holds no other
+    crossing, and the curves are not tangent, it holds a half-wave symmetric cycle. The set is found on a
+    grid.
 
     Parameters
     ----------
@@ -43,14 +47,18 @@ def mees_bergen(method, linear, crossing, others):
         box = _component(method, linear, crossing, slopes, half)
         if box == "open":
             continue
-        if box is None:
+        if box is None or isinstance(box, str):
             break
         (a_low, a_high), (w_low, w_high) = box
         for other in others:
-            if other is not crossing and a_low <= other.amplitude <= a_high and w_low <= other.omega <= w_high:
+            if (
+                other is not crossing
+                and a_low <= other.amplitude <= a_high
+                and w_low <= other.omega <= w_high
+            ):
                 return None, "no rigorous bound: the error set of Mees & Bergen holds two crossings"
-        text = f"proven (Mees & Bergen): a cycle with a in {a_low:.4g}..{a_high:.4g}, omega in {w_low:.4g}..{w_high:.4g}"
-        return box, text
+        where = f"a in {a_low:.4g}..{a_high:.4g}, omega in {w_low:.4g}..{w_high:.4g}"
+        return box, f"proven (Mees & Bergen): a cycle with {where}"
     return None, "no rigorous bound: the error set of Mees & Bergen is not closed here"
 
 
@@ -70,7 +78,7 @@ def slope_bounds(method) -> tuple[float, float] | None:
 
 
 def _component(method, linear, crossing, slopes, half):
-    """Box around the part of the error set that holds the crossing; ``open`` if it reaches the window's edge."""
+    """Box around the error set's part at the crossing; ``open`` if it reaches the window's edge."""
     from scipy.ndimage import label
 
     p = np.log(crossing.amplitude) + np.linspace(-half, half, _POINTS)
@@ -82,7 +90,7 @@ def _component(method, linear, crossing, slopes, half):
         sigma = np.where(rho > r, r**2 / (rho - r), np.inf)
         N = method.harmonics(np.exp(p), None, 1)[0][:, 0, 1]
         inside = np.abs(N[:, None] + 1 / linear(w)[None, :]) <= sigma[None, :]
-    parts, _ = label(inside, structure=np.ones((3, 3)))
+    parts: Any = label(inside, structure=np.ones((3, 3)))[0]  # pyright: ignore[reportIndexIssue]
     mine = parts == parts[_POINTS // 2, _POINTS // 2]
     if not inside[_POINTS // 2, _POINTS // 2]:
         return None
@@ -91,7 +99,10 @@ def _component(method, linear, crossing, slopes, half):
     if min(ends) == 0 or max(ends) == _POINTS - 1:
         return "open"
     a, w = np.exp(p), np.exp(q)  # one grid step of margin on each side
-    return (float(a[rows[0] - 1]), float(a[rows[-1] + 1])), (float(w[columns[0] - 1]), float(w[columns[-1] + 1]))
+    return (float(a[rows[0] - 1]), float(a[rows[-1] + 1])), (
+        float(w[columns[0] - 1]),
+        float(w[columns[-1] + 1]),
+    )
 
 
 def _strictly_proper(H) -> bool:

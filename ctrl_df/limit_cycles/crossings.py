@@ -1,9 +1,10 @@
 """All zeros of D(a, omega) = 1 + N(a, omega) H(j omega) in a box, in the variables ln a and ln omega.
 
-D has no unit, so nothing here depends on the scale of N, H, a or omega. The box is cut into cells; a cell whose
-corner values may hold a zero in real and imaginary part (with a margin for what lies between) is cut again with exact
-values, and each small cell that still may hold one starts a safeguarded Newton iteration. Converged zeros inside
-the box are collected once each; sign changes that lead to none (jumps of N between coexisting motions) are counted.
+D has no unit, so nothing here depends on the scale of N, H, a or omega. The box is cut into cells; a cell
+whose corner values may hold a zero in real and imaginary part (with a margin for what lies between) is cut
+again with exact values, and each small cell that still may hold one starts a safeguarded Newton iteration.
+Converged zeros inside the box are collected once each; sign changes that lead to none (jumps of N between
+coexisting motions) are counted.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def find_crossings(D: Callable, log_a, log_w, values, refine=True) -> Scan:
 
 
 def jacobian(D: Callable, p, q) -> np.ndarray:
-    """Derivatives of (Re D, Im D) by (ln a, ln omega) at points p, q; shape (n, 2, 2)."""
+    """Return the derivatives of (Re D, Im D) by (ln a, ln omega) at points p, q; shape (n, 2, 2)."""
     h = _STEP
     P = np.concatenate([p + h, p - h, p, p])
     Q = np.concatenate([q, q, q + h, q - h])
@@ -90,7 +91,7 @@ def _may_hold_zero(values):
     known = np.isfinite(corners)
     partial = ~known.all(axis=0)
     hold = known.any(axis=0)
-    for part in (corners.real, corners.imag):
+    for part in (np.real(corners), np.imag(corners)):
         low = np.where(known, part, np.inf).min(axis=0)
         high = np.where(known, part, -np.inf).max(axis=0)
         with np.errstate(invalid="ignore"):
@@ -100,7 +101,7 @@ def _may_hold_zero(values):
 
 
 def _cut(D, log_a, log_w, rows, columns):
-    """Cut candidate cells and return the centres of the small cells that may hold a zero, with their reach."""
+    """Cut candidate cells; return the centres of the small cells that may hold a zero, and their reach."""
     t = np.linspace(0, 1, _CUTS + 1)
     starts_p, starts_q, reach = [], [], []
     da, dw = log_a[rows + 1] - log_a[rows], log_w[columns + 1] - log_w[columns]
@@ -110,7 +111,9 @@ def _cut(D, log_a, log_w, rows, columns):
     for i in range(rows.size):
         r, c = np.nonzero(_may_hold_zero(values[i]))
         if r.size > _MOST_PER_CELL:  # neighbours of one zero; the nearest few suffice
-            middle = np.abs(values[i][r, c] + values[i][r + 1, c] + values[i][r, c + 1] + values[i][r + 1, c + 1])
+            middle = np.abs(
+                values[i][r, c] + values[i][r + 1, c] + values[i][r, c + 1] + values[i][r + 1, c + 1]
+            )
             best = np.argsort(np.where(np.isfinite(middle), middle, np.inf))[:_MOST_PER_CELL]
             r, c = r[best], c[best]
         starts_p.append(log_a[rows[i]] + da[i] * (t[r] + 0.5 / _CUTS))

@@ -39,8 +39,9 @@ class LimitCycle:
     omega : float
         [rad/s].
     stable : bool or None
-        Loeb's criterion: whether a slightly larger oscillation decays. A quasi-static heuristic, not a proof; None where
-        the curves are nearly tangent. The exact verdict is the Floquet multipliers of the orbit.
+        Loeb's criterion: whether a slightly larger oscillation decays. A quasi-static heuristic, not a
+        proof; None where the curves are nearly tangent. The exact verdict is the Floquet multipliers of the
+        orbit.
     residual : float
         |1 + N H| that remains.
     sensitivity : Sensitivity
@@ -85,8 +86,8 @@ class LimitCycle:
 def loeb(jacobian) -> bool | None:
     """Sign of growth after a small rise of the amplitude.
 
-    With s = sigma + j omega, D_a da + D_s ds = 0 and D_s = -j dD/domega give dsigma/da = Im(D_a / D_omega); in the
-    matrix of derivatives by (ln a, ln omega) that is minus its determinant, up to a positive factor.
+    With s = sigma + j omega, D_a da + D_s ds = 0 and D_s = -j dD/domega give dsigma/da = Im(D_a / D_omega);
+    in the matrix of derivatives by (ln a, ln omega) that is minus its determinant, up to a positive factor.
 
     References
     ----------
@@ -101,7 +102,7 @@ def loeb(jacobian) -> bool | None:
 
 
 def sensitivity(jacobian) -> Sensitivity:
-    """Worst-case relative shift per relative error e in N: D changes by -e, so the shift is J^-1 (Re e, Im e)."""
+    """Worst shift per relative error e in N: D changes by -e, so the shift is J^-1 (Re e, Im e)."""
     try:
         inverse = np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:
@@ -135,14 +136,19 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
         reasons.append((2, f"the block's motion there is {regime}, so a single N does not describe it"))
     elif regime == "asymmetric":
         reasons.append((1, "the block's output is asymmetric there: a mean and even harmonics are left out"))
-    reasons += _over(distortion, DISTORTION, f"harmonics of {100 * distortion:.0f} % of the fundamental are fed back")
+    reasons += _over(
+        distortion, DISTORTION, f"harmonics of {100 * distortion:.0f} % of the fundamental are fed back"
+    )
     reasons += _over(
         sensitivity.amplitude,
         SENSITIVITY,
-        f"the curves cross nearly tangentially: 1 % in N moves the amplitude by {sensitivity.amplitude:.1f} %",
+        f"the curves cross nearly tangentially: 1 % in N moves the amplitude by {sensitivity.amplitude:.1f} "
+        f"%",
     )
     if not any(level for level, _ in reasons):
-        reasons += _over(spread[0], BAND, f"the amplitude is known to a factor of {math.exp(min(spread[0], 50)):.2g} only")
+        reasons += _over(
+            spread[0], BAND, f"the amplitude is known to a factor of {math.exp(min(spread[0], 50)):.2g} only"
+        )
     else:
         worst = 2 if spread[0] > BAND[1] else 1 if spread[0] > BAND[0] else 0
         reasons.append((worst, ""))
@@ -153,7 +159,8 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
     texts = [text for lvl, text in sorted(reasons, key=lambda r: -r[0]) if text and lvl > 0]
     if level == 0:
         texts = [
-            f"harmonics fed back are {100 * distortion:.1f} % of the fundamental and the curves cross cleanly "
+            f"harmonics fed back are {100 * distortion:.1f} % of the fundamental and the curves cross "
+            f"cleanly "
             f"(1 % in N moves the amplitude by {sensitivity.amplitude:.1f} %)"
         ]
     texts += [text for lvl, text in reasons if lvl == 0 and text]

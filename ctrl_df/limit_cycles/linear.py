@@ -48,7 +48,7 @@ class LinearPart:
             self._prepare()
 
     def __call__(self, omega) -> np.ndarray:
-        """H at `omega` [rad/s] (z = exp(j omega dt) if discrete); NaN at a pole; beyond measured data ValueError."""
+        """Return H at `omega` [rad/s]; NaN at a pole; beyond measured data ValueError."""
         omega = np.asarray(omega, dtype=float)
         flat = omega.reshape(-1)
         if self.measured:
@@ -97,9 +97,13 @@ class LinearPart:
         is_range = isinstance(omega, list | tuple) and len(omega) == 2
         values = np.unique(np.atleast_1d(np.asarray(omega, dtype=float)))
         if values.ndim != 1 or values.size == 0:
-            raise ValueError("omega needs at least one frequency [rad/s]; got none. Leave it out to scan by default.")
+            raise ValueError(
+                "omega needs at least one frequency [rad/s]; got none. Leave it out to scan by default."
+            )
         if not np.isfinite(values).all() or (values < 0).any():
-            raise ValueError(f"omega must be positive and finite [rad/s]; got {values.min():g} to {values.max():g}.")
+            raise ValueError(
+                f"omega must be positive and finite [rad/s]; got {values.min():g} to {values.max():g}."
+            )
         if values[0] == 0:  # python-control starts some of its contours at zero, where no cycle can be
             values = values[1:] if not is_range else np.array([1e-3 * values[-1], values[-1]])
         if is_range and values.size == 2:
@@ -108,7 +112,8 @@ class LinearPart:
             self._require_inside(values)
         if values.size and values[0] > self.top:
             raise ValueError(
-                f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[0]:g} rad/s."
+                f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[0]:g} "
+                f"rad/s."
             )
         return values[values <= self.top * (1 + 1e-12)]
 
@@ -134,7 +139,8 @@ class LinearPart:
         omega, value = omega[positive], value[positive]
         if omega.size < 2 or not np.isfinite(value).all():
             raise ValueError(
-                f"a measured H needs at least two positive frequencies with finite values; got {omega.size} frequencies. "
+                f"a measured H needs at least two positive frequencies with finite values; got {omega.size} "
+                f"frequencies. "
                 "Remove points that are NaN."
             )
         from scipy.interpolate import Akima1DInterpolator, CubicSpline
@@ -158,6 +164,7 @@ class LinearPart:
         slack = 1e-9
         if omega.size and (omega.min() < self.bottom * (1 - slack) or omega.max() > self.top * (1 + slack)):
             raise ValueError(
-                f"a measured H is known from {self.bottom:g} to {self.top:g} rad/s only; got omega from {omega.min():g} "
+                f"a measured H is known from {self.bottom:g} to {self.top:g} rad/s only; got omega from "
+                f"{omega.min():g} "
                 f"to {omega.max():g}. Keep omega inside the data, or fit a model to them."
             )

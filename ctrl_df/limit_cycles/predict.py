@@ -6,6 +6,7 @@ import importlib
 import math
 import warnings
 from dataclasses import replace
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -22,9 +23,9 @@ from .linear import LinearPart
 
 ORDERS = 9
 SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can be computed
-# Relative error of N from returned harmonics d where they cannot be carried, c1 d + c2 d^2. A jump or a corner answers
-# its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py: 0.003 at 0.10, 0.007 at 0.20,
-# 0.21 at 0.79).
+# Relative error of N from returned harmonics d where they cannot be carried, c1 d + c2 d^2. A jump or a
+# corner answers its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py:
+# 0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79).
 MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
 FLOOR = 1e-3  # least half width of a band
 _FAST = ("element", "law", "rate", "linear", "friction")
@@ -57,7 +58,17 @@ class DescribingFunctionResponse(_PythonControlResponse):
     """
 
     def __init__(
-        self, response, N_vals, positions, intersections, *, family=None, limit_cycles=(), status="", H=None, block=None
+        self,
+        response,
+        N_vals,
+        positions,
+        intersections,
+        *,
+        family=None,
+        limit_cycles=(),
+        status="",
+        H=None,
+        block=None,
     ):
         super().__init__(response, N_vals, positions, intersections)
         self.family: Family | None = family
@@ -71,6 +82,7 @@ class DescribingFunctionResponse(_PythonControlResponse):
         return importlib.import_module("ctrl_df.plot.describing").describing_function_plot(self, **kwargs)
 
     def __repr__(self) -> str:
+        """Return the status."""
         return f"<DescribingFunctionResponse: {self.status}>"
 
 
@@ -98,13 +110,15 @@ def describing_function_response(
     Parameters
     ----------
     H : TransferFunction, StateSpace or FrequencyResponseData
-        Linear part: one input, one output; continuous, discrete or measured. It may be improper (the ideal PID).
+        Linear part: one input, one output; continuous, discrete or measured. It may be improper (the ideal
+        PID).
     F : block, ct.NonlinearIOSystem, python-control nonlinearity or callable
         Nonlinear part; the loop is negative feedback, ``u = -H y``.
     A : array_like
         Amplitudes at the block's input; the box to search reaches from the least positive to the greatest.
     omega : array_like, optional
-        Frequencies [rad/s]; a two-element list is a range, an array are points. Default: from the poles and zeros of H.
+        Frequencies [rad/s]; a two-element list is a range, an array are points. Default: from the poles and
+        zeros of H.
     refine : bool
         Whether to converge each solution; False gives grid estimates.
     warn_nyquist : bool, optional
@@ -127,8 +141,8 @@ def describing_function_response(
     Raises
     ------
     TypeError, ValueError
-        H not linear or not SISO, frequencies outside measured data or above the Nyquist frequency, a block whose
-        sampling time differs from H's, amplitudes negative or not finite, an unknown keyword.
+        H not linear or not SISO, frequencies outside measured data or above the Nyquist frequency, a block
+        whose sampling time differs from H's, amplitudes negative or not finite, an unknown keyword.
 
     References
     ----------
@@ -147,7 +161,9 @@ def describing_function_response(
         omega if omega is not None else (list(limits) if limits is not None else None),
         _OMEGA_POINTS[not method.needs_omega],
     )
-    given = dict(output=output, try_method=try_method, num_points=num_points, **(options or {}))
+    given: dict[str, Any] = dict(
+        output=output, try_method=try_method, num_points=num_points, **(options or {})
+    )
     family = describing_function_family(
         F, positive, frequencies, max(orders, 2), executor, save=save, progress=progress, **given
     )
@@ -189,7 +205,7 @@ def _defect(method: Method, linear: LinearPart):
 
 
 def _scan_grid(method: Method, linear: LinearPart, family: Family):
-    """The grid that is searched: the family's, made finer where that costs little or H varies fast."""
+    """Return the grid to search: the family's, finer where that costs little or H varies fast."""
     w = _refined_omega(linear, family.omega)
     if method.name in _FAST:
         coarse = family.amplitudes
@@ -209,7 +225,9 @@ def _refined(grid, least):
     if grid.size < 2:
         return grid
     cuts = max(1, math.ceil(least / (grid.size - 1)))
-    return np.unique(np.concatenate([np.geomspace(lo, hi, cuts + 1) for lo, hi in zip(grid[:-1], grid[1:], strict=True)]))
+    return np.unique(
+        np.concatenate([np.geomspace(lo, hi, cuts + 1) for lo, hi in zip(grid[:-1], grid[1:], strict=True)])
+    )
 
 
 def _refined_omega(linear, w, change=0.15, most=3000):
@@ -228,7 +246,7 @@ def _refined_omega(linear, w, change=0.15, most=3000):
 
 
 def _interpolated(q, N, fine):
-    """N between columns, linear in magnitude and phase over ln omega (physical responses are powers of omega)."""
+    """N between columns, linear in log magnitude and phase over ln omega (a power of omega is exact)."""
     if q.size == fine.size:
         return N
     upper = np.clip(np.searchsorted(q, fine), 1, q.size - 1)
@@ -256,7 +274,7 @@ class _Assessor:
         return sorted(_without_doubles(found), key=lambda c: (c.amplitude, c.omega))
 
     def _irregular(self) -> list[LimitCycle]:
-        """Crossings where N is an average over irregular motion: the interpolant's zeros, one a neighbourhood."""
+        """Crossings among averages over irregular motion: the interpolant's zeros, one a neighbourhood."""
         noisy = np.isin(self.family.regime, _NOISY)
         if self.method.name in _FAST or not noisy.any():
             return []
@@ -276,7 +294,10 @@ class _Assessor:
             residual = float(abs(1 + y[0, 0, 1] * self.linear(w)[0]))
             if regime[0, 0] not in _NOISY or not residual <= max(0.05, 3 * spread[0, 0]):
                 continue  # a jump between coexisting motions, not a crossing
-            note = (2, "N is an average over irregular motion there and the place of the crossing an interpolation")
+            note = (
+                2,
+                "N is an average over irregular motion there and the place of the crossing an interpolation",
+            )
             J = _grid_slope(log_a, log_w, values, place)
             found.append(self._cycle(Crossing(float(np.exp(place[0])), float(w[0]), residual, J), [note]))
         return found
@@ -289,7 +310,9 @@ class _Assessor:
         notes = list(notes)
         distortion, beyond = self._distortion(y, w)
         if beyond:
-            notes.append((1, f"H is not measured at {beyond} and above: its last value stood in for the harmonics"))
+            notes.append(
+                (1, f"H is not measured at {beyond} and above: its last value stood in for the harmonics")
+            )
         sense = sensitivity(crossing.jacobian)
         spread, better, remark = self._spread(crossing, distortion, sense, regime)
         notes += remark
@@ -340,7 +363,11 @@ class _Assessor:
         respond, count = self.answer
         found = balance(respond, count, self.linear, a, w, crossing.jacobian)
         if found.solution is None:
-            return spread, None, [(2 if "no cycle" in found.reason or "reach" in found.reason else 1, found.reason)]
+            return (
+                spread,
+                None,
+                [(2 if "no cycle" in found.reason or "reach" in found.reason else 1, found.reason)],
+            )
         shift = abs(math.log(found.solution[0] / a)), abs(math.log(found.solution[1] / w))
         return tuple(SAFETY * s + FLOOR for s in shift), found.solution, []
 
@@ -358,7 +385,7 @@ class _Assessor:
 
 
 def _grid_slope(log_a, log_w, values, place):
-    """Derivatives of the interpolant in the cell that holds `place`."""
+    """Return the derivatives of the interpolant in the cell that holds `place`."""
     i = int(np.clip(np.searchsorted(log_a, place[0]) - 1, 0, log_a.size - 2))
     k = int(np.clip(np.searchsorted(log_w, place[1]) - 1, 0, log_w.size - 2))
     v = values[i : i + 2, k : k + 2]
@@ -368,7 +395,7 @@ def _grid_slope(log_a, log_w, values, place):
 
 
 def _without_doubles(cycles):
-    """Mark predictions that become one and the same cycle once their harmonics are kept: the nearest stands for it."""
+    """Mark predictions that become the same cycle once harmonics are kept: the nearest stands for it."""
     out = list(cycles)
     for i, one in enumerate(cycles):
         for other in cycles:
@@ -378,7 +405,8 @@ def _without_doubles(cycles):
             mine, its = (abs(math.log(c.corrected[0] / c.amplitude)) for c in (one, other))
             if same and mine > its:
                 text = (
-                    f"With its harmonics kept it becomes the cycle predicted at {other.amplitude:.4g} @ {other.omega:.4g} "
+                    f"With its harmonics kept it becomes the cycle predicted at {other.amplitude:.4g} @ "
+                    f"{other.omega:.4g} "
                     "rad/s: there is hardly a cycle of its own. "
                 )
                 out[i] = replace(one, grade=UNRELIABLE, why=text + one.why)
@@ -399,7 +427,9 @@ def _nyquist(linear, omega, warn, check, kwargs):
         omega = linear.grid(omega, 1000)
     elif omega is not None:
         omega = linear.grid(np.asarray(omega, dtype=float).reshape(-1))
-        omega = _refined_omega(linear, omega, most=1000)  # so that the drawn curve passes through the crossings
+        omega = _refined_omega(
+            linear, omega, most=1000
+        )  # so that the drawn curve passes through the crossings
     if omega is None and not linear.proper:  # its contour never closes: draw what is scanned
         omega, warn = linear.grid(), False
     with warnings.catch_warnings():
@@ -422,11 +452,14 @@ def _check_timebase(linear, F, method):
     dt = getattr(F, "dt", None)
     if dt is None or not isinstance(F, ct.NonlinearIOSystem) or not method.needs_omega:
         return
-    if bool(linear.dt) != bool(dt) or (linear.dt and dt is not True and abs(float(dt) - linear.dt) > 1e-12 * linear.dt):
+    if bool(linear.dt) != bool(dt) or (
+        linear.dt and dt is not True and abs(float(dt) - linear.dt) > 1e-12 * linear.dt
+    ):
         mine = f"dt={linear.H.dt}"
         raise ValueError(
             f"H and the block need one timebase; got {mine} for H and dt={dt} for the block. "
-            "Convert H with ct.sample_system or ct.d2c's like, or simulate the sampled loop with closed_loop(dt=)."
+            "Convert H with ct.sample_system or ct.d2c's like, or simulate the sampled loop with "
+            "closed_loop(dt=)."
         )
 
 
@@ -439,7 +472,9 @@ def _status(scan: Scan, cycles, A, w) -> str:
     if scan.missing:
         parts.append(f"{scan.missing} grid points have no periodic answer and were skipped")
     if scan.unresolved:
-        parts.append(f"{scan.unresolved} sign changes hold no solution (N jumps there, or the curves only come near)")
+        parts.append(
+            f"{scan.unresolved} sign changes hold no solution (N jumps there, or the curves only come near)"
+        )
     if scan.truncated:
         parts.append("the search stopped at its bound on work: narrow the box or the step")
     return "; ".join(parts)

@@ -43,7 +43,7 @@ class WaveformOrbit:
         self.previous = None
 
     def respond(self, U, omega: float):
-        """Return Y_k, k = 0..len(U) - 1, for the input ``Re sum U_k exp(j k omega t)``; None if no period is found."""
+        """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, or None."""
         U = np.asarray(U, dtype=complex)
         self.omega, self.period, self.left = omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([U], omega)
@@ -57,12 +57,12 @@ class WaveformOrbit:
         return None
 
     def _starts(self, size):
-        """States to start from: the last motion, rest, and for a gap a knock that leaves the motion without contact."""
+        """States to start from: the last motion; rest; for a gap, a knock against its faces."""
         if self.previous is not None:
             yield self.previous
             self.previous = None
         gap = 0.0 if self.core is None else self.core.gap
-        if gap == 0:
+        if self.core is None or gap == 0:
             for periods in (3, 30):
                 yield self._follow(self.engine.start(), periods)
             return
@@ -81,7 +81,7 @@ class WaveformOrbit:
         return state
 
     def _map(self, state):
-        """State after one period, its time set back to zero; None where the run fails or the work is spent."""
+        """State after one period, its time back at zero; None where the run fails or the work is spent."""
         if self.left <= 0:
             return None
         start = state.copy()
@@ -150,13 +150,13 @@ class WaveformOrbit:
         return np.array(columns).T
 
     def _at(self, y):
-        """A fresh state at coordinates y, kept within the gap and the stops."""
+        """Return a fresh state at coordinates y, kept within the gap and the stops."""
         x = self.inverse @ y
         if self.core is not None:
             if self.core.joint == "impact":
                 x[2] = x[0] + min(max(x[2] - x[0], 0.0), self.core.gap)
             if self.core.stop is not None:
-                low, high = self.core.stop.span
+                low, high = self.core.stop.span  # pyright: ignore[reportAttributeAccessIssue]
                 b = 2 * self.core.driven
                 x[b] = min(max(x[b], low), high)
         return self.engine.start(x)

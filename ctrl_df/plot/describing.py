@@ -38,10 +38,11 @@ _ANALYSIS = (
 def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None, **kwargs) -> ct.ControlPlot:
     """Nyquist plot of H with the -1/N curves of the block; crossings carry amplitude and frequency.
 
-    Called as ``describing_function_plot(response)`` or ``describing_function_plot(H, F, A[, omega])``; the second
-    form runs `describing_function_response`. A memoryless block has one -1/N curve, drawn over python-control's
-    Nyquist plot. A block with dynamics has a family: solid at constant amplitude, dashed at constant frequency; H is
-    then drawn over the frequencies scanned (continuous Nyquist contours clip and shift what an improper H has to show).
+    Called as ``describing_function_plot(response)`` or ``describing_function_plot(H, F, A[, omega])``; the
+    second form runs `describing_function_response`. A memoryless block has one -1/N curve, drawn over
+    python-control's Nyquist plot. A block with dynamics has a family: solid at constant amplitude, dashed at
+    constant frequency; H is then drawn over the frequencies scanned (continuous Nyquist contours clip and
+    shift what an improper H has to show).
 
     Parameters
     ----------
@@ -61,7 +62,8 @@ def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None,
     Returns
     -------
     ControlPlot
-        ``lines[0]`` Nyquist curve, ``lines[1]`` describing function, for a family first the curves at constant amplitude.
+        ``lines[0]`` Nyquist curve, ``lines[1]`` describing function, for a family first the curves at
+        constant amplitude.
 
     Raises
     ------
@@ -118,7 +120,7 @@ def _family_picture(response, point_label, label, kwargs):
     fig, ax = axes_for(kwargs.pop("ax", None))
     title = kwargs.pop("title", None)
     family, H = response.family, response.response
-    w = np.abs(np.asarray(H.contour).imag) if not H.dt else np.angle(H.contour) / H.dt
+    w = np.abs(np.imag(H.contour)) if not H.dt else np.angle(H.contour) / H.dt
     seen = (w >= family.omega.min() * (1 - 1e-9)) & (w <= family.omega.max() * (1 + 1e-9))
     curve = np.asarray(H.response)[seen]
     include = response.positions or ()
@@ -126,7 +128,7 @@ def _family_picture(response, point_label, label, kwargs):
     solid, dashed = draw_curves(ax, family)
     lines = np.empty(2, dtype=object)
     options = {"color": NYQUIST_COLOR, "lw": 2.2, "label": label or None, **kwargs}
-    lines[0] = ax.plot(curve.real, curve.imag, **options)
+    lines[0] = ax.plot(np.real(curve), np.imag(curve), **options)
     lines[1] = solid + dashed
     _name_curve(ax, curve, label if isinstance(label, str) else "H(jω)")
     _mark(ax, response, point_label)
@@ -141,7 +143,12 @@ def _name_curve(ax, curve, name):
     if index.size:
         place = curve[index[int(0.93 * (index.size - 1))]]
         ax.annotate(
-            name, (place.real, place.imag), xytext=(6, 0), textcoords="offset points", color=NYQUIST_COLOR, fontsize=10
+            name,
+            (place.real, place.imag),
+            xytext=(6, 0),
+            textcoords="offset points",
+            color=NYQUIST_COLOR,
+            fontsize=10,
         )
 
 
@@ -184,5 +191,7 @@ def _keep_in_view(ax, positions):
 
 def _title(response):
     count = len(response.limit_cycles)
-    found = {0: "no limit cycle predicted", 1: "one limit cycle predicted"}.get(count, f"{count} limit cycles predicted")
+    found = {0: "no limit cycle predicted", 1: "one limit cycle predicted"}.get(
+        count, f"{count} limit cycles predicted"
+    )
     return f"{short(response.family.description)}: {found}"

@@ -30,8 +30,8 @@ def plot_family(family, *, ax=None, title=None, amplitudes=5, frequencies=5, **k
     Returns
     -------
     ControlPlot
-        ``lines[0]`` curves at constant amplitude (or the one curve of a memoryless block), ``lines[1]`` at constant
-        frequency.
+        ``lines[0]`` curves at constant amplitude (or the one curve of a memoryless block), ``lines[1]`` at
+        constant frequency.
     """
     fig, ax = axes_for(ax)
     lines = np.empty(2, dtype=object)
@@ -47,7 +47,9 @@ def plot_family(family, *, ax=None, title=None, amplitudes=5, frequencies=5, **k
     return ct.ControlPlot(lines, np.array([[ax]]), fig)
 
 
-def plot_harmonics(family, *, ax=None, title=None, orders=None, amplitude=None, omega=None, **kwargs) -> ct.ControlPlot:
+def plot_harmonics(
+    family, *, ax=None, title=None, orders=None, amplitude=None, omega=None, **kwargs
+) -> ct.ControlPlot:
     """Draw |Y_k| / A over frequency (left) and over amplitude (right), both axes logarithmic.
 
     Parameters
@@ -110,7 +112,9 @@ def _draw_harmonics(ax, x, y, orders, where, kwargs):
         last = np.nonzero(live)[0][-1]
         places.append((k, x[last], values[last], shade))
     for k, px, py, shade in places:
-        ax.annotate(f"{k}", (px, py), xytext=(5, 0), textcoords="offset points", color=shade, va="center", fontsize=9)
+        ax.annotate(
+            f"{k}", (px, py), xytext=(5, 0), textcoords="offset points", color=shade, va="center", fontsize=9
+        )
     note = where + (f"\nharmonics {', '.join(map(str, silent))}: none" if silent else "")
     ax.text(0.03, 0.04, note, transform=ax.transAxes, fontsize=8.5, color="0.3", va="bottom")
     ax.grid(True, which="major", color="0.9", lw=0.7)
@@ -120,7 +124,7 @@ def _draw_harmonics(ax, x, y, orders, where, kwargs):
     return drawn
 
 
-# --- shared with the Nyquist picture ---------------------------------------------------------------------------
+# --- shared with the Nyquist picture ------------------------------------------------------------------------
 
 
 def memoryless(family) -> bool:
@@ -148,12 +152,12 @@ def view_of(values, include=()) -> tuple[float, float, float, float]:
     include = np.asarray(list(include), dtype=complex)
     if include.size:
         size = 0.75 * np.abs(include).max()
-        low = complex(min(include.real) - size, min(include.imag) - size)
-        high = complex(max(include.real) + size, max(include.imag) + size)
+        low = complex(min(np.real(include)) - size, min(np.imag(include)) - size)
+        high = complex(max(np.real(include)) + size, max(np.imag(include)) + size)
     elif z.size:
         reach = np.quantile(np.abs(z), 0.8)
         z = z[np.abs(z) <= reach * 1.001]
-        low, high = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
+        low, high = complex(np.real(z).min(), np.imag(z).min()), complex(np.real(z).max(), np.imag(z).max())
     else:
         low, high = -1 - 1j, 1 + 1j
     left, right = min(low.real, 0.0), max(high.real, 0.0)
@@ -174,11 +178,11 @@ def draw_single(ax, amplitudes, curve, *, ticks=4, **kwargs):
     """Draw the one -1/N curve of a memoryless block, with a few amplitudes marked; return the line."""
     options = {"color": AMPLITUDE_COLOR, "lw": 1.8, **kwargs}
     finite = np.where(np.isfinite(curve), curve, np.nan)
-    line = ax.plot(finite.real, finite.imag, **options)[0]
+    line = ax.plot(np.real(finite), np.imag(finite), **options)[0]
     inside = np.nonzero(_inside(ax, finite))[0]
     if inside.size:
         chosen = inside[np.unique(np.linspace(0, inside.size - 1, ticks).round().astype(int))]
-        ax.plot(finite[chosen].real, finite[chosen].imag, ".", color=line.get_color(), ms=5)
+        ax.plot(np.real(finite[chosen]), np.imag(finite[chosen]), ".", color=line.get_color(), ms=5)
         taken: list = []
         for i in chosen:
             text = f"{'A = ' if i == chosen[0] else ''}{amplitudes[i]:.3g}"
@@ -187,7 +191,7 @@ def draw_single(ax, amplitudes, curve, *, ticks=4, **kwargs):
 
 
 def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):
-    """Draw -1/N at a few constant amplitudes (solid) and constant frequencies (dashed), each labelled at its end."""
+    """Draw -1/N at a few constant amplitudes (solid) and frequencies (dashed), labelled at their ends."""
     z = family.minus_inverse
     shown = _inside(ax, z)
     rows, columns = _chosen(shown.any(axis=1), amplitudes), _chosen(shown.any(axis=0), frequencies)
@@ -195,14 +199,19 @@ def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):
     for n, i in enumerate(rows):
         options = {"color": AMPLITUDE_COLOR, "lw": 1.1, "alpha": 0.9, **kwargs}
         curve = unbroken(z[i], family.regime[i])
-        solid += ax.plot(curve.real, curve.imag, **options)
+        solid += ax.plot(np.real(curve), np.imag(curve), **options)
         _end_label(ax, z[i], f"{'A = ' if n == 0 else ''}{family.amplitudes[i]:.3g}", AMPLITUDE_COLOR, taken)
     for n, k in enumerate(columns):
         options = {"color": OMEGA_COLOR, "lw": 1.1, "ls": (0, (4, 2)), "alpha": 0.9, **kwargs}
         curve = unbroken(z[:, k], family.regime[:, k])
-        dashed += ax.plot(curve.real, curve.imag, **options)
+        dashed += ax.plot(np.real(curve), np.imag(curve), **options)
         _end_label(
-            ax, z[:, k], f"{'ω = ' if n == 0 else ''}{family.omega[k]:.3g}", OMEGA_COLOR, taken, from_start=True
+            ax,
+            z[:, k],
+            f"{'ω = ' if n == 0 else ''}{family.omega[k]:.3g}",
+            OMEGA_COLOR,
+            taken,
+            from_start=True,
         )
     return solid, dashed
 
