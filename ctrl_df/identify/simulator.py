@@ -1,0 +1,519 @@
+"""A model driven by a recorded input: whole, or window by window from initial states of its own.
+
+What a record's clock can do exactly is taken out of the engine: a dead time shifts the axis of the input or
+the instants at which the output is read, static laws of a held input act on its samples, offset, drift and
+rounding act on the output's samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import control as ct
+import numpy as np
+
+from ..blocks.core import ELASTIC, IMPACT, level
+from ..blocks.mechanism import Mechanism
+from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
+from ..simulate.engine import Engine, State, sampled_drive
+from ..simulate.loop import closed_loop
+from . import derivatives
+from .measurement import Measurement
+from .motion_phases import reversals
+
+REFERENCE = ("reference", "r")
+_TIED = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
+
+
+# --- what a record says by itself -------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band."""
+
+    dt: float
+    spread: float
+    speed: float
+    force: float
+    noise: float
+    swing: float  # time of one to and fro [s]
+    half: int  # samples either side of a local polynomial
+    velocity: np.ndarray
+
+
+_FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
+
+
+def facts(record: Measurement) -> Facts:
+    """Return the scales of a record (kept for as long as the record lives)."""
+    known = _FACTS.get(record)
+    if known is None:
+        _, grid, values = derivatives.uniform(record.t, record.y)
+        dt = float(grid[1] - grid[0])
+        cutoff = derivatives.automatic_cutoff(values, dt)
+        velocity = derivatives.derivative(record.t, record.y, 1, cutoff)
+        speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
+        turns = max(len(reversals(velocity, 0.3 * speed)), 1)
+        swing = min(2 * record.duration / turns, record.duration)
+        half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
+        known = Facts(
+            dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
+            max(record.noise_floor(), 1e-9 * float(np.std(record.y))), swing, half, velocity,
+        )  # fmt: skip
+        _FACTS[record] = known
+    return known
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Parts of a record, and the state in which the data say each begins.
+
+    `edges` (nw + 1) sample numbers; `x`, `v`, `a` (nw) reported position, velocity, acceleration at the first
+    sample of each; `x_error`, `v_error` (nw) how far they may be off.
+    """
+
+    edges: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    x_error: np.ndarray
+    v_error: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    @property
+    def slices(self) -> list[slice]:
+        """The windows as slices of the record."""
+        return [slice(a, b) for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
+
+
+def usual_window(record: Measurement) -> float:
+    """Return the length of window [s] that shows a few strokes: two to-and-fro motions, 40 samples at least."""
+    known = facts(record)
+    return max(2 * known.swing, 40 * known.dt)
+
+
+def make_windows(record: Measurement, length: float | None = None) -> Windows:
+    """Cut a record into windows of about `length` [s] (None: one window) and estimate where each begins."""
+    n = len(record)
+    count = 1 if length is None else max(round(record.duration / length), 1)
+    count = max(min(count, n // 20), 1)
+    edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
+    edges[0], edges[-1] = 0, n
+    edges = np.unique(edges)
+    known = facts(record)
+    rows = np.array([_local(record, int(i), known) for i in edges[:-1]])
+    return Windows(edges, *rows.T)
+
+
+def _local(record, i, known) -> tuple[float, float, float, float, float]:
+    """Return (x, v, a, error of x, error of v) at sample i, by a parabola through its neighbours."""
+    low, high = max(i - known.half, 0), min(i + known.half + 1, len(record))
+    if high - low < 2 * known.half:  # at an end: as many samples, to one side
+        low, high = (
+            (0, min(2 * known.half, len(record)))
+            if i < known.half
+            else (max(len(record) - 2 * known.half, 0), high)
+        )
+    s, y = record.t[low:high] - record.t[i], record.y[low:high]
+    reach = max(float(np.max(np.abs(s))), 1e-300)
+    basis = np.vander(s / reach, 3, increasing=True)
+    solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
+    rest = y - basis @ solution
+    sigma = max(float(np.sqrt(np.sum(rest**2) / max(len(y) - 3, 1))), known.noise)
+    errors = sigma * np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis)))
+    x, v, a = solution[0], solution[1] / reach, 2 * solution[2] / reach**2
+    return float(x), float(v), float(a), float(errors[0]), float(errors[1] / reach)
+
+
+# --- the model on the record --------------------------------------------------------------------------
+
+
+@dataclass
+class _Parts:
+    """A block made ready: its engine, and what acts outside of it."""
+
+    engine: Engine
+    core: Any
+    offset: int  # of the block's states in the engine's
+    drive_time: np.ndarray
+    drive_value: np.ndarray
+    delay: float = 0.0  # of the output
+    output: list = field(default_factory=list)  # (primitive, delay still to come)
+    lags: list = field(default_factory=list)  # (state, samples)
+
+
+class Simulator:
+    """One model on one record, ready to be run with many parameter values.
+
+    Parameters
+    ----------
+    model : block or loop of `ctrl_df.closed_loop`
+        A block is driven by the recorded input (the force). A loop runs on the reference: the channel
+        ``reference`` of the record, or its input where there is none.
+    record : Measurement
+        The run.
+    thin : int
+        The input is given in steps of that many samples (their impulse and its moment kept), which makes the
+        run as many times faster and the result a little coarser; for first iterations.
+    rtol : float
+        Relative tolerance of the engine.
+
+    Raises
+    ------
+    TypeError
+        A model that is neither.
+    """
+
+    def __init__(self, model, record: Measurement, *, thin: int = 1, rtol: float = 1e-6):
+        self.model, self.record, self.rtol = model, record, rtol
+        self.parts = getattr(model, "parts", None)
+        self.closed = self.parts is not None
+        self.block = self.parts.block if self.closed else model
+        if not isinstance(self.block, ct.NonlinearIOSystem):
+            raise TypeError(
+                f"compare and refit need a block or a loop of closed_loop; got {type(model).__name__}. "
+                "Wrap a linear system with ct.nlsys, or build the block from ctrl_df.Mass and effects."
+            )
+        self.mechanism = isinstance(self.block, Mechanism)
+        self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
+        self.facts = facts(record)
+        self.runs = 0
+        self._prepared: tuple[Any, _Parts | None] = (None, None)
+
+    @property
+    def tied(self) -> bool:
+        """Whether the block's laws depend on the place (a spring, a ripple, a stop, or a law not known)."""
+        if self.closed or not self.mechanism:
+            return True
+        from ..blocks import effects
+
+        names = {e.id for e in self.block.effects}
+        foreign = any(not hasattr(effects, type(e).__name__) for e in self.block.effects if e.role == "force")
+        return bool(names & _TIED) or foreign
+
+    @property
+    def anchored(self) -> bool:
+        """Whether something pulls the model back, so that a free run does not drift."""
+        if self.closed or not self.mechanism:
+            return True
+        pull, s = 0.0, 2 * self.facts.spread
+        for term in self.block.core.forces:
+            law, p = type(term.effect).law, term.effect.values
+            z = np.zeros(max(term.effect.states, 1))
+            centre = float(np.mean(self.record.y))
+            forces = [float(law(0.0, centre + d, 0.0, z, p, z.copy())) for d in (-s, s)]  # type: ignore[misc]
+            if term.effect.id != "position_ripple":
+                pull += forces[0] - forces[1]
+        return pull > 0.1 * self.facts.force
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """Names of the initial states estimated beside the parameters, per window."""
+        if not self.mechanism:
+            return ()
+        core = self.block.core
+        names = ["x", "v"]
+        if core.joint == IMPACT:
+            names.append("slack")
+        elif core.joint == ELASTIC:
+            names += ["stretch", "stretch_rate"]
+        if core.bristle is not None:
+            names.append("bristle")
+        return tuple(names)
+
+    def priors(self, windows: Windows) -> np.ndarray:
+        """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
+        known, core = self.facts, self.block.core if self.mechanism else None
+        columns = []
+        for name in self.nuisances:
+            if name == "x":
+                columns.append(20 * windows.x_error)
+            elif name == "v":
+                columns.append(10 * windows.v_error + 0.02 * known.speed)
+            elif name == "slack":
+                columns.append(np.full(len(windows), 1.0))
+            elif name == "bristle":
+                columns.append(np.full(len(windows), 0.5))
+            else:
+                bend = known.force / max(core.stiffness, 1e-300)  # type: ignore[union-attr]
+                mass = core.masses[0] * core.masses[-1] / sum(core.masses)  # type: ignore[union-attr]
+                rate = bend * math.sqrt(core.stiffness / mass)  # type: ignore[union-attr]
+                columns.append(np.full(len(windows), 0.3 * (bend if name == "stretch" else rate)))
+        return np.array(columns).T.reshape(len(windows), len(columns))
+
+    def with_values(self, values: Mapping[str, float] | None):
+        """Return the model with these parameter values; a static level below the kinetic one is raised to it."""
+        if not values:
+            return self.model
+        block = self.block.with_parameters(feasible(self.block, values))
+        return closed_loop(self.parts.controller, block, self.parts.dt) if self.closed else block
+
+    def run(
+        self,
+        windows: Windows,
+        values: Mapping[str, float] | None = None,
+        start: np.ndarray | None = None,
+        *,
+        rounded: bool = False,
+    ) -> np.ndarray:
+        """Simulate and return the output at the record's samples, shape (n,).
+
+        Parameters
+        ----------
+        windows : Windows
+            Where the state is set anew.
+        values : mapping or None
+            Parameters that differ from the model's.
+        start : (nw, number of nuisances) array or None
+            Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
+            slack (0 to 1, None: from the acceleration), for an elastic joint its stretch [m] and rate [m/s]
+            beyond the steady one, for bristles the share of full deflection beyond the steady one.
+        rounded : bool
+            Whether an encoder of the model rounds the output. Fits leave it out: its steps have no slope.
+
+        Returns
+        -------
+        array
+            Where the model ran away, ten times the spread of the record beside its mean.
+        """
+        self.runs += 1
+        part = self._prepare(values)
+        record, n = self.record, len(self.record)
+        out = np.empty(n)
+        drive = sampled_drive(
+            part.drive_time, part.drive_value, record.input_hold if self.thin == 1 else "linear"
+        )
+        for w, where in enumerate(windows.slices):
+            times = record.t[where] - part.delay
+            state = self._start(part, windows, w, None if start is None else start[w], times[0])
+            segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
+            state.segment = segment
+            run = part.engine.run(
+                state,
+                float(times[-1]),
+                drive,
+                times,
+                order=5,
+                rtol=self.rtol,
+                log=1,
+                max_steps=60 * len(times) + 20_000,
+            )
+            out[where] = run.outputs[:, 0]
+            if not run.status.ok:
+                out[where.start + run.recorded : where.stop] = np.nan
+        for primitive, later in part.output:
+            if isinstance(primitive, Ramp):
+                out += primitive.offset + primitive.rate * (record.t - later)
+            elif rounded:
+                out = primitive.value(out)
+        limit = 10 * self.facts.spread
+        centre = float(np.mean(record.y))
+        with np.errstate(invalid="ignore"):
+            out = np.where(
+                np.isfinite(out), np.clip(out, centre - 100 * limit, centre + 100 * limit), centre + limit
+            )
+        return out
+
+    # --- preparing ------------------------------------------------------------------------------------
+
+    def _prepare(self, values) -> _Parts:
+        key = None if values is None else tuple(values.items())
+        if self._prepared[1] is not None and self._prepared[0] == key:
+            return self._prepared[1]
+        model = self.with_values(values)
+        if self.closed:
+            part = self._prepare_loop(model)
+        elif self.mechanism:
+            part = self._prepare_block(model)
+        else:
+            time, value = self._before(self.record.t, self.record.u)
+            part = _Parts(Engine(model), None, 0, time, value)
+        self._prepared = (key, part)
+        return part
+
+    def _before(self, t, u):
+        """Let the first value hold for all time before the record."""
+        return np.concatenate(([t[0] - 1e3 * self.record.duration - 1.0], t)), np.concatenate(([u[0]], u))
+
+    def _prepare_loop(self, loop) -> _Parts:
+        channels = self.record.channels or {}
+        reference = next((channels[k] for k in REFERENCE if k in channels), self.record.u)
+        time, value = self._before(self.record.t, reference)
+        block = loop.parts.block
+        offset = (loop.nstates or 0) - (block.nstates or 0)
+        return _Parts(Engine(loop), block.core if self.mechanism else None, offset, time, value)
+
+    def _prepare_block(self, block) -> _Parts:
+        record, t, u = self.record, self.record.t, np.asarray(self.record.u)
+        outside, input_delay, static = [], 0.0, record.input_hold == "zoh"
+        held = u
+        for key, effect in zip(block._keys, block.effects, strict=True):
+            if effect.role != "input":
+                continue
+            channel = effect.channel()
+            if all(isinstance(p, Delay) for p in channel):
+                # a dead time commutes with every law that does not know the time of day
+                input_delay += sum(p.delay for p in channel)
+                outside.append(key)
+            elif static and all(isinstance(p, PiecewiseAffine) and not p.hysteretic for p in channel):
+                for p in channel:
+                    held = p.value(held)
+                outside.append(key)
+            else:
+                static = False
+        tail = []
+        for key, effect in reversed(list(zip(block._keys, block.effects, strict=True))):
+            if effect.role == "output":
+                channel = effect.channel()
+                if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
+                    break
+                tail = [*channel, *tail]
+                outside.append(key)
+        delays = [p.delay if isinstance(p, Delay) else 0.0 for p in tail]
+        later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
+        output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
+        inner = block
+        if outside:
+            kept = [e for k, e in zip(block._keys, block.effects, strict=True) if k not in outside]
+            inner = block._remade(block._values, kept)
+        core = inner.core
+        time, value = self._before(t, held)
+        lags = []
+        signal = held
+        for primitive, state in core.input_channel:
+            if isinstance(primitive, Lag) and record.input_hold == "zoh":
+                signal = _lagged(t, signal, primitive.time_constant)
+                lags.append((state, signal))
+            elif isinstance(primitive, Lag):
+                lags.append((state, signal))
+            elif state < 0:
+                signal = primitive.value(signal)
+        if self.thin > 1:
+            time, value = _thinned(t, held, self.thin)
+            time, value = self._before(time, value)
+        return _Parts(Engine(inner), core, 0, time + input_delay, value, float(sum(delays)), output, [
+            (state, np.interp(t - input_delay, t, s)) for state, s in lags
+        ])  # fmt: skip
+
+    def _start(self, part, windows, w, start, time) -> State:
+        engine, core = part.engine, part.core
+        x0 = np.zeros(engine.nstates)
+        if core is None:
+            return engine.start(x0, time)
+        given = dict(zip(self.nuisances, start, strict=True)) if start is not None else {}
+        i = int(windows.edges[w])
+        x = float(windows.x[w]) + given.get("x", 0.0)
+        for primitive, later in part.output:
+            if isinstance(primitive, Ramp):
+                x -= primitive.offset + primitive.rate * (self.record.t[i] - later)
+        v = float(windows.v[w]) + given.get("v", 0.0)
+        if core.stop is not None:
+            low, high = core.stop.span
+            x = min(max(x, low), high)
+        states = x0[part.offset :]
+        stretch, rate = 0.0, 0.0
+        if core.joint == IMPACT:
+            slack = given.get("slack", 1.0 if windows.a[w] > 0 else 0.0)
+            stretch = min(max(slack, 0.0), 1.0) * core.gap
+        elif core.joint == ELASTIC:
+            pull = core.masses[0] * float(windows.a[w])
+            stretch = pull / core.stiffness + (core.gap if pull > 0 else 0.0) + given.get("stretch", 0.0)
+            rate = given.get("stretch_rate", 0.0)
+        if core.bodies == 2 and core.measured == 1:
+            states[2], states[3] = x, v
+            states[0], states[1] = x - stretch, v - rate
+        else:
+            states[0], states[1] = x, v
+            if core.bodies == 2:
+                states[2], states[3] = x + stretch, v + rate
+        if core.bodies == 2 and core.stop is not None:
+            low, high = core.stop.span
+            beyond = min(max(states[2], low), high) - states[2]
+            states[2] += beyond
+            states[0] += beyond
+        if core.bristle is not None:
+            speed = states[2 * core.driven + 1]
+            full = (
+                level(core.friction[core.driven], 1.0, math.copysign(1.0, speed), abs(speed))
+                + core.bristle.level
+            )
+            share = math.tanh(3 * speed / self.facts.speed) + given.get("bristle", 0.0)
+            states[core.bristle_state] = min(max(share, -1.0), 1.0) * full / core.bristle.stiffness
+        for state, samples in part.lags:
+            states[state] = samples[i]
+        return engine.start(x0, time)
+
+
+def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values with static levels raised to the kinetic one where they fell below it."""
+    values = dict(values)
+    current = block.parameters
+    statics = [
+        f"{k}.level"
+        for k, e in zip(block._keys, block.effects, strict=True)
+        if e.id in ("stiction", "stribeck")
+    ]
+    if statics:
+        kinetic = sum(
+            values.get(f"{k}.level", current[f"{k}.level"].value)
+            for k, e in zip(block._keys, block.effects, strict=True)
+            if e.role == "friction" and e.side == "motor" and e.rank == 0 and f"{k}.level" in current
+        )
+        for name in statics:
+            if values.get(name, current[name].value) < kinetic:
+                values[name] = kinetic
+    return values
+
+
+def _lagged(t, u, time_constant):
+    """Return the output of a first-order lag at the samples of a held input, started at its steady value."""
+    from scipy.signal import lfilter
+
+    steps = np.diff(t)
+    if np.ptp(steps) <= 0.02 * np.mean(steps):
+        a = math.exp(-float(np.mean(steps)) / time_constant)
+        rest, _ = lfilter([1 - a], [1.0, -a], u[:-1], zi=np.array([a * u[0]]))
+        return np.concatenate(([u[0]], rest))
+    out = np.array(u, dtype=float)
+    for i, step in enumerate(steps):
+        a = math.exp(-step / time_constant)
+        out[i + 1] = a * out[i] + (1 - a) * u[i]
+    return out
+
+
+def _thinned(t, u, factor):
+    """Return knots and values of a broken line whose second integral is that of the held input at every knot.
+
+    A mass moved by either passes the same places at the knots: (s[k-1] + 4 s[k] + s[k+1]) T^2/6 equals the
+    second difference of the place.
+    """
+    from scipy.linalg import solve_banded
+
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    count = (len(t) - 1) // factor
+    knots = np.arange(count + 1) * factor
+    speed = np.concatenate(([0.0], np.cumsum(u[:-1]) * dt))
+    place = np.concatenate(([0.0], np.cumsum(speed[:-1] * dt + 0.5 * dt * dt * u[:-1])))
+    step = dt * factor
+    right = np.empty(count + 1)
+    # ends: the place after the first interval, and the speed and place over the last one
+    right[1:-1] = (place[knots[2:]] - 2 * place[knots[1:-1]] + place[knots[:-2]]) * 6 / step**2
+    right[0] = place[knots[1]] * 6 / step**2
+    last = place[knots[-1]] - place[knots[-2]]
+    right[-1] = (speed[knots[-1]] * step - last) * 6 / step**2
+    bands = np.ones((3, count + 1))
+    bands[1] = 4.0
+    bands[1, 0] = bands[1, -1] = 2.0
+    values = solve_banded((1, 1), bands, right)
+    time = t[0] + knots * dt
+    rest = len(t) - 1 - int(knots[-1])
+    if rest:
+        time, values = np.append(time, t[-1]), np.append(values, u[-1])
+    return time, values
