@@ -275,7 +275,7 @@ def identity(F) -> str:
 
 
 def points(method: Method, A, omega, zero_check=False):
-    """N and regime at pairs (A, omega), grouped so that grid solvers see grids.
+    """N, regime and residual at pairs (A, omega), grouped so that grid solvers see grids.
 
     Parameters
     ----------
@@ -288,32 +288,39 @@ def points(method: Method, A, omega, zero_check=False):
     -------
     N : ndarray of complex
     regime : ndarray of str
+    residual : ndarray
     """
-    N, regime = np.empty(A.shape, dtype=complex), np.full(A.shape, "", dtype="U24")
-    flat, names, a = N.reshape(-1), regime.reshape(-1), A.reshape(-1)
+    N, regime, residual = (
+        np.empty(A.shape, dtype=complex),
+        np.full(A.shape, "", dtype="U24"),
+        np.zeros(A.shape),
+    )
+    flat, names, errors, a = N.reshape(-1), regime.reshape(-1), residual.reshape(-1), A.reshape(-1)
     zero = a == 0
     if zero.any():
         flat[zero] = _slope_at_zero(method, a.max(), zero_check)
     live = np.nonzero(~zero)[0]
     if not live.size:
-        return N, regime
+        return N, regime, residual
     levels, row = np.unique(a[live], return_inverse=True)
     if not method.needs_omega or omega is None:
-        y, kind, _ = method.harmonics(levels, None, 1)
-        flat[live], names[live] = y[row, 0, 1], kind[row, 0]
-        return N, regime
+        y, kind, error = method.harmonics(levels, None, 1)
+        flat[live], names[live], errors[live] = y[row, 0, 1], kind[row, 0], error[row, 0]
+        return N, regime, residual
     w = omega.reshape(-1)[live]
     frequencies, column = np.unique(w, return_inverse=True)
     if levels.size * frequencies.size <= _RECTANGLE * live.size:
-        y, kind, _ = method.harmonics(levels, frequencies, 1)
+        y, kind, error = method.harmonics(levels, frequencies, 1)
         flat[live], names[live] = y[row, column, 1], kind[row, column]
-        return N, regime
+        errors[live] = error[row, column]
+        return N, regime, residual
     for k, frequency in enumerate(frequencies):
         mine = np.nonzero(column == k)[0]
         some, where = np.unique(row[mine], return_inverse=True)
-        y, kind, _ = method.harmonics(levels[some], np.array([frequency]), 1)
+        y, kind, error = method.harmonics(levels[some], np.array([frequency]), 1)
         flat[live[mine]], names[live[mine]] = y[where, 0, 1], kind[where, 0]
-    return N, regime
+        errors[live[mine]] = error[where, 0]
+    return N, regime, residual
 
 
 def _slope_at_zero(method, largest, zero_check):

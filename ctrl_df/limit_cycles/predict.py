@@ -29,7 +29,7 @@ SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can b
 MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
 FLOOR = 1e-3  # least half width of a band
 _FAST = ("element", "law", "rate", "linear", "friction")
-_NOISY = ("aperiodic",)  # regimes whose N is an average that jumps from point to point
+_NOISE = 1e-6  # spread of an average from which N jumps from point to point
 _OMEGA_POINTS = {True: 1000, False: 200}  # of a range: memoryless, dynamic
 
 
@@ -197,11 +197,16 @@ def _defect(method: Method, linear: LinearPart):
     def D(p, q):
         a, w = np.exp(p), np.exp(q)
         h, _ = linear.clamped(w)
-        N, regime = points(method, a, w)
+        N, regime, spread = points(method, a, w)
         with np.errstate(all="ignore"):
-            return np.where(np.isin(regime, _NOISY), np.nan, 1 + N * h)
+            return np.where(_noisy(regime, spread), np.nan, 1 + N * h)
 
     return D
+
+
+def _noisy(regime, spread):
+    """Where N is an average over irregular motion rather than a function of (a, omega)."""
+    return (np.asarray(regime) == "aperiodic") & ~(np.asarray(spread) < _NOISE)
 
 
 def _scan_grid(method: Method, linear: LinearPart, family: Family):
@@ -275,7 +280,7 @@ class _Assessor:
 
     def _irregular(self) -> list[LimitCycle]:
         """Crossings among averages over irregular motion: the interpolant's zeros, one a neighbourhood."""
-        noisy = np.isin(self.family.regime, _NOISY)
+        noisy = _noisy(self.family.regime, self.family.residual)
         if self.method.name in _FAST or not noisy.any():
             return []
         log_a, log_w = np.log(self.family.amplitudes), np.log(self.family.omega)
@@ -292,7 +297,7 @@ class _Assessor:
             w = np.exp(place[1:])
             y, regime, spread = self.method.harmonics(np.exp(place[:1]), w, 1)
             residual = float(abs(1 + y[0, 0, 1] * self.linear(w)[0]))
-            if regime[0, 0] not in _NOISY or not residual <= max(0.05, 3 * spread[0, 0]):
+            if not _noisy(regime, spread)[0, 0] or not residual <= max(0.05, 3 * spread[0, 0]):
                 continue  # a jump between coexisting motions, not a crossing
             note = (
                 2,
