@@ -1,0 +1,193 @@
+"""The command ``ctrl-df``: the demo, limit cycles of a model file, a model improved with a record."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .model_file import EXAMPLE, ModelFile, read_model
+
+BAD_INPUT = 2
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit code: 0, or 2 for input that cannot be used (one line on stderr)."""
+    options = _parser().parse_args(argv)
+    try:
+        return options.run(options)
+    except (ValueError, TypeError, OSError) as error:
+        print(f"ctrl-df: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("ctrl-df: interrupted", file=sys.stderr)
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="ctrl-df",
+        description="Limit cycles of drives with friction and backlash, and the effect a model is missing.",
+        epilog="MODEL.toml, all sections:\n\n" + EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    shape: dict[str, Any] = dict(epilog=parser.epilog, formatter_class=argparse.RawDescriptionHelpFormatter)
+
+    demo = commands.add_parser("demo", help="the paper's systems and a hidden-effect study: tables, pictures")
+    demo.add_argument("--out", default="ctrl-df-demo", metavar="DIR", help="directory of the pictures (default %(default)s)")
+    demo.set_defaults(run=_demo)
+
+    cycles = commands.add_parser("limit-cycles", help="predicted, exact and simulated limit cycles of a model", **shape)
+    cycles.add_argument("model", metavar="MODEL.toml")
+    cycles.add_argument("--json", action="store_true", help="machine-readable answer")
+    cycles.set_defaults(run=_limit_cycles)
+
+    better = commands.add_parser("improve", help="find what a model is missing, from a record", **shape)
+    better.add_argument("data", metavar="DATA.csv")
+    better.add_argument("--model", required=True, metavar="MODEL.toml")
+    better.add_argument("--report", metavar="OUT.html", help="write one self-contained HTML page")
+    better.add_argument("--json", action="store_true", help="machine-readable answer")
+    better.set_defaults(run=_improve)
+    return parser
+
+
+def _demo(options) -> int:
+    from .demo import run
+
+    run(Path(options.out))
+    return 0
+
+
+# --- limit cycles -------------------------------------------------------------------------------------------
+
+
+def _limit_cycles(options) -> int:
+    from .limit_cycles.predict import describing_function_response
+    from .limit_cycles.verify import verify
+    from .simulate.loop import closed_loop
+
+    model = read_model(options.model)
+    if model.controller is None:
+        raise ValueError(f"{model.path} needs a section [controller] with kp, ki, kd to close the loop; add it.")
+    if model.amplitudes is None:
+        raise ValueError(f"{model.path} needs a section [box] with amplitude and omega, each [low, high]; add it.")
+    response = describing_function_response(model.controller, model.plant, model.amplitudes, model.omega)
+    check = verify(response, loop=closed_loop(model.controller, model.plant, model.dt))
+    if options.json:
+        _print_json(
+            {
+                "model": model.path,
+                "plant": repr(model.plant),
+                "status": response.status,
+                "cycles": [_row(r) for r in check],
+                "note": check.note,
+            }
+        )
+        return 0
+    print(f"{model.plant!r}\n{response.status}\n\n{check.table()}")
+    for cycle in response.limit_cycles:
+        print(f"\n{cycle.amplitude:.5g} @ {cycle.omega:.5g} rad/s, {cycle.grade}: {cycle.why}")
+    return 0
+
+
+def _row(row) -> dict[str, Any]:
+    out: dict[str, Any] = {"verdict": row.verdict, "predicted": None, "exact": None, "simulated": None}
+    if row.predicted is not None:
+        names = ("amplitude", "output_amplitude", "omega", "stable", "distortion", "omega_band", "amplitude_band",
+                 "sensitivity", "grade", "why", "regime")  # fmt: skip
+        out["predicted"] = {n: getattr(row.predicted, n) for n in names}
+    if row.exact is not None:
+        names = ("amplitude", "output_amplitude", "omega", "period", "stable", "residual", "multiplier")
+        out["exact"] = {n: getattr(row.exact, n) for n in names} | {"status": row.exact.status.value}
+    if row.simulated is not None:
+        out["simulated"] = {"omega": row.simulated[0], "output_amplitude": row.simulated[1]}
+    return out
+
+
+# --- improve ------------------------------------------------------------------------------------------------
+
+
+def _improve(options) -> int:
+    from .identify.improve import improve
+    from .identify.measurement import Measurement
+
+    model = read_model(options.model)
+    if options.report:
+        folder = Path(options.report).resolve().parent
+        if not folder.is_dir():
+            raise ValueError(f"--report needs an existing directory; got {folder}. Create it first.")
+    columns = {"time": "t", "input": "r" if model.closed_loop else "F", "output": "x", **model.columns}
+    record = Measurement.from_csv(options.data, **columns)
+    study = improve(_subject(model), record)
+    if options.report:
+        study.report(options.report)
+    if options.json:
+        _print_json(_study(study))
+    else:
+        print(study.summary())
+        if options.report:
+            print(f"\nreport: {options.report}")
+    return 0
+
+
+def _subject(model: ModelFile):
+    if not model.closed_loop:
+        return model.plant
+    from .simulate.loop import closed_loop
+
+    return closed_loop(model.controller, model.plant, model.dt)
+
+
+def _study(study) -> dict[str, Any]:
+    steps = []
+    for step in study.steps:
+        values = {n: getattr(step, n, None) for n in ("effect", "nrmse", "nrmse_holdout")}
+        effect = values["effect"]
+        values["effect"] = getattr(effect, "id", effect)
+        values["parameters"] = _parameters(getattr(step, "parameters", {}))
+        steps.append(values)
+    block = getattr(getattr(study.model, "parts", None), "block", study.model)
+    return {
+        "verdict": study.verdict,
+        "steps": steps,
+        "model": repr(block),
+        "parameters": _parameters(getattr(block, "parameters", {})),
+    }
+
+
+def _parameters(table) -> dict[str, Any]:
+    out = {}
+    for name, p in dict(table).items():
+        out[name] = {"value": float(getattr(p, "value", p)), "unit": getattr(p, "unit", "")}
+        error = getattr(p, "standard_error", getattr(p, "error", None))
+        if error is not None:
+            out[name]["standard_error"] = error
+    return out
+
+
+def _print_json(answer) -> None:
+    print(json.dumps(_plain(answer), indent=2, allow_nan=False))
+
+
+def _plain(value):
+    """Numbers of numpy and non-finite ones as JSON knows them (nan and inf become null)."""
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(v) for v in value]
+    if isinstance(value, str | bool | None):
+        return value
+    if isinstance(value, int):
+        return value
+    try:
+        number = value.item() if hasattr(value, "item") else value
+        if isinstance(number, bool | int | str):
+            return number
+        return float(number) if math.isfinite(number) else None
+    except (TypeError, ValueError):
+        return str(value)

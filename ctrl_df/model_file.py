@@ -1,0 +1,217 @@
+"""MODEL.toml: a plant, its controller, the box to search and the columns of a record, in one text file."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .blocks.effect import Effect, effect_class
+from .blocks.mechanism import Mass, Mechanism, TwoMass
+from .blocks.pid import pid
+
+EXAMPLE = """\
+[plant]
+kind = "mass"              # or "two_mass" (then motor_mass and load_mass)
+mass = 9.0                 # kg
+
+[effects.coulomb]          # any effect id, parameters by name, SI units; several: one table each
+level = 5.0                # N
+[effects.viscous]
+coefficient = 0.5          # N s/m
+
+[controller]               # F = kp e + ki (integral of e) + kd (rate of e)
+kp = 2000.0
+ki = 44250.0               # optional, as all below
+kd = 130.0
+tf = 0.0                   # filter of the derivative [s]; 0: ideal, on the measured velocity
+dt = 0.0                   # sample time of a digital controller [s]; 0: continuous
+
+[box]                      # where limit cycles are sought
+amplitude = [5.2, 100.0]   # at the plant's input [N], peak
+omega = [4.0, 40.0]        # rad/s
+points = [40, 60]          # of the grid, optional
+
+[data]                     # columns of DATA.csv for improve
+time = "t"
+input = "F"
+output = "x"
+input_unit = "N"           # optional; also time_unit, velocity, velocity_unit, input_hold
+output_unit = "mm"
+closed_loop = false        # true: the input column is the reference of the loop with [controller]
+"""
+
+_PLANTS: dict[str, type[Mechanism]] = {"mass": Mass, "two_mass": TwoMass}
+_SECTIONS = ("plant", "effects", "controller", "box", "data")
+_DATA = {
+    "time", "input", "output", "velocity", "delimiter", "channels", "name", "input_unit", "output_unit", "time_unit",
+    "velocity_unit", "input_hold", "closed_loop",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """What a MODEL.toml says.
+
+    Attributes
+    ----------
+    path : str
+    plant : Mechanism
+    controller : ct.TransferFunction or None
+    dt : float
+        Sample time of the controller [s], 0: continuous.
+    amplitudes, omega : ndarray or None
+        The grid of [box].
+    columns : dict
+        Keywords for ``Measurement.from_csv``.
+    closed_loop : bool
+        Whether records were taken with the loop closed.
+    """
+
+    path: str
+    plant: Mechanism
+    controller: Any = None
+    dt: float = 0.0
+    amplitudes: np.ndarray | None = None
+    omega: np.ndarray | None = None
+    columns: dict[str, Any] = field(default_factory=dict)
+    closed_loop: bool = False
+
+
+def read_model(path) -> ModelFile:
+    """Read a MODEL.toml.
+
+    Raises
+    ------
+    ValueError
+        No TOML, an unknown section, effect or key, a value out of range; the message names file and section.
+    OSError
+        The file cannot be read.
+    """
+    text = Path(path).read_bytes()
+    try:
+        table = tomllib.loads(text.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is no TOML file: {error}. See ctrl-df --help for an example.") from None
+    _known(path, "file", table, _SECTIONS)
+    plant = _within(path, "[plant]", lambda: _plant(table))
+    controller = dt = None
+    if "controller" in table:
+        controller, dt = _within(path, "[controller]", lambda: _controller(table["controller"]))
+    amplitudes, omega = _within(path, "[box]", lambda: _box(table.get("box")))
+    data = _within(path, "[data]", lambda: _data(table.get("data", {})))
+    closed = bool(data.pop("closed_loop", False))
+    if closed and controller is None:
+        raise ValueError(f"{path}, [data]: closed_loop = true needs a [controller] section; add it.")
+    return ModelFile(str(path), plant, controller, dt or 0.0, amplitudes, omega, data, closed)
+
+
+def _plant(table) -> Mechanism:
+    if "plant" not in table:
+        raise ValueError('a model needs a section [plant] with kind = "mass" or "two_mass".')
+    given = dict(_mapping(table["plant"], "plant"))
+    kind = given.pop("kind", "mass")
+    if kind not in _PLANTS:
+        raise ValueError(f"kind must be one of {', '.join(_PLANTS)}; got {kind!r}.")
+    cls = _PLANTS[kind]
+    needed = [n for n, p in inspect.signature(cls).parameters.items() if p.default is inspect.Parameter.empty]
+    _known(None, kind, given, (*needed, "measured", "name"))
+    for name in needed:
+        if name not in given:
+            raise ValueError(f"{kind} needs {name} [kg]; add it.")
+    return cls(**given, effects=_effects(table.get("effects", {})))
+
+
+def _effects(given) -> list[Effect]:
+    """Build effects from tables [effects.ID] or from a list [[effects]] with id."""
+    if isinstance(given, Mapping):
+        pairs = [(key, dict(_mapping(values, f"effects.{key}"))) for key, values in given.items()]
+    elif isinstance(given, list):
+        pairs = []
+        for entry in given:
+            values = dict(_mapping(entry, "effects"))
+            if "id" not in values:
+                raise ValueError("every table of [[effects]] needs an id, such as id = \"coulomb\".")
+            pairs.append((values.pop("id"), values))
+    else:
+        raise ValueError(f"effects must be tables [effects.ID]; got {given!r}.")
+    made = []
+    for key, values in pairs:
+        cls = effect_class(key)
+        _known(None, f"effect {key}", values, [f.name for f in dataclasses.fields(cls)])
+        try:
+            made.append(cls(**values))
+        except TypeError as error:
+            names = ", ".join(f.name for f in dataclasses.fields(cls))
+            raise ValueError(f"effect {key} has the parameters {names}; {error}.") from None
+    return made
+
+
+def _controller(given):
+    given = dict(_mapping(given, "controller"))
+    _known(None, "controller", given, ("kp", "ki", "kd", "tf", "dt"))
+    if "kp" not in given:
+        raise ValueError("a controller needs kp [N/m]; add it (0 if there is none).")
+    numbers = {k: _number(k, v) for k, v in given.items()}
+    dt = numbers.pop("dt", 0.0)
+    if dt < 0:
+        raise ValueError(f"dt must be >= 0 (sample time [s]); got {dt!r}. Use 0 for a continuous controller.")
+    return pid(**numbers), dt
+
+
+def _box(given):
+    if given is None:
+        return None, None
+    given = _mapping(given, "box")
+    _known(None, "box", given, ("amplitude", "omega", "points"))
+    points = given.get("points", [40, 60])
+    if not (isinstance(points, list) and len(points) == 2 and all(isinstance(n, int) and n >= 2 for n in points)):
+        raise ValueError(f"points must be two integers >= 2 (amplitudes, frequencies); got {points!r}.")
+    edges = []
+    for key, count in zip(("amplitude", "omega"), points, strict=True):
+        pair = given.get(key)
+        if not (isinstance(pair, list) and len(pair) == 2):
+            raise ValueError(f"{key} must be a pair [low, high]; got {pair!r}.")
+        low, high = (_number(key, v) for v in pair)
+        if not 0 < low < high < np.inf:
+            raise ValueError(f"{key} needs 0 < low < high; got {pair!r}.")
+        edges.append(np.geomspace(low, high, count))
+    return tuple(edges)
+
+
+def _data(given):
+    given = dict(_mapping(given, "data"))
+    _known(None, "data", given, sorted(_DATA))
+    return given
+
+
+def _number(name, value) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{name} must be a number; got {value!r}.")
+    return float(value)
+
+
+def _mapping(value, name) -> Mapping:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a table of key = value; got {value!r}.")
+    return value
+
+
+def _known(path, where, given, known):
+    unknown = [k for k in given if k not in known]
+    if unknown:
+        place = f"{path}: " if path else ""
+        raise ValueError(f"{place}{where} knows the keys {', '.join(known)}; got {unknown[0]!r}. Remove or correct it.")
+
+
+def _within(path, section, work):
+    try:
+        return work()
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path}, {section}: {error}") from None
