@@ -1,0 +1,247 @@
+"""A model beside its records: how far off, whether by more than noise, and where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .candidate import _Problem, window_lengths
+from .measurement import Measurement
+from .residual_tests import InputTest, Whiteness, fit_percent, input_residual_test, nrmse, rmse, whiteness
+from .simulator import Simulator, Windows, facts
+from .where import Regions, error_regions
+
+
+@dataclass(frozen=True, eq=False)
+class RecordComparison:
+    """A model beside one record.
+
+    Attributes
+    ----------
+    record : Measurement
+    simulated, residual : (n,) array
+        At the record's samples; residual is measured minus simulated.
+    edges : (nw + 1,) array
+        Samples at which the model was started anew; two for a free run.
+    fitted : int
+        Parameters fitted to these data.
+    """
+
+    record: Measurement
+    simulated: np.ndarray
+    residual: np.ndarray
+    edges: np.ndarray
+    fitted: int = 0
+
+    @property
+    def rmse(self) -> float:
+        """Rms of the residual [output unit]."""
+        return rmse(self.residual)
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the residual over that of the centred output."""
+        return nrmse(self.record.y, self.simulated)
+
+    @property
+    def fit_percent(self) -> float:
+        """``100 (1 - nrmse)``."""
+        return fit_percent(self.record.y, self.simulated)
+
+    @property
+    def windows(self) -> int:
+        """Number of windows; 1: a free run."""
+        return len(self.edges) - 1
+
+    @cached_property
+    def white(self) -> Whiteness:
+        """Test of the residual for whiteness."""
+        return whiteness(self.residual)
+
+    @cached_property
+    def input_test(self) -> InputTest | None:
+        """Test of the residual for traces of the input; None for records too short."""
+        if len(self.residual) < 100:
+            return None
+        return input_residual_test(self.record.u, self.residual, fitted=self.fitted)
+
+    @cached_property
+    def where(self) -> Regions:
+        """Regions ranked by their share of the error; none for records under 50 samples."""
+        if len(self.residual) < 50:
+            return Regions()
+        velocity = self.record.velocity if self.record.velocity is not None else facts(self.record).velocity
+        return error_regions(
+            self.record.t, self.residual, position=self.record.y, velocity=velocity, force=self.record.u
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Outcome of `compare`: the sum over all records, and each by itself in `records`.
+
+    `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and `where` are
+    those of the record with the largest error.
+    """
+
+    model: Any
+    records: tuple[RecordComparison, ...]
+
+    def _each(self, name):
+        values = tuple(getattr(r, name) for r in self.records)
+        return values[0] if len(values) == 1 else values
+
+    @property
+    def simulated(self):
+        """Simulated output at the record's samples."""
+        return self._each("simulated")
+
+    @property
+    def residual(self):
+        """Measured minus simulated."""
+        return self._each("residual")
+
+    @property
+    def rmse(self) -> float:
+        """Rms of the residual over all samples [output unit]."""
+        return math.sqrt(sum(float(r.residual @ r.residual) for r in self.records) / sum(len(r.residual) for r in self.records))
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the residual over that of the outputs, each centred."""
+        error = sum(float(r.residual @ r.residual) for r in self.records)
+        return math.sqrt(error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in self.records))
+
+    @property
+    def fit_percent(self) -> float:
+        """MATLAB's fit, ``100 (1 - nrmse)``."""
+        return 100 * (1 - self.nrmse)
+
+    @property
+    def worst(self) -> RecordComparison:
+        """The record with the largest nrmse."""
+        return max(self.records, key=lambda r: r.nrmse)
+
+    @property
+    def white(self) -> Whiteness:
+        """Whiteness of the worst record's residual: true if it passes, with its ``p_value``."""
+        return self.worst.white
+
+    @property
+    def input_test(self) -> InputTest | None:
+        """Whether the worst record's residual still depends on the input."""
+        return self.worst.input_test
+
+    @property
+    def where(self) -> Regions:
+        """Regions of the worst record, ranked by their share of the error."""
+        return self.worst.where
+
+    @property
+    def windows(self) -> int:
+        """Number of windows of all records together."""
+        return sum(r.windows for r in self.records)
+
+    @property
+    def mode(self) -> str:
+        """``free`` or ``windows``."""
+        return "windows" if any(r.windows > 1 for r in self.records) else "free"
+
+    def report(self) -> str:
+        """Return the comparison as text: each record, the tests, the regions."""
+        lines = [str(self)]
+        if len(self.records) > 1:
+            lines += [f"  {r.record.name:<24} nrmse {r.nrmse:.4g}  rmse {r.rmse:.4g} {r.record.output_unit}" for r in self.records]
+        test = self.worst.input_test
+        if test is not None:
+            lines.append(
+                "The residual does not depend on the input" if test else "The residual still depends on the input"
+            )
+            lines[-1] += f" (p = {test.p_value:.2g}): {'what is left looks like noise.' if test else 'something is missing.'}"
+        if self.where:
+            lines += ["", *self.where.sentences[:6], "", self.where.table(8)]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        worst = self.worst
+        how = "free run from fitted initial states"
+        if self.mode == "windows":
+            lengths = [float(np.ptp(r.record.t)) / r.windows for r in self.records]
+            how = (
+                f"{self.windows} windows of {np.mean(lengths):.3g} s, each from a fitted initial state "
+                "(nothing holds this model in place: over a free run it would drift)"
+            )
+        count = f"{len(self.records)} records" if len(self.records) > 1 else f"record {worst.record.name!r}"
+        return (
+            f"{count}: nrmse {self.nrmse:.4g}, fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g} "
+            f"{worst.record.output_unit}, residual {'white' if self.white else 'not white'} "
+            f"(p = {self.white.p_value:.2g}); {how}."
+        )
+
+    def plot(self, record=None, **keywords):
+        """Draw measured and simulated output, the residual, and where the error lies; returns a ct.ControlPlot.
+
+        Parameters
+        ----------
+        record : int or None
+            Which record; None: the worst.
+        """
+        from ..plot.compare import comparison_plot
+
+        return comparison_plot(self, record, **keywords)
+
+
+def compare(model, data, *, mode: str = "auto", window: float | None = None, **keywords) -> Comparison:
+    """Simulate a model on records with the event engine and compare.
+
+    Parameters
+    ----------
+    model : block or loop of `ctrl_df.closed_loop`
+        A block runs on the recorded force. A loop runs on the reference: the record's channel ``reference``,
+        or its input where there is no such channel.
+    data : Measurement or sequence of them
+        What was recorded.
+    mode : {'auto', 'free', 'windows'}
+        One run from a fitted initial state; or windows, each from an initial state of its own. Auto: a free
+        run for loops, for models that a spring holds in place, and for short records; windows for the rest,
+        as an inertia without a spring drifts whatever its parameters.
+    window : float or None
+        Length of the windows [s]; None: two to-and-fro motions.
+
+    Returns
+    -------
+    Comparison
+    """
+    if keywords:
+        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    records = as_records(data)
+    lengths = window_lengths(model, records, "windows" if mode == "auto" and window is not None else mode, window)
+    problem = _Problem(model, records, (), 10_000)
+    problem.stage(lengths, 1)
+    problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
+    return comparison_of(problem.simulators, problem.windows, problem.nuisance)
+
+
+def comparison_of(simulators: list[Simulator], windows: list[Windows], starts, fitted: int = 0) -> Comparison:
+    """Return the comparison of models already started right (``simulators[k].model`` on its record)."""
+    rows = []
+    for s, w, start in zip(simulators, windows, starts, strict=True):
+        fresh = Simulator(s.model, s.record)
+        simulated = fresh.run(w, None, start, rounded=True)
+        rows.append(RecordComparison(s.record, simulated, s.record.y - simulated, w.edges, fitted))
+    return Comparison(simulators[0].model, tuple(rows))
+
+
+def as_records(data) -> list[Measurement]:
+    """Return the records as a list; TypeError for anything that is none."""
+    records = [data] if isinstance(data, Measurement) else list(data) if isinstance(data, Iterable) else [data]
+    bad = [r for r in records if not isinstance(r, Measurement)]
+    if bad or not records:
+        got = type(bad[0]).__name__ if bad else "an empty sequence"
+        raise TypeError(f"compare and refit need a Measurement or several; got {got}. Use ctrl_df.Measurement(t, u, y).")
+    return records

@@ -1,0 +1,80 @@
+"""Measured and simulated output, the residual, and where the error lies, in one picture."""
+
+from __future__ import annotations
+
+import control as ct
+import matplotlib.pyplot as plt
+import numpy as np
+
+_MEASURED, _SIMULATED, _ERROR = "0.55", "#1f4e9c", "#b3402a"
+
+
+def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) -> ct.ControlPlot:
+    """Draw a `Comparison`; see `ctrl_df.identify.compare.Comparison.plot`.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    record : int or None
+        Which record; None: the one with the largest error.
+    title : str or None
+        Over the picture.
+    rows : int
+        Regions shown.
+    """
+    if keywords:
+        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    chosen = comparison.worst if record is None else comparison.records[record]
+    data, unit = chosen.record, chosen.record.output_unit
+    fig = plt.gcf() if not plt.gcf().axes else plt.figure()
+    fig.set_size_inches(9, 6.5)
+    grid = fig.add_gridspec(2, 2, width_ratios=(2.1, 1), height_ratios=(1.5, 1))
+    top = fig.add_subplot(grid[0, 0])
+    below = fig.add_subplot(grid[1, 0], sharex=top)
+    bars = fig.add_subplot(grid[:, 1])
+    lines = np.empty(3, dtype=object)
+    lines[0] = [top.plot(data.t, data.y, color=_MEASURED, lw=2.2, label="measured")[0]]
+    lines[0].append(top.plot(data.t, chosen.simulated, color=_SIMULATED, lw=1.0, label="simulated")[0])
+    top.set_ylabel(f"Output [{unit}]")
+    top.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.99), fontsize=9)
+    top.set_title(f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %", loc="left", fontsize=10)
+    lines[1] = below.plot(data.t, chosen.residual, color=_ERROR, lw=0.7)
+    white = chosen.white
+    below.set_title(
+        f"rmse {chosen.rmse:.3g} {unit}; {'white' if white else 'not white'} (p = {white.p_value:.2g})",
+        loc="left", fontsize=10,
+    )  # fmt: skip
+    below.set_ylabel(f"Measured - simulated [{unit}]")
+    below.set_xlabel("Time [s]")
+    for edge in chosen.edges[1:-1]:
+        for ax in (top, below):
+            ax.axvline(data.t[edge], color="0.8", lw=0.6, zorder=0)
+    lines[2] = _regions(bars, chosen.where, rows)
+    for ax in (top, below, bars):
+        ax.spines[["top", "right"]].set_visible(False)
+    top.tick_params(labelbottom=False)
+    fig.suptitle(data.name if title is None else title, fontsize=11)
+    fig.tight_layout()
+    return ct.ControlPlot(lines, np.array([top, below, bars], dtype=object), fig)
+
+
+def _regions(ax, regions, rows):
+    """Bars: share of the error; ticks: share of the samples. Filled where beyond chance."""
+    significant = regions.significant
+    shown = (significant if len(significant) else regions)[:rows][::-1]
+    ax.set_title("Where the error is" if len(significant) else "No region stands out", loc="left", fontsize=10)
+    if not shown:
+        ax.set_axis_off()
+        return []
+    place = np.arange(len(shown))
+    share = [100 * r.share for r in shown]
+    colour = [_ERROR if r.p_value < 0.01 else "0.8" for r in shown]
+    bars = list(ax.barh(place, share, 0.42, color=colour))
+    for i, region in enumerate(shown):
+        expected = 100 * region.expected_share
+        ax.plot([expected, expected], [i - 0.3, i + 0.3], color="black", lw=1.5)
+        ax.text(0, i + 0.27, f"{region.kind.replace('_', ' ')}: {region.label}", fontsize=8, va="bottom")
+    ax.set_yticks([])
+    ax.set_ylim(-0.6, len(shown) - 0.1)
+    ax.set_xlabel("Share of squared error [%]\n(black: share of the samples)", fontsize=9)
+    return bars
