@@ -86,7 +86,9 @@ class Candidate:
     @property
     def standard_errors(self) -> dict[str, float]:
         """Standard errors by name."""
-        return dict(zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True))
+        return dict(
+            zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True)
+        )
 
 
 def default_free(block) -> tuple[str, ...]:
@@ -99,7 +101,9 @@ def window_lengths(model, records: Sequence[Measurement], mode="auto", window=No
     if mode not in MODES:
         raise ValueError(f"mode must be one of {', '.join(MODES)}; got {mode!r}.")
     if window is not None and not window > 0:
-        raise ValueError(f"window needs a length > 0 [s]; got {window!r}. Leave it out for one that fits the motion.")
+        raise ValueError(
+            f"window needs a length > 0 [s]; got {window!r}. Leave it out for one that fits the motion."
+        )
     lengths: list[float | None] = []
     for record in records:
         simulator = Simulator(model, record)
@@ -332,7 +336,9 @@ class _Problem:
                 if down[i] != theta[i]:
                     other = self.simulate(down, nuisance)
                     width = up[i] - down[i]
-            change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
+            change = math.sqrt(
+                float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)]))
+            )
             for k, (a, b) in enumerate(zip(moved, other, strict=True)):
                 columns[k].append((a - b) / width)
             # Next time the output shall move by a third of the noise.
@@ -347,19 +353,25 @@ class _Problem:
                     rows.append(np.ones(len(self.records[k])))
                     continue
                 size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
-                    self.priors[k][:, j], {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf)
+                    self.priors[k][:, j],
+                    {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
                 )
                 moved_start = nuisance[k].copy()
                 sign = np.where(moved_start[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
                 moved_start[:, j] += sign * size
                 moved = simulator.run(self.windows[k], values, moved_start)
                 width = np.concatenate(
-                    [np.full(w.stop - w.start, c) for w, c in zip(self.windows[k].slices, sign * size, strict=True)]
+                    [
+                        np.full(w.stop - w.start, c)
+                        for w, c in zip(self.windows[k].slices, sign * size, strict=True)
+                    ]
                 )
                 rows.append((moved - base[k]) / width)
             self.nfev += len(rows) / len(self.simulators)
             by_start.append(np.array(rows).T.reshape(len(self.records[k]), len(rows)))
-        return [np.array(c).T.reshape(len(r), len(self.names)) for c, r in zip(columns, self.records, strict=True)], by_start
+        return [
+            np.array(c).T.reshape(len(r), len(self.names)) for c, r in zip(columns, self.records, strict=True)
+        ], by_start
 
     def normal(self, jp, js, residual, weights, nuisance, damping=0.0):
         """Eliminate the initial states; return (H, g, back) with ``back(step)`` their own step."""
@@ -476,7 +488,11 @@ class _Problem:
         base = [r.y - e for r, e in zip(self.records, residual, strict=True)]
         values = self.values(theta) or {}
         p = len(self.names)
-        jp, js = self.jacobian(theta, nuisance, base, central) if p else ([np.zeros((len(r), 0)) for r in residual], None)
+        jp, js = (
+            self.jacobian(theta, nuisance, base, central)
+            if p
+            else ([np.zeros((len(r), 0)) for r in residual], None)
+        )
         covariance, null, projected = np.zeros((0, 0)), [], jp
         slopes = np.array([v.slope(q) for v, q in zip(self.variables, theta, strict=True)])
         if p:
@@ -485,7 +501,11 @@ class _Problem:
             projected = [j / slopes for j in projected]
         vector = np.array([values[k] for k in self.names])
         at_bound = tuple(
-            bool(v.clip(q + 1e-6) == q or v.clip(q - 1e-6) == q or abs(values[v.name] - v.p(q)) > 1e-9 * v.scale)
+            bool(
+                v.clip(q + 1e-6) == q
+                or v.clip(q - 1e-6) == q
+                or abs(values[v.name] - v.p(q)) > 1e-9 * v.scale
+            )
             for v, q in zip(self.variables, theta, strict=True)
         )
         total = sum(float(e @ e) for e in residual)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .candidate import _Problem, window_lengths
+from .derivatives import automatic_cutoff, derivative
 from .measurement import Measurement
 from .residual_tests import InputTest, Whiteness, fit_percent, input_residual_test, nrmse, rmse, whiteness
 from .simulator import Simulator, Windows, facts
@@ -72,13 +73,41 @@ class RecordComparison:
 
     @cached_property
     def where(self) -> Regions:
-        """Regions ranked by their share of the error; none for records under 50 samples."""
+        """Regions ranked by their share of the error; none for records under 50 samples.
+
+        A position error remembers what went wrong before. As long as the residual is not white, its regions
+        are therefore those of its second derivative, the error of acceleration, which stands where it arises.
+        """
         if len(self.residual) < 50:
             return Regions()
         velocity = self.record.velocity if self.record.velocity is not None else facts(self.record).velocity
+        error, kept = (self.residual, slice(None)) if self.white else self._acceleration_error()
         return error_regions(
-            self.record.t, self.residual, position=self.record.y, velocity=velocity, force=self.record.u
+            self.record.t[kept],
+            error,
+            position=self.record.y[kept],
+            velocity=velocity[kept],
+            force=self.record.u[kept],
         )
+
+    def _acceleration_error(self) -> tuple[np.ndarray, slice]:
+        """Return the low-passed second derivative of the residual, and the samples at which it holds.
+
+        Derivatives fail at the ends of a window: a line bridges them inside, the record's own ends are left out.
+        """
+        t, dt = self.record.t, facts(self.record).dt
+        cutoff = automatic_cutoff(self.residual - self.residual.mean(), dt)
+        out, margin = np.empty(len(t)), int(0.6 / (cutoff * dt)) + 1
+        for a, b in zip(self.edges[:-1], self.edges[1:], strict=True):
+            out[a:b] = derivative(t[a:b], self.residual[a:b], 2, cutoff)
+        good = np.ones(len(t), bool)
+        for edge in self.edges:
+            good[max(edge - margin, 0) : edge + margin] = False
+        if np.count_nonzero(good) < 50:
+            return self.residual, slice(None)
+        out[~good] = np.interp(t[~good], t[good], out[good])
+        first, last = np.flatnonzero(good)[[0, -1]]
+        return out[first : last + 1], slice(int(first), int(last) + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +138,18 @@ class Comparison:
     @property
     def rmse(self) -> float:
         """Rms of the residual over all samples [output unit]."""
-        return math.sqrt(sum(float(r.residual @ r.residual) for r in self.records) / sum(len(r.residual) for r in self.records))
+        return math.sqrt(
+            sum(float(r.residual @ r.residual) for r in self.records)
+            / sum(len(r.residual) for r in self.records)
+        )
 
     @property
     def nrmse(self) -> float:
         """Rms of the residual over that of the outputs, each centred."""
         error = sum(float(r.residual @ r.residual) for r in self.records)
-        return math.sqrt(error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in self.records))
+        return math.sqrt(
+            error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in self.records)
+        )
 
     @property
     def fit_percent(self) -> float:
@@ -156,13 +190,22 @@ class Comparison:
         """Return the comparison as text: each record, the tests, the regions."""
         lines = [str(self)]
         if len(self.records) > 1:
-            lines += [f"  {r.record.name:<24} nrmse {r.nrmse:.4g}  rmse {r.rmse:.4g} {r.record.output_unit}" for r in self.records]
+            lines += [
+                f"  {r.record.name:<24} nrmse {r.nrmse:.4g}  rmse {r.rmse:.4g} {r.record.output_unit}"
+                for r in self.records
+            ]
         test = self.worst.input_test
         if test is not None:
             lines.append(
-                "The residual does not depend on the input" if test else "The residual still depends on the input"
+                f"The residual shows {'no trace' if test else 'traces'} of the input (p = {test.p_value:.2g})"
+                + (
+                    ", and is white: nothing is missing."
+                    if test and self.white
+                    else "."
+                    if test
+                    else ": something is missing."
+                )
             )
-            lines[-1] += f" (p = {test.p_value:.2g}): {'what is left looks like noise.' if test else 'something is missing.'}"
         if self.where:
             lines += ["", *self.where.sentences[:6], "", self.where.table(8)]
         return "\n".join(lines)
@@ -220,28 +263,33 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     records = as_records(data)
-    lengths = window_lengths(model, records, "windows" if mode == "auto" and window is not None else mode, window)
+    lengths = window_lengths(
+        model, records, "windows" if mode == "auto" and window is not None else mode, window
+    )
     problem = _Problem(model, records, (), 10_000)
     problem.stage(lengths, 1)
     problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
-    return comparison_of(problem.simulators, problem.windows, problem.nuisance)
+    return comparison_of(model, records, problem.windows, problem.nuisance)
 
 
-def comparison_of(simulators: list[Simulator], windows: list[Windows], starts, fitted: int = 0) -> Comparison:
-    """Return the comparison of models already started right (``simulators[k].model`` on its record)."""
+def comparison_of(model, records, windows: list[Windows], starts, fitted: int = 0) -> Comparison:
+    """Return the comparison of a model whose initial states in each window are known already."""
     rows = []
-    for s, w, start in zip(simulators, windows, starts, strict=True):
-        fresh = Simulator(s.model, s.record)
-        simulated = fresh.run(w, None, start, rounded=True)
-        rows.append(RecordComparison(s.record, simulated, s.record.y - simulated, w.edges, fitted))
-    return Comparison(simulators[0].model, tuple(rows))
+    for record, w, start in zip(records, windows, starts, strict=True):
+        simulated = Simulator(model, record).run(w, None, start, rounded=True)
+        rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
+    return Comparison(model, tuple(rows))
 
 
 def as_records(data) -> list[Measurement]:
     """Return the records as a list; TypeError for anything that is none."""
-    records = [data] if isinstance(data, Measurement) else list(data) if isinstance(data, Iterable) else [data]
+    records = (
+        [data] if isinstance(data, Measurement) else list(data) if isinstance(data, Iterable) else [data]
+    )
     bad = [r for r in records if not isinstance(r, Measurement)]
     if bad or not records:
         got = type(bad[0]).__name__ if bad else "an empty sequence"
-        raise TypeError(f"compare and refit need a Measurement or several; got {got}. Use ctrl_df.Measurement(t, u, y).")
+        raise TypeError(
+            f"compare and refit need a Measurement or several; got {got}. Use ctrl_df.Measurement(t, u, y)."
+        )
     return records

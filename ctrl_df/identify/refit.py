@@ -169,12 +169,14 @@ def refit(
         coarse=start is None, tolerance=1e-4, central=True, polish=6,
     )  # fmt: skip
     found = _with_steps(found, records, block, free)
-    comparison = comparison_of(found.simulators, found.windows, found.starts, fitted=len(names))
+    comparison = comparison_of(found.model, records, found.windows, found.starts, fitted=len(names))
     blurred = _blurred(found)
     table = Simulator(found.model, records[0]).block.parameters
     errors = found.standard_errors
     parameters = {
-        k: FittedParameter(k, table[k].value, errors[k], table[k].unit, float(start_values[k]), bound, k not in blurred)
+        k: FittedParameter(
+            k, table[k].value, errors[k], table[k].unit, float(start_values[k]), bound, k not in blurred
+        )
         for k, bound in zip(found.names, found.at_bound, strict=True)
     }
     return Fit(
@@ -223,8 +225,6 @@ def _with_steps(found: Candidate, records, block, free) -> Candidate:
     steps = [step_of(r.y) for r in records]
     if min(steps) > 0:
         found.model = Simulator(found.model, records[0]).with_values({key: float(np.median(steps))})
-        for s in found.simulators:
-            s.__init__(found.model, s.record, thin=s.thin)
     return found
 
 
@@ -252,7 +252,11 @@ def _sentences(found: Candidate) -> tuple[str, ...]:
         signs = [p[1] * parts[0][1] > 0 for p in parts]
         up = ", ".join(k for (k, _), s in zip(parts, signs, strict=True) if s)
         down = ", ".join(k for (k, _), s in zip(parts, signs, strict=True) if not s)
-        change = f"raising {up}" + (f" while lowering {down}" if down else "") + (" together" if len(parts) > 1 else "")
+        change = (
+            f"raising {up}"
+            + (f" while lowering {down}" if down else "")
+            + (" together" if len(parts) > 1 else "")
+        )
         lines.append(
             f"{' and '.join(k for k, _ in parts)} cannot be told apart on these data: {change} leaves the output "
             "as it is. Fix one of them, or excite the drive otherwise."
@@ -260,5 +264,3 @@ def _sentences(found: Candidate) -> tuple[str, ...]:
     for k in sorted(_blurred(found) - named, key=found.names.index):
         lines.append(f"{k} is less certain than it is large: these data do not determine it.")
     return tuple(lines)
-
-

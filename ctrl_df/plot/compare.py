@@ -62,7 +62,9 @@ def _regions(ax, regions, rows):
     """Bars: share of the error; ticks: share of the samples. Filled where beyond chance."""
     significant = regions.significant
     shown = (significant if len(significant) else regions)[:rows][::-1]
-    ax.set_title("Where the error is" if len(significant) else "No region stands out", loc="left", fontsize=10)
+    ax.set_title(
+        "Where the error is" if len(significant) else "No region stands out", loc="left", fontsize=10
+    )
     if not shown:
         ax.set_axis_off()
         return []
