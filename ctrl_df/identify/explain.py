@@ -1,0 +1,63 @@
+"""A diagnosis in plain words: what, where, how sure, how large."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def find_regions(tried, runs):
+    """Return the regions of error of a fitted candidate on its longest run, by its force where it can be had."""
+    from .where import error_regions
+
+    i = max(range(len(runs)), key=lambda k: len(runs[k].t))
+    run, residual = runs[i], np.asarray(tried.fitted.residuals[i])
+    if not np.all(np.isfinite(residual)):
+        return None
+    return error_regions(run.t, residual, position=run.y, velocity=run.v, force=run.u)
+
+
+def named(effect) -> str:
+    """Return an effect's id as words."""
+    return effect.id.replace("_", " ")
+
+
+def values_of(effect) -> str:
+    """Return fitted parameters as text with units."""
+    return ", ".join(f"{k.replace('_', ' ')} {p.value:.4g} {p.unit}".rstrip() for k, p in effect.parameters.items())
+
+
+def explain(diagnosis, structure0) -> str:
+    """Return the verdict in sentences."""
+    d = diagnosis
+    first = d.ranking[0] if d.ranking else None
+    if d.verdict == "none":
+        return (
+            f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} (held out "
+            f"{d.nrmse_holdout:.2%}), which is the noise of these data. No effect of the library improves on it beyond chance."
+        )
+    places = d.where.significant[:2] if d.where is not None else ()
+    where = " ".join(r.sentence for r in places)
+    if d.verdict == "unknown":
+        tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
+        return (
+            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}; {tried}"
+            f"{d.structure:.2g} of structure remain beside {d.noise:.2g} of noise (rms, output unit). "
+            f"Look here: {where or 'the error is spread over the whole record.'}"
+        )
+    size = f"{d.nrmse:.2%} to {first.nrmse:.2%} (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
+    same = ""
+    if first.equivalents:
+        same = " On these data the same map as " + ", ".join(e.replace("_", " ") for e in first.equivalents) + "."
+    if d.verdict == "effect":
+        sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
+        return (
+            f"Missing: {named(first.effect)} ({values_of(first.effect)}). It shows as {first.effect.shows}. "
+            f"With it the error falls from {size}; probability {sure:.1%}.{same}"
+            + (f" Before, {where[0].lower() + where[1:]}" if where else "")
+        )
+    others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
+    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
+    return (
+        f"An effect is missing, and these data do not tell which: {names}. The first reduces the error from {size}."
+        f"{same} next_experiment gives an input that would separate them."
+    )
