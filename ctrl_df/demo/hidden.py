@@ -1,0 +1,53 @@
+"""A hidden-effect study on data made on the spot: the second flow of the package, start to end."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+
+from ..blocks.effects import Coulomb, PositionRipple, Viscous
+from ..blocks.mechanism import Mass, Mechanism
+
+_WHY = "The hidden-effect study needs ctrl_df.identify.improve, which this version does not have."
+
+
+def rig() -> Mechanism:
+    """Return the drive that is measured: unknown to the model, a ripple over position."""
+    return Mass(2.2, [Coulomb(3.0), Viscous(6.0), PositionRipple(1.5, 0.02)])
+
+
+def model() -> Mechanism:
+    """Return what its user believes: friction, nominal values."""
+    return Mass(2.0, [Coulomb(2.5), Viscous(5.0)])
+
+
+def embedded_data():
+    """Measure the rig for 10 s at 1 kHz: a multisine force, 60 dB of white sensor noise."""
+    from ..identify.measurement import Measurement
+    from ..simulate.response import event_response
+
+    t = np.arange(0, 10, 1e-3)
+    random = np.random.default_rng(1997)
+    frequencies = np.array([0.3, 0.7, 1.1, 1.9, 3.1, 5.3])
+    phases = random.uniform(0, 2 * np.pi, frequencies.size)
+    force = (np.array([9, 7, 6, 5, 5, 5])[:, None] * np.sin(2 * np.pi * np.outer(frequencies, t) + phases[:, None])).sum(0)
+    x = np.asarray(event_response(rig(), t, force, input_hold="zoh", keep_events=False).outputs)[0]
+    noise = 1e-3 * np.std(x) * random.standard_normal(t.size)
+    return Measurement(t, force, x + noise, name="embedded rig")
+
+
+def study_text(folder: Path) -> str:
+    """Improve the model with the embedded data; return the summary and write the report beside the pictures."""
+    if importlib.util.find_spec("ctrl_df.identify.improve") is None:
+        return _WHY
+    from ..identify.improve import improve
+
+    study = improve(model(), embedded_data())
+    path = folder / "hidden-effect.html"
+    study.report(path)
+    return (
+        "Hidden effect: a drive is measured (10 s at 1 kHz, 60 dB); its model knows Coulomb and viscous friction only.\n"
+        f"The drive also has a force ripple of 20 mm period.\n{study.summary()}\nreport: {path}"
+    )

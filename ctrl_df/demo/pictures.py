@@ -1,0 +1,143 @@
+"""The paper's figures 3, 4, 5, 7, 8, 9, 10, drawn anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ..df.describing import describing_function_family
+from ..plot.describing import describing_function_plot
+from ..plot.family import plot_family, plot_harmonics
+from ..plot.response import loop_response_plot
+from .findings import Finding, settled, simulate
+from .systems import backlash_plant, friction_plant
+
+DPI = 130
+Findings = dict[str, Finding]
+
+
+def draw_all(findings: Findings, folder: Path) -> list[Path]:
+    """Draw every figure into `folder`; return their paths."""
+    figures: dict[str, Callable[[Findings], object]] = {
+        "fig3-friction-family": _figure_3,
+        "fig3-friction-crossings": _crossings("friction"),
+        "fig4-friction-harmonics": _figure_4,
+        "fig5-friction-loop": _figure_5,
+        "fig7-backlash-families": _figure_7,
+        "fig7-backlash-crossings": _crossings("backlash 0.2"),
+        "fig8-backlash-harmonics": _figure_8,
+        "fig9-backlash-loop-0.2": _figure_9,
+        "fig10-backlash-loop-0.8": _figure_10,
+        "hunting-with-stiction": _hunting,
+    }
+    paths = []
+    for name, draw in figures.items():
+        plt.close("all")
+        figure = draw(findings)
+        path = folder / f"{name}.png"
+        figure.savefig(path, dpi=DPI)  # type: ignore[attr-defined]
+        plt.close("all")
+        paths.append(path)
+    return paths
+
+
+def _figure_3(_):
+    family = describing_function_family(friction_plant(), np.geomspace(6, 60, 60), np.geomspace(2, 30, 90))
+    figure, ax = plt.subplots(figsize=(6.8, 5), layout="constrained")
+    plot_family(family, ax=ax, title="Fig. 3: -1/N(a, ω) of the mass with friction [N/m]")
+    return figure
+
+
+def _figure_4(_):
+    family = describing_function_family(friction_plant(), np.geomspace(5.2, 60, 60), np.geomspace(2, 40, 60))
+    return plot_harmonics(
+        family, title="Fig. 4: harmonic content of x, mass with friction [m/N]", amplitude=15, omega=14
+    ).figure
+
+
+def _figure_5(findings):
+    finding = findings["friction"]
+    labels = [f"rest start {1e3 * start:g} mm" for start, _ in finding.runs]
+    cplt = loop_response_plot(
+        [run for _, run in finding.runs],
+        labels=labels,
+        window=(0, 6),
+        title="Fig. 5: the friction loop has a boundary, not an attractor",
+    )
+    reach = 1.6 * np.abs(np.asarray(finding.runs[0][1].outputs)).max(axis=1)
+    for axis, limit in zip(np.ravel(cplt.axes), (reach[-1], 1e3 * reach[0]), strict=True):
+        axis.set_ylim(-limit, limit)
+    return cplt.figure
+
+
+def _figure_7(_):
+    figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.8), layout="constrained")
+    for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
+        plant = backlash_plant(restitution)
+        family = describing_function_family(plant, np.geomspace(10, 100, 40), np.geomspace(5, 60, 40))
+        plot_family(family, ax=ax, title=f"restitution {restitution}")
+    figure.suptitle("Fig. 7: -1/N(a, ω) of two masses with backlash [N/m]", fontsize="medium")
+    return figure
+
+
+def _figure_8(_):
+    figure, axes = plt.subplots(1, 2, figsize=(9.8, 4.2), layout="constrained", sharey=True)
+    for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
+        plant = backlash_plant(restitution)
+        family = describing_function_family(plant, np.array([20.0]), np.geomspace(5, 60, 120))
+        plot_harmonics(family, ax=ax)
+        ax.set_title(f"restitution {restitution}", fontsize="medium")
+    axes[0].set_ylabel("|X_k| / a  [m/N]")
+    figure.suptitle("Fig. 8: harmonic content of the load's position, a = 20 N", fontsize="medium")
+    return figure
+
+
+def _figure_9(findings):
+    start, run = findings["backlash 0.2"].runs[0]
+    end = settled(run)
+    return loop_response_plot(
+        run,
+        window=(0, 6),
+        title=f"Fig. 9: backlash, restitution 0.2: settles to {end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
+    ).figure
+
+
+def _figure_10(findings):
+    loop = findings["backlash 0.8"].loop
+    figure = plt.figure(figsize=(10, 4.8), layout="constrained")
+    axes = figure.subplots(2, 2, sharex="col", width_ratios=(2, 1))
+    early = simulate(loop, loop.starts[0], time=20.0, step=1e-3)
+    loop_response_plot(early, window=(0, 8), ax=axes[:, 0])
+    # far beyond the irregular motion: 200 s, sampled finely at the end
+    late = simulate(loop, loop.starts[0], time=200.3, step=5e-4)
+    loop_response_plot(late, window=(200.0, 200.3), ax=axes[:, 1])
+    axes[0, 0].set_title("the first seconds, as in the paper", fontsize="medium")
+    axes[0, 1].set_title(f"after 200 s: {settled(late).omega:.2f} rad/s", fontsize="medium")
+    for axis in axes[:, 1]:
+        axis.set_ylabel("")
+    figure.suptitle("Fig. 10: backlash, restitution 0.8: irregular for minutes, then a rattle", fontsize="medium")
+    return figure
+
+
+def _hunting(findings):
+    start, run = findings["static 5.5"].runs[0]
+    end = settled(run)
+    t_end = float(np.asarray(run.time)[-1])
+    return loop_response_plot(
+        run,
+        window=(t_end - 3, t_end),
+        title=f"static level 5.5 N: hunting at {end.omega:.3f} rad/s, stuck between the jumps",
+    ).figure
+
+
+def _crossings(key):
+    def draw(findings):
+        figure, ax = plt.subplots(figsize=(6.8, 5), layout="constrained")
+        describing_function_plot(findings[key].response, ax=ax, label="PID")
+        ax.set_title(f"PID and -1/N(a, ω): {findings[key].loop.title}", fontsize="medium")
+        return figure
+
+    return draw
