@@ -489,13 +489,24 @@ def _settle(A, eps, phi, w, transient):
                 tries += 1
                 ok, p, v, contact, radius, closing = _polish(A, eps, phi, w, since, lap)
                 if ok:
-                    return 1, lap, since, p, v, contact, radius, closing
+                    return _shortest(A, eps, p, v, since, lap, contact, radius, closing)
         if since == power:
             ref_phi, ref_w, since, elapsed = phi, w, 0, 0.0
             power = min(2 * power, 4096)
         if clock > 2.0 * math.pi * transient:
             break
     return 0, 0, 0, phi, w, False, 0.0, 0.0
+
+
+@njit(cache=True)
+def _shortest(A, eps, phi, w, count, lap, contact, radius, closing):
+    """The answer of `_settle` for a lap that may hold the same orbit several times."""
+    for parts in range(lap, 1, -1):
+        if lap % parts == 0 and count % parts == 0:
+            ok, p, v, con, rad, clo = _polish(A, eps, phi, w, count // parts, lap // parts)
+            if ok and abs(_wrap(p - phi)) < _NEAR and abs(v - w) < _NEAR * (1.0 + A):
+                return 1, lap // parts, count // parts, p, v, con, rad, clo
+    return 1, lap, count, phi, w, contact, radius, closing
 
 
 @njit(cache=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import threading
 
+import control as ct
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
@@ -19,7 +20,7 @@ from ..simulate.layout import EVENT_KINDS
 from ..status import Status
 from . import shooting
 from .shooting import CLOSED, SPENT, close_orbit, make_shot, shoot, sweep
-from .symmetries import find_symmetries
+from .symmetries import Probe, find_symmetries
 
 ORBIT_REGIMES = (
     "slip",
@@ -42,7 +43,7 @@ no dry friction and no contact; the state runs away (NaN); the bound on work was
 steadily besides swinging (its mean motion is no part of the harmonics); a load that is never touched."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
-RTOL = 1e-9
+RTOL = 5e-10
 _COARSE = 1e-7  # tolerance while a transient is followed
 _LONGEST = 12  # periods of a subharmonic motion that is recognised
 _BLOCKS = 8  # an average's spread is estimated from that many parts
@@ -151,14 +152,15 @@ class OrbitSolver:
         ) or 1.0  # fmt: skip
         self.free_row = self._row_is_free(s)
         self.quantized = bool(np.any(prog.nodes[:, layout.KIND] == layout.QUANTIZER))
-        self.gap = any(
-            prog.par[n[layout.PAR] + layout.P_GAP] > 0 for n in self.mechanisms
-        )
+        self.gap = any(prog.par[n[layout.PAR] + layout.P_GAP] > 0 for n in self.mechanisms)
+        self.contacts = self.gap or any(prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms)
         self.previous: State | None = None
         self.forget()
 
     def _without_transparent(self, block):
         """Delays turn the phase, offset and drift move the mean: all exactly, outside the simulation."""
+        if isinstance(block, ct.TransferFunction):
+            return ct.ss(block)
         if not isinstance(block, Mechanism):
             return block
         rounded = any(e.id == "sensor_quantization" for e in block.effects)
@@ -184,15 +186,11 @@ class OrbitSolver:
             raise user_error(self.block, pointers.raised[-1])
         pointers.raised.clear()
 
-    def _rates(self, x):
-        from .symmetries import Probe
-
-        return Probe(self.engine).at(x, 0.0)[0]
+    def _rates(self, x, force=0.0):
+        return Probe(self.engine).at(x, force)[0]
 
     def _row_is_free(self, s):
         """Whether the output described shifts with a free position."""
-        from .symmetries import Probe
-
         probe, x = Probe(self.engine), np.zeros(self.engine.nstates)
         at_zero = probe.at(x, 0.0)[2][self.row]
         return any(probe.at(x + 3.7 * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
@@ -259,11 +257,14 @@ class OrbitSolver:
     def _aim(self, A, omega):
         self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([[0.0, A]], omega)
-        self.atol = RTOL * shooting.floor(self.symmetries.power, self.inertia, A, omega)
+        self.atol = shooting.floor(self.symmetries.power, self.inertia, A, omega)
 
     def _hmax(self, orders):
-        """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic."""
-        return min(1 / 8, 9 / 8 / orders)
+        """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic.
+
+        Impacts are located on the interpolant of a step, which is less exact than its end.
+        """
+        return min(1 / 16 if self.contacts else 1 / 8, 9 / 8 / orders)
 
     def _answer(self, orders):
         """Coefficients Y_k, regime and residual at the present aim."""
@@ -280,7 +281,13 @@ class OrbitSolver:
             state = self._follow(self._nudged(state), 40)
             orbit = self._periodic(state, orders=orders)
         if self.gap and orbit is not None and not self.kinds & _TOUCH:
-            orbit = self._touching(orders) or self._periodic(orbit[0], orders=orders)
+            mirrored = self.mirrored
+            touching, state = self._touching(orders)
+            if touching is not None or state is not None:
+                orbit = touching
+            else:
+                self.mirrored = mirrored
+                orbit = self._periodic(orbit[0], orders=orders)
         if orbit is None:
             return self._unperiodic(state, orders)
         self.previous = orbit[0]
@@ -359,6 +366,9 @@ class OrbitSolver:
             raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
         if outcome != CLOSED:
             return None
+        gained = np.abs(shot.trial[1][self.symmetries.inertial]) if not self.mirrored else np.zeros(0)
+        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
+            raise _OutOfWork(Status.DIVERGED)  # nothing ties the mechanism to the ground, and something pushes it
         if self.quantized:  # the harmonics of the centred motion
             self._shoot(state.copy(), RTOL, periods, spectrum)
         self.integrals, self.ends = spectrum[self.row], shot.ends[:, self.row].copy()
@@ -366,31 +376,35 @@ class OrbitSolver:
         return state, miss
 
     def _touching(self, orders):
-        """An orbit whose bodies touch, for a block with a gap that was found swinging freely within it; or None.
+        """An orbit whose bodies touch, for a block with a gap that was found swinging freely within it.
 
-        A motion without contact coexists with others at moderate force and is what a centred start leads to.
+        A motion without contact coexists with others at moderate force and is what a centred start leads to. Returns
+        the orbit or None, and a state from which the bodies keep touching or None.
         """
-        A, was = self.A, (self.mirrored, self.previous)
-        node = next(m for m in self.mechanisms if self.engine.program.par[m[layout.PAR] + layout.P_GAP] > 0)
-        at, gap = node[layout.X], self.engine.program.par[node[layout.PAR] + layout.P_GAP]
-        body = self.engine.program.par[node[layout.PAR] + layout.P_M0 + 1]
-        speed = gap * self.omega + A / (body * self.omega)
-        for place, leaving in ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2)):
+        prog, keeps = self.engine.program, None
+        node = next(m for m in self.mechanisms if prog.par[m[layout.PAR] + layout.P_GAP] > 0)
+        at, gap = node[layout.X], prog.par[node[layout.PAR] + layout.P_GAP]
+        speed = gap * self.omega + self.A / (prog.par[node[layout.PAR] + layout.P_M0 + 1] * self.omega)
+        for face, leaving in ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2)):
             self.mirrored = self.symmetric
             y = np.zeros(self.engine.nstates)
-            y[at + 2], y[at + 3] = place * gap, leaving * speed
-            self._resize(A)
+            y[at + 2], y[at + 3] = face * gap, leaving * speed
+            self._resize(self.A)
             state = self._follow(self._state(y), 20)
             if not self.shot.tally[2] & _TOUCH:
                 continue
             orbit = self._periodic(state, orders=orders)
             if orbit is None and self.symmetric:
                 self.mirrored = False
-                orbit = self._periodic(self._follow(self._nudged(state), 30), orders=orders)
+                state = self._follow(self._nudged(state), 30)
+                if not self.shot.tally[2] & _TOUCH:
+                    continue
+                orbit = self._periodic(state, orders=orders)
             if orbit is not None and self.kinds & _TOUCH:
-                return orbit
-        self.mirrored, self.previous = was
-        return None
+                return orbit, state
+            if orbit is None:
+                keeps = state if keeps is None else keeps
+        return None, keeps
 
     def _unperiodic(self, state, orders):
         """Look for a longer period; else average over many."""
@@ -415,28 +429,32 @@ class OrbitSolver:
                     name = "subharmonic" if periods > 1 else self._name(c, self.ends, orbit[1])
                     return c, name, orbit[1]
         length = self.averages // _BLOCKS
-        parts = []
+        parts, touched = [], 0
         for _ in range(_BLOCKS):
             spectrum = np.zeros((self.row + 1, orders + 1), complex)
             for _ in range(length):
                 part = np.zeros_like(spectrum)
-                self._shoot(state, RTOL, 1, part)
+                touched |= self._shoot(state, RTOL, 1, part) & _TOUCH
                 spectrum += part / length
                 parts_ends = self.shot.ends[:, self.row].copy()
                 spectrum[self.row] += self._ramp(parts_ends, orders, 1) * self.period / 2 / length
             parts.append(self._coefficients(spectrum[self.row], np.zeros(2), 1, False))
         parts = np.array(parts)
         mean = parts.mean(axis=0)
+        if self.gap and not touched:
+            return mean, "free", 0.0
         error = np.std(parts[:, 1], ddof=1) / np.sqrt(_BLOCKS)
         return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
 
     def _stop_if_running_away(self, y):
-        """Raise where a speed grows steadily: nothing holds the mass back."""
+        """Raise where a state grows out of all bounds, or a speed steadily: nothing holds the mass back."""
         half = len(y) // 2
+        if np.max(np.abs(y[-1])) > 100 * np.max(np.abs(y[half])) > 1e4 * np.max(np.abs(y[0])):
+            raise _OutOfWork(Status.DIVERGED)
         for i in np.flatnonzero(self.symmetries.power == 1):
             early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
             spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
-            if abs(early) > 0 and abs(late / early - 1) < 1e-3 and spread < 0.5 * abs(early / half):
+            if abs(early) > 1e-3 * self.A / (self.inertia * self.omega) and abs(late / early - 1) < 1e-3 and spread < 0.5 * abs(early / half):
                 raise _OutOfWork(Status.DIVERGED)
 
     # --- what was found ---------------------------------------------------------------------------------------
@@ -513,8 +531,11 @@ class OrbitSolver:
             return _OutOfWork(Status.WORK_LIMIT)
         x = state.x
         if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < 1e50:
-            slope = self._rates(x)
-            ahead = self._rates(x + slope * 1e-6 * self.period)
+            force = self.A * np.cos(self.omega * self.shot.clock[0])
+            with np.errstate(all="ignore"):
+                slope = self._rates(x, force)
+                ahead = self._rates(x + slope * 1e-6 * self.period, force)
+            pointers.raised.clear()
             if not (np.all(np.isfinite(slope)) and np.all(np.isfinite(ahead))):
                 return user_error(self.block, ValueError(f"a law returned NaN or inf near the state {x}"))
         return _OutOfWork(Status.DIVERGED)
