@@ -167,6 +167,7 @@ def refit(
     found = fit_candidate(
         fitted, records, start, names, budget=budget, mode=mode, window=window, robust=robust,
         coarse=start is None, tolerance=1e-4, central=True, polish=6,
+        iterations=40,
     )  # fmt: skip
     found = _with_steps(found, records, block, free)
     comparison = comparison_of(found.model, records, found.windows, found.starts, fitted=len(names))

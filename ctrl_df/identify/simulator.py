@@ -23,7 +23,6 @@ from ..simulate.engine import Engine, State, sampled_drive
 from ..simulate.loop import closed_loop
 from . import derivatives
 from .measurement import Measurement
-from .motion_phases import reversals
 
 REFERENCE = ("reference", "r")
 _TIED = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
@@ -58,8 +57,7 @@ def facts(record: Measurement) -> Facts:
         cutoff = derivatives.automatic_cutoff(values, dt)
         velocity = derivatives.derivative(record.t, record.y, 1, cutoff)
         speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
-        turns = max(len(reversals(velocity, 0.3 * speed)), 1)
-        swing = min(2 * record.duration / turns, record.duration)
+        swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
         known = Facts(
             dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
@@ -67,6 +65,19 @@ def facts(record: Measurement) -> Facts:
         )  # fmt: skip
         _FACTS[record] = known
     return known
+
+
+def _turns(y) -> int:
+    """Count the turning points of a signal between strokes longer than half its rms, so that noise adds none."""
+    y = y[:: max(len(y) // 2000, 1)]
+    least, top, low, up, count = 0.5 * float(np.std(y)), y[0], y[0], 0, 0
+    for value in y.tolist():
+        top, low = max(top, value), min(low, value)
+        if up >= 0 and value < top - least:
+            up, low, count = -1, value, count + 1
+        elif up <= 0 and value > low + least:
+            up, top, count = 1, value, count + 1
+    return count
 
 
 @dataclass(frozen=True)
@@ -234,9 +245,9 @@ class Simulator:
         columns = []
         for name in self.nuisances:
             if name == "x":
-                columns.append(20 * windows.x_error)
+                columns.append(3 * windows.x_error)
             elif name == "v":
-                columns.append(10 * windows.v_error + 0.02 * known.speed)
+                columns.append(2 * windows.v_error + 0.005 * known.speed)
             elif name == "slack":
                 columns.append(np.full(len(windows), 1.0))
             elif name == "bristle":

@@ -74,7 +74,7 @@ def _regions(ax, regions, rows):
     bars = list(ax.barh(place, share, 0.42, color=colour))
     for i, region in enumerate(shown):
         expected = 100 * region.expected_share
-        ax.plot([expected, expected], [i - 0.3, i + 0.3], color="black", lw=1.5)
+        ax.plot([expected, expected], [i - 0.21, i + 0.21], color="black", lw=1.5)
         ax.text(0, i + 0.27, f"{region.kind.replace('_', ' ')}: {region.label}", fontsize=8, va="bottom")
     ax.set_yticks([])
     ax.set_ylim(-0.6, len(shown) - 0.1)
