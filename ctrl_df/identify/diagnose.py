@@ -14,7 +14,7 @@ from ..blocks.mechanism import Mechanism
 from .equivalence import coloured_floor, indistinguishable, whitened_power, whitener
 from .measurement import Measurement
 from .screen import Start, applicable, attach, make_screen, starts_for
-from .trial import Fitted, as_run, fit, scales_of, thinning
+from .trial import Fitted, as_run, fit, scales_of, thinning, windowed
 
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
 
@@ -261,12 +261,13 @@ class _Study:
 
     def __init__(self, block, records, held, free):
         self.block, self.records, self.held, self.free = block, records, held, free
-        self.coarse = self._runs(records, thinning(records, _SAMPLES))
-        self.coarse_held = [as_run(r, thinning(held, _SAMPLES)) for r in held]
-        self.scales = scales_of(block, self.coarse)
+        thin = thinning(records, _SAMPLES)
+        whole = self._runs(records, thin)
+        self.scales = scales_of(block, whole)
+        # Short windows first: over a long free run a wrong model drifts away, and its error says little.
+        self.coarse = [windowed(run) for run in whole]
+        self.coarse_held = [windowed(as_run(r, thinning(held, _SAMPLES))) for r in held]
         base = fit(block, self.coarse, free, self.scales, iterations=25)
-        if base.rms > 0.02 * self.scales.position:
-            base = fit(base.block, self.coarse, free, self.scales, starts=base.starts, iterations=10, tolerance=1e-5)
         self.base = _Tried("", base, 0)
         self._hold(self.base, self.coarse_held)
 
@@ -280,9 +281,9 @@ class _Study:
             runs.append(as_run(r, thin, use))
         return runs
 
-    def _hold(self, tried, runs):
+    def _hold(self, tried, runs, starts=None):
         if runs:
-            tried.held = fit(tried.block, runs, (), self.scales, iterations=6)
+            tried.held = fit(tried.block, runs, (), self.scales, starts=starts, iterations=4, tolerance=1e-2)
 
     def _residuals(self, tried):
         held = tried.held.residuals if tried.held is not None else ()
@@ -322,8 +323,14 @@ class _Study:
 
     def confirm(self, found):
         thin = max(thinning(self.records, 10_000), 1)
-        fine = self._runs(self.records, thin)
-        fine_held = [as_run(r, max(thinning(self.held, 10_000), 1)) for r in self.held]
+        fine = [
+            windowed(run, len(old.windows))
+            for run, old in zip(self._runs(self.records, thin), self.coarse, strict=True)
+        ]
+        thin = max(thinning(self.held, 10_000), 1) if self.held else 1
+        fine_held = [
+            windowed(as_run(r, thin), len(old.windows)) for r, old in zip(self.held, self.coarse_held, strict=True)
+        ]
         base = self._polish(self.base, fine, fine_held)
         chosen = [self._polish(t, fine, fine_held) for t in found[:_CONFIRM]]
         self._judge(chosen, base)
@@ -335,7 +342,7 @@ class _Study:
         free = tried.fitted.names
         better = fit(tried.block, runs, free, self.scales, starts=tried.fitted.starts, iterations=3, tolerance=1e-3)
         new = _Tried(tried.effect_key, better, tried.extra, confirmed=True)
-        self._hold(new, held)
+        self._hold(new, held, tried.held.starts if tried.held is not None else None)
         return new
 
     def errors(self, tried, runs, held):
@@ -355,9 +362,9 @@ class _Study:
 
         base, chosen = self.confirm(found)
         best = chosen[0] if chosen else base
-        split = [coloured_floor(e, r.y, r.record.dt) for e, r in self._pairs(best)]
+        split = [coloured_floor(e, r.v, r.record.dt) for e, r in self._pairs(best)]
         noise, structure = (math.sqrt(float(np.mean([s[i] ** 2 for s in split]))) for i in (0, 1))
-        split0 = [coloured_floor(e, r.y, r.record.dt) for e, r in self._pairs(base)]
+        split0 = [coloured_floor(e, r.v, r.record.dt) for e, r in self._pairs(base)]
         structure0 = math.sqrt(float(np.mean([s[1] ** 2 for s in split0])))
         base_errors = self.errors(base, self.fine, self.fine_held)
         rest = [t for t in found if t.effect_key not in {c.effect_key for c in chosen}]

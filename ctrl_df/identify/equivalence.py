@@ -61,7 +61,7 @@ def classes(candidates, outputs, noise: NoiseModel, alike) -> list[list[int]]:
     return groups
 
 
-def coloured_floor(residual, y, dt: float) -> tuple[float, float]:
+def coloured_floor(residual, velocity, dt: float) -> tuple[float, float]:
     """Split the rms of a residual into noise and structure.
 
     Motion lives at low frequency. The density of the residual just above the band of motion, continued flat
@@ -78,7 +78,7 @@ def coloured_floor(residual, y, dt: float) -> tuple[float, float]:
     n = len(residual)
     length = min(n, max(64, n // 4))
     f, p = welch(residual - np.mean(residual), 1 / dt, nperseg=length, detrend=False)
-    _, py = welch(np.gradient(y, dt), 1 / dt, nperseg=length, detrend="constant")
+    _, py = welch(velocity, 1 / dt, nperseg=length, detrend="constant")
     energy = np.cumsum(py)
     edge = f[min(int(np.searchsorted(energy, 0.97 * energy[-1])), len(f) - 1)]
     low = min(max(2.0 * edge, 8 * f[1]), 0.25 * f[-1])

@@ -20,7 +20,6 @@ from .measurement import Measurement
 from .simulator import Simulator, Windows, facts
 
 RTOL = 1e-6
-_FAILED = 1e6  # standardised residual of a simulation that did not reach the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class Run:
     y: np.ndarray
     v: np.ndarray  # smoothed velocity of the measurement
     use: np.ndarray
-    whole: Windows  # the record as one window
+    windows: Windows  # parts with a start of their own
 
     @property
     def rest(self) -> bool:
@@ -52,9 +51,19 @@ def as_run(record, thin: int = 1, use=None) -> Run:
         speed = None if record.velocity is None else record.velocity[::thin]
         record = record._with(t=record.t[::thin], u=u, y=record.y[::thin], velocity=speed, channels=channels)
         use, velocity = use[::thin], velocity[::thin]
-    zero = np.zeros(1)
-    whole = Windows(np.array([0, len(record)]), zero, zero, zero, zero, zero)
-    return Run(record, record.t, record.u, record.y, velocity, use, whole)
+    return Run(record, record.t, record.u, record.y, velocity, use, _cut([0, len(record)]))
+
+
+def _cut(edges) -> Windows:
+    zero = np.zeros(len(edges) - 1)
+    return Windows(np.asarray(edges), zero, zero, zero, zero, zero)
+
+
+def windowed(run: Run, count: int | None = None) -> Run:
+    """Cut a run into windows of about two to-and-fro motions, or into `count`, each with a start of its own."""
+    n, span = len(run.t), run.t[-1] - run.t[0]
+    count = count or int(min(max(round(span / max(2.5 * facts(run.record).swing, 60 * span / n)), 1), 40))
+    return replace(run, windows=_cut(np.linspace(0, n, count + 1).astype(int)))
 
 
 def thinning(records, samples: int) -> int:
@@ -65,15 +74,20 @@ def thinning(records, samples: int) -> int:
 # --- simulating -----------------------------------------------------------------------------------
 
 
-def simulate(block, run: Run, start, rtol: float = RTOL) -> np.ndarray:
+def simulate(block, run: Run, starts, rtol: float = RTOL) -> np.ndarray:
     """Return the simulated output at the run's samples.
 
-    `start`: reported position [m], velocity [m/s], share of a gap taken up, at the first sample.
+    `starts`, (windows, 3): reported position [m], velocity [m/s], share of a gap taken up, where each begins.
     """
     simulator = Simulator(block, run.record, rtol=rtol)
-    given = dict(x=start[0], v=start[1], slack=start[2])
-    begin = np.array([[given.get(name, 0.0) for name in simulator.nuisances]])
-    return simulator.run(run.whole, None, begin, rounded=True)
+    begin = np.zeros((len(starts), len(simulator.nuisances)))
+    for j, name in enumerate(simulator.nuisances):
+        if name in _STARTS:
+            begin[:, j] = starts[:, _STARTS.index(name)]
+    return simulator.run(run.windows, None, begin, rounded=True)
+
+
+_STARTS = ("x", "v", "slack")
 
 
 def with_values(block, values):
@@ -183,13 +197,20 @@ class Fitted:
 
 
 def first_starts(runs) -> tuple[np.ndarray, ...]:
-    """Return starts read off the records."""
-    starts = []
-    for run in runs:
-        n = max(min(len(run.t) // 200, 20), 1)
-        at = float(np.mean(run.y[:n])) if run.rest else float(run.y[0])
-        starts.append(np.array([at, 0.0 if run.rest else float(run.v[0]), 0.5]))
-    return tuple(starts)
+    """Return starts read off the records, one row a window."""
+    return tuple(np.array([_start_at(run, int(i)) for i in run.windows.edges[:-1]]) for run in runs)
+
+
+def _start_at(run, i):
+    n = max(min(len(run.t) // 200, 20), 4)
+    part = slice(i, min(i + n, len(run.t)))
+    if i == 0 and np.max(np.abs(run.u[part])) < 1e-9 * np.max(np.abs(run.u)):
+        return float(np.mean(run.y[part])), 0.0, 0.5
+    low = max(i - n, 0)
+    t, y, v = run.t[low : part.stop], run.y[low : part.stop], run.v[low : part.stop]
+    way = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (v[1:] + v[:-1]))))
+    way -= way[i - low]
+    return float(np.mean(y - way)), float(run.v[i]), 0.5
 
 
 def fit(
@@ -213,95 +234,107 @@ def fit(
         Bound on the steps.
     """
     starts = first_starts(runs) if starts is None else starts
-    coords = coordinates(block, free, scales)
-    gap = block.core.gap > 0
-    per = 3 if gap else 2
-    sizes = np.array([0.02 * scales.position, 0.02 * scales.speed, 0.3][:per])
-    z = np.array([c.z(block.parameters[c.name].value) for c in coords])
-    z = np.concatenate([z, np.zeros(per * len(runs))])
-    begin = [np.array(s[:per]) for s in starts]
-    count = 0
-    unit = np.sqrt(np.mean([np.var(r.y) for r in runs]))
+    problem = _Problem(block, runs, coordinates(block, free, scales), starts, scales, rtol)
+    z, ys, e, jacobian = problem.solve(iterations, tolerance)
+    model, moved = problem.unpack(z)
+    residuals = tuple(r.y - y for y, r in zip(ys, runs, strict=True))
+    return Fitted(
+        model, tuple(moved), tuple(ys), residuals, tuple(free), jacobian, tuple(problem.coords), problem.simulations
+    )  # fmt: skip
 
-    def unpack(z):
-        values = {c.name: c.value(v) for c, v in zip(coords, z, strict=False)}
-        moved = []
-        for i, s in enumerate(begin):
-            part = z[len(coords) + per * i : len(coords) + per * (i + 1)]
-            new = s + sizes * part
-            if gap:
-                new[2] = min(max(new[2], 0.0), 1.0)
-            moved.append(np.concatenate([new, starts[i][per:]]))
-        return with_values(block, values), moved
 
-    def outputs(z, only=None):
-        nonlocal count
+class _Problem:
+    """Unknowns of one fit: coordinates of the free parameters, then the starts of all windows."""
+
+    def __init__(self, block, runs, coords, starts, scales, rtol):
+        self.block, self.runs, self.coords, self.starts, self.rtol = block, runs, coords, starts, rtol
+        self.gap = block.core.gap > 0
+        self.kinds = 3 if self.gap else 2
+        self.sizes = np.array([0.02 * scales.position, 0.02 * scales.speed, 0.3])
+        self.counts = [len(s) for s in starts]
+        self.unit = scales.position
+        self.simulations = 0
+        names = [c.name for c in coords]
+        self.z0 = np.array([c.z(block.parameters[n].value) for c, n in zip(coords, names, strict=True)])
+        self.total = len(coords) + self.kinds * sum(self.counts)
+
+    def unpack(self, z):
+        values = {c.name: c.value(v) for c, v in zip(self.coords, z, strict=False)}
+        at, moved = len(self.coords), []
+        for s, n in zip(self.starts, self.counts, strict=True):
+            new = s.copy()
+            new[:, : self.kinds] += z[at : at + self.kinds * n].reshape(n, self.kinds) * self.sizes[: self.kinds]
+            new[:, 2] = np.clip(new[:, 2], 0.0, 1.0)
+            moved.append(new)
+            at += self.kinds * n
+        return with_values(self.block, values), moved
+
+    def outputs(self, z):
         try:
-            model, moved = unpack(z)
+            model, moved = self.unpack(z)
         except ValueError:
-            return [np.full(len(r.t), np.nan) for r in runs]
-        result = []
-        for i, run in enumerate(runs):
-            if only is not None and i != only:
-                result.append(None)
+            return None
+        self.simulations += 1
+        return [simulate(model, run, s, self.rtol) for run, s in zip(self.runs, moved, strict=True)]
+
+    def errors(self, ys):
+        return np.concatenate([(r.y - y)[r.use] for y, r in zip(ys, self.runs, strict=True)]) / self.unit
+
+    def jacobian(self, z, ys, e):
+        rows = np.zeros((self.total, len(e)))
+        p = len(self.coords)
+        for i, c in enumerate(self.coords):
+            step = 2e-3 if c.value(z[i] + 2e-3) != c.value(z[i]) else -2e-3
+            trial = z.copy()
+            trial[i] += step
+            moved = self.outputs(trial)
+            if moved is not None:
+                rows[i] = (self.errors(moved) - e) / step
+        # the starts of all windows at once: each moves its own window only
+        windows = np.concatenate([
+            np.repeat(np.arange(n) + sum(self.counts[:k]), np.diff(r.windows.edges))[r.use]
+            for k, (r, n) in enumerate(zip(self.runs, self.counts, strict=True))
+        ])  # fmt: skip
+        for kind in range(self.kinds):
+            trial = z.copy()
+            step = 2e-2 if kind < 2 else 0.1
+            trial[p + kind :: self.kinds] += step
+            moved = self.outputs(trial)
+            if moved is None:
                 continue
-            count += 1
-            result.append(simulate(model, run, moved[i], rtol))
-        return result
+            slope = (self.errors(moved) - e) / step
+            rows[p + kind + self.kinds * windows, np.arange(len(e))] = slope
+        rows[~np.isfinite(rows)] = 0.0
+        return rows
 
-    def errors(ys):
-        parts = [np.where(np.isfinite(y), run.y - y, _FAILED * unit)[run.use] for y, run in zip(ys, runs, strict=True)]
-        return np.concatenate(parts) / unit
-
-    ys = outputs(z)
-    e = errors(ys)
-    cost, damping = float(e @ e), 1e-3
-    jacobian = None
-    for _ in range(iterations):
-        columns = []
-        for i in range(len(z)):
-            step = np.zeros(len(z))
-            step[i] = 2e-3 if i < len(coords) else 2e-2
-            c = coords[i] if i < len(coords) else None
-            if c is not None and c.value(z[i] + step[i]) == c.value(z[i]):
-                step[i] = -step[i]
-            only = None if i < len(coords) else (i - len(coords)) // per
-            moved = outputs(z + step, only)
-            moved = [old if new is None else new for old, new in zip(ys, moved, strict=True)]
-            columns.append((errors(moved) - e) / step[i])
-        jacobian = np.array(columns)
-        jacobian[~np.isfinite(jacobian)] = 0.0
-        normal, gradient = jacobian @ jacobian.T, jacobian @ e
-        diagonal = np.diag(normal).copy()
-        diagonal += 1e-12 * (diagonal.max() + 1e-300)
-        better = False
-        for _ in range(6):
-            move = -np.linalg.solve(normal + damping * np.diag(diagonal), gradient)
-            limit = np.where(np.arange(len(z)) < len(coords), 0.7, 10.0)
-            move = move / max(1.0, float(np.max(np.abs(move) / limit)))
-            trial_z = z + move
-            trial_y = outputs(trial_z)
-            trial = errors(trial_y)
-            new = float(trial @ trial)
-            if new < cost:
-                better = True
+    def solve(self, iterations, tolerance):
+        """Levenberg-Marquardt; returns unknowns, outputs, errors and the last Jacobian."""
+        z = np.concatenate([self.z0, np.zeros(self.total - len(self.coords))])
+        ys = self.outputs(z)
+        e = self.errors(ys)
+        cost, damping, jacobian = float(e @ e), 1e-3, np.zeros((0, len(e)))
+        limit = np.where(np.arange(len(z)) < len(self.coords), 0.7, 30.0)
+        for _ in range(iterations):
+            jacobian = self.jacobian(z, ys, e)
+            normal, gradient = jacobian @ jacobian.T, jacobian @ e
+            diagonal = np.diag(normal) + 1e-12 * (np.max(np.diag(normal)) + 1e-300)
+            accepted = None
+            for _ in range(5):
+                move = -np.linalg.solve(normal + damping * np.diag(diagonal), gradient)
+                move /= max(1.0, float(np.max(np.abs(move) / limit)))
+                trial = self.outputs(z + move)
+                if trial is not None:
+                    errors = self.errors(trial)
+                    new = float(errors @ errors)
+                    if new < cost:
+                        accepted = (z + move, trial, errors, new)
+                        break
+                damping = max(damping, 1e-6) * 10
+            if accepted is None:
                 break
-            damping = max(damping, 1e-6) * 8
-            if damping > 1e4:
+            gain = (cost - accepted[3]) / cost
+            z, ys, e, cost = accepted
+            damping = max(damping / 8, 1e-9)
+            if gain < tolerance:
                 break
-        if not better:
-            break
-        gain = (cost - new) / cost
-        z, ys, e, cost = trial_z, trial_y, trial, new
-        damping = max(damping / 6, 1e-9)
-        if gain < tolerance:
-            break
-    model, moved = unpack(z)
-    residuals = tuple(np.where(np.isfinite(y), r.y - y, _FAILED * unit) for y, r in zip(ys, runs, strict=True))
-    scaled = None if jacobian is None else jacobian * unit
-    return Fitted(model, tuple(moved), tuple(ys), residuals, tuple(free), scaled, tuple(coords), count)
-
-
-def keep(run: Run, use) -> Run:
-    """Return the run with other samples counting."""
-    return replace(run, use=use)
+        return z, ys, e, jacobian
