@@ -1,7 +1,97 @@
-"""ctrl_df: limit cycles of drives with friction and backlash, for python-control."""
+"""Limit cycles of drives with friction and backlash, for python-control.
 
-from .blocks.effect import Effect, effect_library, register_effect
+Two flows run through the package::
+
+    physics block --> describing function family --> predicted limit cycles --> exact orbit, simulation --> verdict
+       Mass             describing_function_            describing_function_        find_limit_cycle         verify
+       TwoMass          family                          response, ..._plot          event_response
+
+    measurement --> compare --> diagnose --> add the effect --> refit --> compare again
+    Measurement     compare     diagnose     block.with_effect   refit    improve (the whole ladder)
+"""
+
+from importlib import import_module as _import_module
+
+from .blocks.effect import Effect, effect_class, effect_library, register_effect
 from .blocks.effects import *  # noqa: F403
+from .blocks.effects import __all__ as _effects
+from .blocks.hysteresis import play, rate_limiter, relay_with_hysteresis
 from .blocks.mechanism import Mass, Mechanism, TwoMass, backlash_masses, friction_mass
+from .blocks.memoryless import (
+    cubic,
+    dead_zone,
+    piecewise_linear,
+    preload,
+    quantizer,
+    relay,
+    relay_with_dead_zone,
+    saturation,
+)
 from .blocks.parameter import Parameter, parameter
 from .blocks.pid import pid
+from .status import Status
+
+# Names loaded on first use, so that importing the package stays cheap.
+_LAZY = {
+    "describing_function": "df.describing",
+    "describing_function_family": "df.describing",
+    "Family": "df.family",
+    "load_family": "df.family",
+    "closed_loop": "simulate.loop",
+    "sampled": "simulate.sampled",
+    "event_response": "simulate.response",
+    "DescribingFunctionResponse": "limit_cycles.predict",
+    "describing_function_response": "limit_cycles.predict",
+    "LimitCycle": "limit_cycles.grade",
+    "find_limit_cycle": "limit_cycles.orbit",
+    "Orbit": "limit_cycles.orbit",
+    "verify": "limit_cycles.verify",
+    "describing_function_plot": "plot.describing",
+    "Measurement": "identify.measurement",
+    "FrequencyMeasurement": "identify.frequency_measurement",
+    "compare": "identify.compare",
+    "refit": "identify.refit",
+    "diagnose": "identify.diagnose",
+    "improve": "identify.improve",
+}
+
+__all__ = [
+    "Effect",
+    "Mass",
+    "Mechanism",
+    "Parameter",
+    "Status",
+    "TwoMass",
+    "backlash_masses",
+    "cubic",
+    "dead_zone",
+    "effect_class",
+    "effect_library",
+    "friction_mass",
+    "parameter",
+    "pid",
+    "piecewise_linear",
+    "play",
+    "preload",
+    "quantizer",
+    "rate_limiter",
+    "register_effect",
+    "relay",
+    "relay_with_dead_zone",
+    "relay_with_hysteresis",
+    "saturation",
+    *_effects,
+    *_LAZY,
+]
+
+
+def __getattr__(name):
+    if name in _LAZY:
+        value = getattr(_import_module(f".{_LAZY[name]}", __name__), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted(__all__)

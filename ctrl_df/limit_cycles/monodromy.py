@@ -80,7 +80,7 @@ class Tracer:
             if len(segments) >= self.max_events:
                 status = Status.WORK_LIMIT
                 break
-            run = self.engine.run(now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=1, max_steps=200_000)
+            run = self.engine.run(now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=2, max_steps=200_000)
             if not run.status.ok:
                 status = run.status
                 break

@@ -11,7 +11,7 @@ import numpy as np
 from ..df.describing import describing_function
 from ..simulate import driver
 from ..simulate.engine import Engine, Event, State, harmonic_drive
-from ..simulate.layout import AUX, H_OUT, KIND, MECHANISM, MODE
+from ..simulate.layout import AUX, H_OUT, KIND, MECHANISM, MODE, NX, X
 from ..status import Status
 from .monodromy import RTOL, Tracer
 
@@ -177,6 +177,9 @@ class OrbitFinder:
         Several motions may coexist; the one nearest to the output amplitude wanted is taken, else the largest.
         """
         block = self.parts.block
+        if not block.nstates:
+            y1 = complex(describing_function(block, amplitude)) * amplitude
+            return np.zeros(0), y1, 1j * omega * y1
         engine = Engine(block)
         core = getattr(block, "core", None)
         starts = [np.zeros(engine.nstates)]
@@ -309,6 +312,11 @@ class OrbitFinder:
             omega = _corner_frequency(self.parts)
             if omega:
                 return 20 * np.pi / omega
+            controller = self.loop.syslist[0]
+            if isinstance(controller, ct.StateSpace) and controller.nstates:
+                fastest = float(np.max(np.abs(controller.poles())))
+                if fastest > 0:
+                    return 40 * np.pi / fastest
         return 10.0
 
     def _repeats(self, laps):
@@ -317,9 +325,10 @@ class OrbitFinder:
         return bool(np.all(np.abs(a - b) < 1e-7 * np.max(size)))
 
     def _output_signal(self):
-        """Signal index of the loop's first output."""
+        """Signal index of the loop's first output, or of its last where the block is static (its output may jump)."""
         ints = self.engine.program.ints
-        return int(ints[ints[ints[H_OUT]] + 1])
+        static = self.parts is not None and not self.parts.block.nstates
+        return int(ints[ints[ints[H_OUT] + (self.engine.noutputs - 1 if static else 0)] + 1])
 
     # --- refinement ---------------------------------------------------------------------------------------
 
@@ -407,24 +416,32 @@ class OrbitFinder:
 
     def _rebuilt(self, start, x):
         """The moved start in freshly settled modes; rigid joints kept closed, gaps and stops respected."""
-        state = self.engine.start(x)
-        if self.parts is not None and getattr(self.parts.block, "core", None) is not None:
-            core = self.parts.block.core
-            o = self.loop.syslist[0].nstates or 0
-            if core.joint == "rigid":
-                state.x[o + 2 : o + 4] = state.x[o : o + 2]
-            elif core.joint == "impact":
-                stretch = state.x[o + 2] - state.x[o]
-                state.x[o + 2] = state.x[o] + min(max(stretch, 0.0), core.gap)
-        state = self.tracer.settle(state)
+        state = self.tracer.settle(self.engine.start(self.feasible(x)))
         return state if np.all(np.isfinite(state.x)) else None
+
+    def feasible(self, x):
+        """The nearest state with rigid joints closed, stretches within gaps and bodies within stops."""
+        core = getattr(self.parts.block, "core", None) if self.parts is not None else None
+        x = np.array(x, dtype=float)
+        if core is None:
+            return x
+        o = self.loop.syslist[0].nstates or 0
+        if core.stop is not None:
+            at = o + 2 * core.driven
+            x[at] = np.clip(x[at], *core.stop.span)
+        if core.joint == "rigid":
+            x[o : o + 2] = x[o + 2 : o + 4]
+        elif core.joint == "impact":
+            x[o + 2] = x[o] + np.clip(x[o + 2] - x[o], 0.0, core.gap)
+        return x
 
     def _finished(self, start, period, lap, size, status) -> Orbit:
         times = np.linspace(0.0, period, 1025)
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         run = self.engine.run(start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8)
-        values = np.linalg.eigvals(lap.monodromy)
+        live = self._live_states()
+        values = np.linalg.eigvals(lap.monodromy[np.ix_(live, live)])
         trivial = int(np.argmin(np.abs(values - 1.0)))
         floquet = np.delete(values, trivial)
         floquet = floquet[np.argsort(-np.abs(floquet))]
@@ -440,6 +457,14 @@ class OrbitFinder:
             bool(np.all(np.abs(floquet) < 1.0)), residual, tuple(events), status, lap.grazing, times,
             run.outputs.T, run.states.T, self.loop,
         )  # fmt: skip
+
+    def _live_states(self):
+        """States the engine moves; a block may carry others for ordinary solvers only."""
+        nodes = self.engine.program.nodes
+        live = np.zeros(self.engine.nstates, bool)
+        for node in nodes:
+            live[node[X] : node[X] + node[NX]] = True
+        return np.flatnonzero(live)
 
     def _averaged(self, x0, times, laps, swings=40) -> Orbit | None:
         """A motion that never quite repeats (sampled or aperiodic): figures averaged over many swings."""

@@ -27,7 +27,7 @@ def workspace(prog):
     owner = np.zeros(ng + 1, np.int64)
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
-    vectors = [np.zeros(n) for _ in range(4)] + [np.zeros(ng + 1) for _ in range(4)]
+    vectors = [np.zeros(n) for _ in range(4)] + [np.zeros(ng + 1) for _ in range(5)]
     return (work, np.zeros((16, n)), np.zeros((8, n)), *vectors, owner)
 
 
@@ -140,11 +140,13 @@ def run(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are added; no
     columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, owner = space
+    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner = space
     n, ng = x.shape[0], scale.shape[0]
     if fresh == 1:
         for j in range(n):
             size[j] = abs(x[j])
+    for i in range(ng):
+        g[i] = math.inf  # the section's margin must not outlive the run that watched it
     t, index, h = clock[0], int(clock[1]), clock[2]
     segment = int(clock[6])
     steps = 0
@@ -257,8 +259,7 @@ def run(
                         watch_sign,
                     )  # fmt: skip
                 for i in range(ng):
-                    if abs(g[i]) < math.inf:
-                        scale[i] = max(scale[i], abs(g[i]))
+                    norm[i] = max(scale[i], abs(g[i])) if abs(g[i]) < math.inf else scale[i]
                     if i != blocked and (g[i] + gtol[i] < 0.0 or lowest[i] + gtol[i] < 0.0):
                         suspect = True
                 if has_tracked or watch >= 0:
@@ -275,7 +276,7 @@ def run(
                     prepare5(length, k, poly)
                 if suspect:
                     theta, at = _locate(
-                        prog, drive, segment, t, length, x, mode, work, order, poly, xi, dx, g, lowest, gtol, scale,
+                        prog, drive, segment, t, length, x, mode, work, order, poly, xi, dx, g, lowest, gtol, norm,
                         blocked, watch, watch_level, watch_sign, has_tracked or watch >= 0,
                     )  # fmt: skip
             if blocked >= 0 and locate and g[blocked] > gtol[blocked]:

@@ -384,8 +384,8 @@ def _impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     """Newton's impact in the joint; the end of chatter becomes sustained contact.
 
     Chatter: with restitution e < 1 and a steady pressing acceleration p the flights shrink geometrically and end after
-    2 w / (p (1 - e)), w the rebound speed. Once a flight is lower than `height` of the gap the rest of the chatter is
-    passed over at once, momentum kept: an error in time of that order.
+    2 w / (p (1 - e)), w the rebound speed. Once a flight is lower than `height` of the gap (or of the position's own
+    size) the rest of the chatter is passed over at once, momentum kept: an error of position of that order.
     """
     w, f, trial = work
     nodes, par = prog.nodes, prog.par
@@ -407,7 +407,9 @@ def _impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     mechanism_rates(prog, node, t, x, mode, force, f, dx, g, False)
     press = side * (dx[xo + 3] - dx[xo + 1])
     speed = abs(rebound)
-    if press > 0.0 and speed * speed < 2.0 * press * height * gap:
+    # positions are known relative to their size only: a flight below that resolution is none
+    lowest = height * (gap + 4.0 * abs(x[xo]))
+    if press > 0.0 and speed * speed < 2.0 * press * lowest:
         x[xo + 1] = x[xo + 3] = common
         mode[mo + JOINT] = side
         signals(prog, t, x, mode, w)
@@ -442,7 +444,7 @@ def _stop(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     resolve(prog, node, t, x, mode, force, f, trial)
     mechanism_rates(prog, node, t, x, mode, force, f, dx, g, False)
     press, speed = side * dx[at + 1], abs(rebound)
-    if speed == 0.0 or (press > 0.0 and speed * speed < 2.0 * press * height * (high - low)):
+    if speed == 0.0 or (press > 0.0 and speed * speed < 2.0 * press * height * (high - low + abs(x[at]))):
         x[at + 1] = 0.0
         if rigid:
             x[xo + 1] = 0.0

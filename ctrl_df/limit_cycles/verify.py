@@ -1,0 +1,247 @@
+"""Predictions held against the exact orbit and a plain simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..df.dispatch import translated
+from ..simulate.loop import closed_loop
+from .grade import LimitCycle
+from .orbit import Orbit, OrbitFinder
+
+CONFIRMED, SHIFTED = "confirmed", "shifted"
+NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "not tested"
+
+# Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle, shifted.
+CONFIRMED_WITHIN = 0.05
+SHIFTED_WITHIN = (1.25, 2.0)  # frequency, amplitude
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One cycle: predicted, exact, simulated.
+
+    Attributes
+    ----------
+    predicted : LimitCycle or None
+        None for a cycle the describing function missed.
+    exact : Orbit or None
+        The orbit found from the prediction, or by the search.
+    simulated : tuple of (omega, output amplitude) or None
+        What a simulation started beside the orbit settles to; None where it leaves (an unstable orbit).
+    verdict : str
+        ``confirmed``, ``shifted``, ``no such orbit``, ``missed by the describing function``, ``not tested``.
+    """
+
+    predicted: LimitCycle | None
+    exact: Orbit | None
+    simulated: tuple[float, float] | None
+    verdict: str
+
+    @property
+    def omega_error(self) -> float:
+        """Relative error of the predicted frequency; nan without a pair."""
+        return self._error("omega")
+
+    @property
+    def amplitude_error(self) -> float:
+        """Relative error of the predicted amplitude at the block's input; nan without a pair."""
+        return self._error("amplitude")
+
+    @property
+    def in_band(self) -> bool | None:
+        """Whether the stated error bands hold the exact answer; None without a pair."""
+        if self.predicted is None or self.exact is None:
+            return None
+        low_w, high_w = self.predicted.omega_band
+        low_a, high_a = self.predicted.amplitude_band
+        return bool(low_w <= self.exact.omega <= high_w and low_a <= self.exact.amplitude <= high_a)
+
+    def _error(self, name):
+        if self.predicted is None or self.exact is None or self.verdict == NONE:
+            return float("nan")
+        return getattr(self.predicted, name) / getattr(self.exact, name) - 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """Predictions of one loop beside the truth.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        One a cycle, predicted ones first.
+    orbits : list of Orbit
+        All exact orbits found, those the prediction missed included.
+    note : str
+        What could not be tested, and why.
+    """
+
+    rows: tuple[Row, ...]
+    orbits: list[Orbit]
+    note: str = ""
+    loop: Any = field(repr=False, default=None)
+
+    def table(self) -> str:
+        """Return the rows as text: predicted | exact | simulated, errors and verdict."""
+        head = ("predicted a @ w", "exact a @ w", "multiplier", "simulated y @ w", "error a", "error w", "grade", "verdict")
+        lines = [head]
+        for row in self.rows:
+            p, e, s = row.predicted, row.exact, row.simulated
+            shown = None if row.verdict == NONE else e
+            lines.append(
+                (
+                    f"{p.amplitude:.6g} @ {p.omega:.6g}" if p else "-",
+                    f"{shown.amplitude:.7g} @ {shown.omega:.7g}" if shown else "-",
+                    _multiplier(shown),
+                    f"{s[1]:.4g} @ {s[0]:.6g}" if s else ("leaves" if shown is not None and shown.stable is False else "-"),
+                    _percent(row.amplitude_error),
+                    _percent(row.omega_error),
+                    p.grade if p else "-",
+                    row.verdict,
+                )
+            )
+        if len(lines) == 1:
+            lines.append(("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found"))
+        widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+        text = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
+        text.insert(1, "  ".join("-" * w for w in widths))
+        return "\n".join(text + ([self.note] if self.note else []))
+
+    def __str__(self) -> str:
+        return self.table()
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Check:
+    """Check every predicted limit cycle against the exact orbit and a simulation of the closed loop.
+
+    Parameters
+    ----------
+    resp : DescribingFunctionResponse
+        From `ctrl_df.describing_function_response`.
+    loop : ct.InterconnectedSystem, optional
+        The loop to simulate; default ``closed_loop(resp.H, resp.block)``. Give the sampled loop to see what sampling does.
+    search : bool
+        Also search, from simulations of many sizes, for orbits that the prediction missed.
+    search_time : float
+        Longest simulation of that search [s].
+
+    Returns
+    -------
+    Check
+        ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or more improper
+        than a PID) rows say ``not tested`` and ``.note`` why.
+    """
+    if keywords:
+        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    cycles = list(resp.limit_cycles)
+    if loop is None:
+        try:
+            loop = closed_loop(resp.H, translated(resp.block))
+            finder = OrbitFinder(loop)
+        except (ValueError, TypeError) as error:
+            return Check(tuple(Row(c, None, None, UNTESTED) for c in cycles), [], f"not simulated: {error}")
+    else:
+        finder = OrbitFinder(loop)
+
+    orbits: list[Orbit] = []
+
+    def keep(orbit: Orbit | None) -> Orbit | None:
+        if orbit is None:
+            return None
+        for known in orbits:
+            if orbit.same_as(known, 1e-4 if orbit.status.ok else 2e-2):
+                return known
+        orbits.append(orbit)
+        return orbit
+
+    for cycle in cycles:
+        keep(finder.from_guess(cycle))
+    if search:
+        for orbit in finder.search(search_time):
+            keep(orbit)
+    partner = _pairs(cycles, orbits)
+    rows = []
+    for cycle in cycles:
+        match = partner.get(id(cycle))
+        if match is None:
+            rows.append(Row(cycle, None, None, NONE))
+            continue
+        worst = max(abs(cycle.omega / match.omega - 1), abs(cycle.amplitude / match.amplitude - 1))
+        rows.append(Row(cycle, match, simulated(finder, match), CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED))
+    paired = {id(orbit) for orbit in partner.values()}
+    for orbit in orbits:
+        if id(orbit) not in paired:
+            rows.append(Row(None, orbit, simulated(finder, orbit), MISSED))
+    return Check(tuple(rows), orbits, loop=loop)
+
+
+def _pairs(cycles, orbits) -> dict[int, Orbit]:
+    """Pair predictions with orbits, nearest first, each once; of equally near ones those that agree on stability."""
+    near = []
+    for cycle in cycles:
+        for orbit in orbits:
+            if _close(cycle, orbit):
+                distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(np.log(cycle.amplitude / orbit.amplitude))
+                disagree = orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
+                near.append((distance * (2.0 if disagree else 1.0), len(near), cycle, orbit))
+    partner: dict[int, Orbit] = {}
+    taken: set[int] = set()
+    for _, _, cycle, orbit in sorted(near, key=lambda n: n[:2]):
+        if id(cycle) not in partner and id(orbit) not in taken:
+            partner[id(cycle)] = orbit
+            taken.add(id(orbit))
+    return partner
+
+
+def simulated(finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01) -> tuple[float, float] | None:
+    """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves the orbit."""
+    if orbit.stable is False:
+        return None
+    if orbit.stable is None:
+        return orbit.omega, orbit.output_amplitude
+    swings = finder._swings(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps, None)
+    if len(swings) < 8:
+        return None
+    t = np.array([s[0] for s in swings])
+    span = t[-1] - t[len(t) // 2]
+    turns = round(span * orbit.omega / (2 * np.pi))
+    if turns < 1:
+        return None
+    omega = 2 * np.pi * turns / span
+    engine = finder.engine
+    spectrum = np.zeros((engine.noutputs, 2), complex)
+    period = 2 * np.pi / omega
+    run = engine.run(engine.start(swings[-1][1]), period, rtol=1e-8, max_step=period / 8, spectrum=spectrum, omega=omega)
+    amplitude = 2 * abs(spectrum[0, 1]) / period
+    if not run.status.ok or not 0.2 < amplitude / orbit.output_amplitude < 5:
+        return None
+    return omega, float(amplitude)
+
+
+def _close(cycle: LimitCycle, orbit: Orbit) -> bool:
+    ratio_w, ratio_a = cycle.omega / orbit.omega, cycle.amplitude / orbit.amplitude
+    return max(ratio_w, 1 / ratio_w) <= SHIFTED_WITHIN[0] and max(ratio_a, 1 / ratio_a) <= SHIFTED_WITHIN[1]
+
+
+def _multiplier(orbit) -> str:
+    if orbit is None:
+        return "-"
+    if orbit.stable is None:
+        return "irregular"
+    return f"{orbit.multiplier:.5g} {'stable' if orbit.stable else 'unstable'}"
+
+
+def _percent(value) -> str:
+    return "-" if np.isnan(value) else f"{100 * value:+.2f} %"
+
+
