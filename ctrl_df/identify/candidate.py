@@ -271,9 +271,15 @@ class _Problem:
         self.block = block
         self.variables = [_Variable(k, table[k], natural_scale(table[k].unit, self.known[0])) for k in names]
         for variable in self.variables:
-            if variable.name == "hard_stop.limit" and "sensor_offset" not in block._keys and "drift" not in block._keys:
+            if (
+                variable.name == "hard_stop.limit"
+                and "sensor_offset" not in block._keys
+                and "drift" not in block._keys
+            ):
                 # No body has been where a stop would not let it.
-                reach = max(float(np.max(np.abs(r.y))) - 4 * k.noise for r, k in zip(records, self.known, strict=True))
+                reach = max(
+                    float(np.max(np.abs(r.y))) - 4 * k.noise for r, k in zip(records, self.known, strict=True)
+                )
                 variable.lower = max(variable.lower, reach)
         self.steps = np.full(len(names), 1e-3)
         self.nfev = 0

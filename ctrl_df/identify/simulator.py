@@ -245,9 +245,9 @@ class Simulator:
         columns = []
         for name in self.nuisances:
             if name == "x":
-                columns.append(3 * windows.x_error)
+                columns.append(5 * windows.x_error + 0.005 * known.spread)
             elif name == "v":
-                columns.append(2 * windows.v_error + 0.005 * known.speed)
+                columns.append(2 * windows.v_error + 0.01 * known.speed)
             elif name == "slack":
                 columns.append(np.full(len(windows), 1.0))
             elif name == "bristle":
@@ -425,6 +425,7 @@ class Simulator:
             if isinstance(primitive, Ramp):
                 x -= primitive.offset + primitive.rate * (self.record.t[i] - later)
         v = float(windows.v[w]) + given.get("v", 0.0)
+        v -= sum(p.rate for p, _ in part.output if isinstance(p, Ramp))
         if core.stop is not None:
             low, high = core.stop.span
             x = min(max(x, low), high)

@@ -1,0 +1,113 @@
+"""Compare: exact simulation on the record's clock, free runs and windows, words and picture."""
+
+import control as ct
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import rigs
+
+from ctrl_df.blocks.effects import Drift, InputDelay, InputSaturation, SensorDelay, SensorOffset
+from ctrl_df.blocks.mechanism import friction_mass
+from ctrl_df.blocks.pid import pid
+from ctrl_df.identify.compare import compare
+from ctrl_df.identify.measurement import Measurement
+from ctrl_df.identify.simulator import Simulator, make_windows
+from ctrl_df.simulate.loop import closed_loop
+from ctrl_df.simulate.response import event_response
+
+mpl.use("agg")
+
+
+@pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay", "drift", "input_saturation", "input_lag"])
+def test_simulation_agrees_with_the_rig(hidden):
+    rig = rigs.draw(hidden, 3)
+    record = rig.train[0]
+    measured = record.measurement()
+    y = Simulator(rig.true_block, measured).run(make_windows(measured))
+    # The start is estimated from noisy data: worst 0.3 of the noise; thinned 1.3.
+    assert np.std(y - record.clean) < 0.6 * record.noise
+    thin = Simulator(rig.true_block, measured, thin=4).run(make_windows(measured))
+    assert np.std(thin - record.clean) < 2 * record.noise
+
+
+def test_delays_offset_and_drift_are_exact():
+    t = np.arange(4001) * 1e-3
+    u = 3 * np.sin(2 * np.pi * 1.3 * t) + np.sign(np.sin(2 * np.pi * 0.7 * t))
+    block = friction_mass(2.0, 0.3, 1.5)
+    late = np.where(t >= 0.0123, np.interp(t - 0.0123, t, u), u[0])
+    plain = event_response(block, t, late, 0, input_hold="linear")
+    truth = np.interp(t - 0.0045, t, np.asarray(plain.outputs)[0]) + 0.2 + 0.05 * t
+    model = block.with_effect(InputDelay(0.0123)).with_effect(SensorDelay(0.0045))
+    model = model.with_effect(SensorOffset(0.2)).with_effect(Drift(0.05))
+    result = compare(model, Measurement(t, u, truth, input_hold="linear"), mode="free")
+    # 5e-6 measured: the delayed input is sampled again by np.interp
+    assert result.nrmse < 3e-5
+
+
+def test_static_input_laws_act_on_held_samples():
+    t = np.arange(2001) * 1e-3
+    u = 3 * np.sin(2 * np.pi * 1.3 * t)
+    block = friction_mass(2.0, 0.3, 1.5)
+    y = np.asarray(event_response(block, t, np.clip(u, -2, 2), 0, input_hold="zoh").outputs)[0]
+    assert compare(block.with_effect(InputSaturation(2.0)), Measurement(t, u, y), mode="free").nrmse < 1e-5
+
+
+def test_true_model_is_white_and_wrong_one_is_not():
+    rig = rigs.draw("asymmetric_coulomb", 3)
+    record = rig.train[0].measurement()
+    right = compare(rig.true_block, record, mode="windows")
+    assert right.rmse == pytest.approx(rig.train[0].noise, rel=0.03)
+    assert right.white.p_value > 1e-4 and right.mode == "windows" and "drift" in str(right)
+    wrong = compare(rig.baseline, record)
+    assert wrong.nrmse > 10 * right.nrmse and not wrong.white
+    assert wrong.fit_percent == pytest.approx(100 * (1 - wrong.nrmse))
+    assert wrong.residual == pytest.approx(record.y - wrong.simulated)
+    assert len(wrong.where.significant) > 0
+    assert compare(rig.baseline, record, mode="free").mode == "free"
+
+
+def test_several_records_add_up():
+    rig = rigs.draw_none(5)
+    records = [rig.train[0].measurement(), rig.holdout[0].measurement()]
+    result = compare(rig.true_block, records)
+    assert len(result.simulated) == 2
+    squares = sum(np.sum(r**2) for r in result.residual)
+    assert result.rmse == pytest.approx(np.sqrt(squares / sum(len(r) for r in records)))
+    assert "2 records" in result.report()
+
+
+def test_loop_runs_on_its_reference():
+    block = friction_mass(9.0, 5.0, 0.5)
+    loop = closed_loop(pid(2000, 4000, 130), block)
+    t = np.arange(3001) * 1e-3
+    r = 0.01 * np.sin(2 * np.pi * 1.1 * t)
+    out = np.asarray(event_response(loop, t, r, 0).outputs)
+    data = Measurement(t, out[1], out[0], channels={"reference": r}, input_hold="linear")
+    assert compare(loop, data).nrmse < 1e-4
+    alone = Measurement(t, r, out[0], input_hold="linear")
+    assert compare(loop, alone).nrmse < 1e-4
+
+
+def test_picture_shows_three_parts():
+    rig = rigs.draw("constant_force", 3)
+    result = compare(rig.baseline, rig.train[0].measurement())
+    drawn = result.plot()
+    assert isinstance(drawn, ct.ControlPlot)
+    top, below, bars = np.ravel(drawn.axes)
+    assert top.lines[0].get_ydata() == pytest.approx(rig.train[0].y)
+    assert below.lines[0].get_ydata() == pytest.approx(result.residual)
+    assert len(bars.patches) > 0
+    plt.close("all")
+
+
+def test_errors_name_the_remedy():
+    record = rigs.draw_none(5).train[0].measurement()
+    with pytest.raises(TypeError, match="unrecognized keyword"):
+        compare(friction_mass(1, 1), record, free=True)
+    with pytest.raises(TypeError, match="Measurement"):
+        compare(friction_mass(1, 1), 3)
+    with pytest.raises(TypeError, match="block or a loop"):
+        compare(3, record)
+    with pytest.raises(ValueError, match="window needs a length"):
+        compare(friction_mass(1, 1), record, window=-1)
