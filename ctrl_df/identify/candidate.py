@@ -3,8 +3,8 @@
 Each window of each record starts from a state of its own. Those states enter linearly near the solution; they
 are eliminated window by window from the normal equations (variable projection), so that the work grows with
 the number of parameters only. Steps are Levenberg-Marquardt, bounds are kept by projection, outliers are
-bent to Huber's loss once the fit is near. Derivatives are differences of a size that moves the output by about
-the noise: far above the roughness that events leave in the cost.
+bent to Huber's loss once the fit is near. Derivatives are differences of a size that moves the output by
+about the noise: far above the roughness that events leave in the cost.
 """
 
 from __future__ import annotations
@@ -254,7 +254,8 @@ def natural_scale(unit: str, known) -> float:
     """Return the size a parameter of this unit has when it matters on a record with these facts."""
     length, speed, force = known.spread, known.speed, known.force
     return {
-        "N": 0.1 * force, "m": 0.1 * length, "m/s": 0.1 * speed, "s": 5 * known.dt, "N/m": 0.1 * force / length,
+        "N": 0.1 * force, "m": 0.1 * length, "m/s": 0.1 * speed, "s": 5 * known.dt,
+        "N/m": 0.1 * force / length,
         "N s/m": 0.1 * force / speed, "N s^2/m^2": 0.1 * force / speed**2, "N/m^3": 0.1 * force / length**3,
         "kg": force * length / speed**2, "rad": 1.0,
     }.get(unit, 1.0)  # fmt: skip
@@ -317,7 +318,8 @@ class _Problem:
     def cost(self, residual, nuisance, weights):
         total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
         return 0.5 * (total + self._prior_weight() * sum(
-            float(np.sum((a - m) ** 2 / p**2)) for a, m, p in zip(nuisance, self.means(), self.priors, strict=True)
+            float(np.sum((a - m) ** 2 / p**2))
+            for a, m, p in zip(nuisance, self.means(), self.priors, strict=True)
         ))  # fmt: skip
 
     def _prior_weight(self):
@@ -550,17 +552,20 @@ class _Problem:
         spread = sum(float(np.sum((r.y - r.y.mean()) ** 2)) for r in self.records)
         count = sum(len(e) for e in residual)
         return Candidate(
-            self.simulators[0].with_values(values), self.names, vector, covariance, projected, residual, base,
-            0.5 * total, math.sqrt(total / count), math.sqrt(total / spread), round(self.nfev), self.converged,
-            at_bound, null, np.array([max(v.scale, v.natural) for v in self.variables]), nuisance, self.windows,
+            self.simulators[0].with_values(values), self.names, vector, covariance, projected, residual,
+            base,
+            0.5 * total, math.sqrt(total / count), math.sqrt(total / spread), round(self.nfev),
+            self.converged,
+            at_bound, null, np.array([max(v.scale, v.natural) for v in self.variables]), nuisance,
+            self.windows,
             self.simulators,
         )  # fmt: skip
 
     def _uncertainty(self, jp, js, residual, nuisance):
         """Covariance of the scaled parameters by the sandwich rule, the noise's colour from the residual.
 
-        cov = H^-1 (sum over records J' Omega J) H^-1, with Omega the covariance of a stationary residual whose
-        spectrum an autoregressive model gives; lost degrees of freedom are given back.
+        cov = H^-1 (sum over records J' Omega J) H^-1, with Omega the covariance of a stationary residual
+        whose spectrum an autoregressive model gives; lost degrees of freedom are given back.
         """
         ones = [np.ones(len(r)) for r in residual]
         projected = [j.copy() for j in jp]

@@ -93,7 +93,7 @@ class RecordComparison:
     def _acceleration_error(self) -> tuple[np.ndarray, slice]:
         """Return the low-passed second derivative of the residual, and the samples at which it holds.
 
-        Derivatives fail at the ends of a window: a line bridges them inside, the record's own ends are left out.
+        Derivatives fail at the ends of a window: a line bridges them inside; the record's ends are left out.
         """
         t, dt = self.record.t, facts(self.record).dt
         cutoff = automatic_cutoff(self.residual - self.residual.mean(), dt)
@@ -114,8 +114,8 @@ class RecordComparison:
 class Comparison:
     """Outcome of `compare`: the sum over all records, and each by itself in `records`.
 
-    `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and `where` are
-    those of the record with the largest error.
+    `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and
+    `where` are those of the record with the largest error.
     """
 
     model: Any
@@ -211,6 +211,7 @@ class Comparison:
         return "\n".join(lines)
 
     def __str__(self) -> str:
+        """Return it as text."""
         worst = self.worst
         how = "free run from fitted initial states"
         if self.mode == "windows":
@@ -227,7 +228,7 @@ class Comparison:
         )
 
     def plot(self, record=None, **keywords):
-        """Draw measured and simulated output, the residual, and where the error lies; returns a ct.ControlPlot.
+        """Draw outputs, residual, and where the error lies; returns a ct.ControlPlot.
 
         Parameters
         ----------

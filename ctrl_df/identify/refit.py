@@ -44,9 +44,11 @@ class FittedParameter:
     identifiable: bool
 
     def __float__(self) -> float:
+        """Return the value."""
         return self.value
 
     def __str__(self) -> str:
+        """Return it as text."""
         marks = ("  at its bound" if self.at_bound else "") + (
             "" if self.identifiable else "  not determined by these data"
         )
@@ -97,6 +99,7 @@ class Fit:
         return "\n".join([*lines, "", self.comparison.report()])
 
     def __str__(self) -> str:
+        """Return it as text."""
         return self.report()
 
 
@@ -159,8 +162,8 @@ def refit(
     block = Simulator(fitted, records[0]).block
     if not hasattr(block, "with_parameters") or not hasattr(block, "parameters"):
         raise TypeError(
-            f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got {type(block).__name__}. "
-            "Build it from ctrl_df.Mass and effects."
+            f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got "
+            f"{type(block).__name__}. Build it from ctrl_df.Mass and effects."
         )
     names = _names(block, free)
     start_values = {**{k: block.parameters[k].value for k in names}, **dict(start or {})}
@@ -181,8 +184,8 @@ def refit(
         for k, bound in zip(found.names, found.at_bound, strict=True)
     }
     return Fit(
-        _as_given(model, found.model), MappingProxyType(parameters), comparison, found.covariance, _sentences(found),
-        found.converged, found.nfev,
+        _as_given(model, found.model), MappingProxyType(parameters), comparison, found.covariance,
+        _sentences(found), found.converged, found.nfev,
     )  # fmt: skip
 
 
@@ -259,8 +262,8 @@ def _sentences(found: Candidate) -> tuple[str, ...]:
             + (" together" if len(parts) > 1 else "")
         )
         lines.append(
-            f"{' and '.join(k for k, _ in parts)} cannot be told apart on these data: {change} leaves the output "
-            "as it is. Fix one of them, or excite the drive otherwise."
+            f"{' and '.join(k for k, _ in parts)} cannot be told apart on these data: {change} leaves the "
+            "output as it is. Fix one of them, or excite the drive otherwise."
         )
     for k in sorted(_blurred(found) - named, key=found.names.index):
         lines.append(f"{k} is less certain than it is large: these data do not determine it.")

@@ -68,7 +68,7 @@ def facts(record: Measurement) -> Facts:
 
 
 def _turns(y) -> int:
-    """Count the turning points of a signal between strokes longer than half its rms, so that noise adds none."""
+    """Count the turning points between strokes longer than half the rms, so that noise adds none."""
     y = y[:: max(len(y) // 2000, 1)]
     least, top, low, up, count = 0.5 * float(np.std(y)), y[0], y[0], 0, 0
     for value in y.tolist():
@@ -96,6 +96,7 @@ class Windows:
     v_error: np.ndarray
 
     def __len__(self) -> int:
+        """Return the number of windows."""
         return len(self.x)
 
     @property
@@ -105,7 +106,7 @@ class Windows:
 
 
 def usual_window(record: Measurement) -> float:
-    """Return the length of window [s] that shows a few strokes: two to-and-fro motions, 40 samples at least."""
+    """Return a length of window [s] that shows two to-and-fro motions, 40 samples at least."""
     known = facts(record)
     return max(2 * known.swing, 40 * known.dt)
 
@@ -245,7 +246,7 @@ class Simulator:
         columns = []
         for name in self.nuisances:
             if name == "x":
-                columns.append(5 * windows.x_error + 0.005 * known.spread)
+                columns.append(5 * windows.x_error + 0.02 * known.spread)
             elif name == "v":
                 columns.append(2 * windows.v_error + 0.01 * known.speed)
             elif name == "slack":
@@ -260,7 +261,7 @@ class Simulator:
         return np.array(columns).T.reshape(len(windows), len(columns))
 
     def with_values(self, values: Mapping[str, float] | None):
-        """Return the model with these parameter values; a static level below the kinetic one is raised to it."""
+        """Return the model with these values; a static level below the kinetic one is raised to it."""
         if not values:
             return self.model
         block = self.block.with_parameters(feasible(self.block, values))
