@@ -185,7 +185,7 @@ class Simulator:
 
     def __init__(self, model, record: Measurement, *, thin: int = 1, rtol: float = 1e-6):
         self.model, self.record, self.rtol = model, record, rtol
-        self.parts = getattr(model, "parts", None)
+        self.parts: Any = getattr(model, "parts", None)
         self.closed = self.parts is not None
         self.block = self.parts.block if self.closed else model
         if not isinstance(self.block, ct.NonlinearIOSystem):
@@ -452,7 +452,7 @@ class Simulator:
             states[2] += beyond
             states[0] += beyond
         if core.bristle is not None:
-            speed = states[2 * core.driven + 1]
+            speed = float(states[2 * core.driven + 1])
             full = (
                 level(core.friction[core.driven], 1.0, math.copysign(1.0, speed), abs(speed))
                 + core.bristle.level
