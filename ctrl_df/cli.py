@@ -16,7 +16,7 @@ BAD_INPUT = 2
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit code: 0, or 2 for input that cannot be used (one line on stderr)."""
+    """Run the command line; return its exit code: 0, or 2 for unusable input (one line on stderr)."""
     options = _parser().parse_args(argv)
     try:
         return options.run(options)
@@ -39,10 +39,14 @@ def _parser() -> argparse.ArgumentParser:
     shape: dict[str, Any] = dict(epilog=parser.epilog, formatter_class=argparse.RawDescriptionHelpFormatter)
 
     demo = commands.add_parser("demo", help="the paper's systems and a hidden-effect study: tables, pictures")
-    demo.add_argument("--out", default="ctrl-df-demo", metavar="DIR", help="directory of the pictures (default %(default)s)")
+    demo.add_argument(
+        "--out", default="ctrl-df-demo", metavar="DIR", help="where the pictures go (default %(default)s)"
+    )
     demo.set_defaults(run=_demo)
 
-    cycles = commands.add_parser("limit-cycles", help="predicted, exact and simulated limit cycles of a model", **shape)
+    cycles = commands.add_parser(
+        "limit-cycles", help="limit cycles of a model: predicted, exact, simulated", **shape
+    )
     cycles.add_argument("model", metavar="MODEL.toml")
     cycles.add_argument("--json", action="store_true", help="machine-readable answer")
     cycles.set_defaults(run=_limit_cycles)
@@ -73,9 +77,9 @@ def _limit_cycles(options) -> int:
 
     model = read_model(options.model)
     if model.controller is None:
-        raise ValueError(f"{model.path} needs a section [controller] with kp, ki, kd to close the loop; add it.")
+        raise ValueError(f"{model.path} needs a section [controller] (kp, ki, kd) to close the loop.")
     if model.amplitudes is None:
-        raise ValueError(f"{model.path} needs a section [box] with amplitude and omega, each [low, high]; add it.")
+        raise ValueError(f"{model.path} needs a section [box] (amplitude, omega: each [low, high]).")
     response = describing_function_response(model.controller, model.plant, model.amplitudes, model.omega)
     check = verify(response, loop=closed_loop(model.controller, model.plant, model.dt))
     if options.json:
@@ -98,8 +102,8 @@ def _limit_cycles(options) -> int:
 def _row(row) -> dict[str, Any]:
     out: dict[str, Any] = {"verdict": row.verdict, "predicted": None, "exact": None, "simulated": None}
     if row.predicted is not None:
-        names = ("amplitude", "output_amplitude", "omega", "stable", "distortion", "omega_band", "amplitude_band",
-                 "sensitivity", "grade", "why", "regime")  # fmt: skip
+        names = ("amplitude", "output_amplitude", "omega", "stable", "distortion", "omega_band")
+        names += ("amplitude_band", "sensitivity", "grade", "why", "regime")
         out["predicted"] = {n: getattr(row.predicted, n) for n in names}
     if row.exact is not None:
         names = ("amplitude", "output_amplitude", "omega", "period", "stable", "residual", "multiplier")

@@ -49,10 +49,17 @@ closed_loop = false        # true: the input column is the reference of the loop
 
 _PLANTS: dict[str, type[Mechanism]] = {"mass": Mass, "two_mass": TwoMass}
 _SECTIONS = ("plant", "effects", "controller", "box", "data")
-_DATA = {
-    "time", "input", "output", "velocity", "delimiter", "channels", "name", "input_unit", "output_unit", "time_unit",
-    "velocity_unit", "input_hold", "closed_loop",
-}  # fmt: skip
+_COLUMNS = ("time", "input", "output", "velocity", "channels", "delimiter")
+_DATA = (
+    *_COLUMNS,
+    "name",
+    "input_unit",
+    "output_unit",
+    "time_unit",
+    "velocity_unit",
+    "input_hold",
+    "closed_loop",
+)
 
 
 @dataclass(frozen=True)
@@ -100,7 +107,7 @@ def read_model(path) -> ModelFile:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} is no TOML file: {error}. See ctrl-df --help for an example.") from None
     _known(path, "file", table, _SECTIONS)
-    plant = _within(path, "[plant]", lambda: _plant(table))
+    plant = _within(path, "plant and effects", lambda: _plant(table))
     controller = dt = None
     if "controller" in table:
         controller, dt = _within(path, "[controller]", lambda: _controller(table["controller"]))
@@ -137,7 +144,7 @@ def _effects(given) -> list[Effect]:
         for entry in given:
             values = dict(_mapping(entry, "effects"))
             if "id" not in values:
-                raise ValueError("every table of [[effects]] needs an id, such as id = \"coulomb\".")
+                raise ValueError('every table of [[effects]] needs an id, such as id = "coulomb".')
             pairs.append((values.pop("id"), values))
     else:
         raise ValueError(f"effects must be tables [effects.ID]; got {given!r}.")
@@ -171,7 +178,8 @@ def _box(given):
     given = _mapping(given, "box")
     _known(None, "box", given, ("amplitude", "omega", "points"))
     points = given.get("points", [40, 60])
-    if not (isinstance(points, list) and len(points) == 2 and all(isinstance(n, int) and n >= 2 for n in points)):
+    whole = isinstance(points, list) and all(isinstance(n, int) and n >= 2 for n in points)
+    if not whole or len(points) != 2:
         raise ValueError(f"points must be two integers >= 2 (amplitudes, frequencies); got {points!r}.")
     edges = []
     for key, count in zip(("amplitude", "omega"), points, strict=True):
@@ -187,7 +195,7 @@ def _box(given):
 
 def _data(given):
     given = dict(_mapping(given, "data"))
-    _known(None, "data", given, sorted(_DATA))
+    _known(None, "data", given, _DATA)
     return given
 
 
@@ -207,7 +215,7 @@ def _known(path, where, given, known):
     unknown = [k for k in given if k not in known]
     if unknown:
         place = f"{path}: " if path else ""
-        raise ValueError(f"{place}{where} knows the keys {', '.join(known)}; got {unknown[0]!r}. Remove or correct it.")
+        raise ValueError(f"{place}{where} knows the keys {', '.join(known)}; got {unknown[0]!r}. Correct it.")
 
 
 def _within(path, section, work):

@@ -32,7 +32,8 @@ def embedded_data():
     random = np.random.default_rng(1997)
     frequencies = np.array([0.3, 0.7, 1.1, 1.9, 3.1, 5.3])
     phases = random.uniform(0, 2 * np.pi, frequencies.size)
-    force = (np.array([9, 7, 6, 5, 5, 5])[:, None] * np.sin(2 * np.pi * np.outer(frequencies, t) + phases[:, None])).sum(0)
+    waves = np.sin(2 * np.pi * np.outer(frequencies, t) + phases[:, None])
+    force = np.array([9, 7, 6, 5, 5, 5]) @ waves
     x = np.asarray(event_response(rig(), t, force, input_hold="zoh", keep_events=False).outputs)[0]
     noise = 1e-3 * np.std(x) * random.standard_normal(t.size)
     return Measurement(t, force, x + noise, name="embedded rig")
@@ -48,6 +49,6 @@ def study_text(folder: Path) -> str:
     path = folder / "hidden-effect.html"
     study.report(path)
     return (
-        "Hidden effect: a drive is measured (10 s at 1 kHz, 60 dB); its model knows Coulomb and viscous friction only.\n"
+        "Hidden effect: a drive is measured (10 s at 1 kHz, 60 dB); its model knows dry and viscous friction only.\n"
         f"The drive also has a force ripple of 20 mm period.\n{study.summary()}\nreport: {path}"
     )

@@ -87,7 +87,7 @@ def _figure_8(_):
     figure, axes = plt.subplots(1, 2, figsize=(9.8, 4.2), layout="constrained", sharey=True)
     for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
         plant = backlash_plant(restitution)
-        family = describing_function_family(plant, np.array([20.0]), np.geomspace(5, 60, 120))
+        family = describing_function_family(plant, np.array([20.0]), np.geomspace(5, 60, 80))
         plot_harmonics(family, ax=ax)
         ax.set_title(f"restitution {restitution}", fontsize="medium")
     axes[0].set_ylabel("|X_k| / a  [m/N]")
@@ -109,7 +109,7 @@ def _figure_10(findings):
     loop = findings["backlash 0.8"].loop
     figure = plt.figure(figsize=(10, 4.8), layout="constrained")
     axes = figure.subplots(2, 2, sharex="col", width_ratios=(2, 1))
-    early = simulate(loop, loop.starts[0], time=20.0, step=1e-3)
+    early = simulate(loop, loop.starts[0], time=8.0, step=1e-3)
     loop_response_plot(early, window=(0, 8), ax=axes[:, 0])
     # far beyond the irregular motion: 200 s, sampled finely at the end
     late = simulate(loop, loop.starts[0], time=200.3, step=5e-4)
@@ -118,7 +118,9 @@ def _figure_10(findings):
     axes[0, 1].set_title(f"after 200 s: {settled(late).omega:.2f} rad/s", fontsize="medium")
     for axis in axes[:, 1]:
         axis.set_ylabel("")
-    figure.suptitle("Fig. 10: backlash, restitution 0.8: irregular for minutes, then a rattle", fontsize="medium")
+    figure.suptitle(
+        "Fig. 10: backlash, restitution 0.8: irregular for minutes, then a rattle", fontsize="medium"
+    )
     return figure
 
 
@@ -135,9 +137,11 @@ def _hunting(findings):
 
 def _crossings(key):
     def draw(findings):
-        figure, ax = plt.subplots(figsize=(6.8, 5), layout="constrained")
-        describing_function_plot(findings[key].response, ax=ax, label="PID")
-        ax.set_title(f"PID and -1/N(a, ω): {findings[key].loop.title}", fontsize="medium")
+        figure, ax = plt.subplots(figsize=(7.4, 5), layout="constrained")
+        describing_function_plot(
+            findings[key].response, ax=ax, label="PID", point_label="%.4g N @ %.4g rad/s"
+        )
+        ax.set_title(f"PID and -1/N(a, ω) [N/m]: {findings[key].loop.title}", fontsize="medium")
         return figure
 
     return draw

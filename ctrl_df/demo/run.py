@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import time
 from pathlib import Path
 
@@ -32,7 +33,9 @@ def run(folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     begin = time.perf_counter()
     print("Azenha & Machado (1997), checked. F1, x1: fundamental amplitudes of force and position.")
-    print("(The first run after installation compiles for a minute or two; the result is kept.)\n", flush=True)
+    print(
+        "(The first run after installation compiles for a minute or two; the result is kept.)\n", flush=True
+    )
     findings: dict[str, Finding] = {}
     rows = []
     for loop in paper_loops():
@@ -43,8 +46,11 @@ def run(folder: Path) -> list[Path]:
     head = ("paper's claim", "describing function", "exact", "simulated")
     print(wrapped_table(head, rows, WIDTHS))
     print("\nWhere the paper holds, and where it does not:")
+    lessons: dict[str, list[str]] = {}
     for loop in paper_loops():
-        print(f"- {loop.title}. {loop.lesson}")
+        lessons.setdefault(loop.lesson, []).append(loop.title)
+    for lesson, titles in lessons.items():
+        print(textwrap.fill(f"- {'; '.join(titles)}. {lesson}", 120, subsequent_indent="  "))
     print(_GENERAL, flush=True)
 
     # pictures into files: no window, whatever the machine's display

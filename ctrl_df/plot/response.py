@@ -51,7 +51,9 @@ def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None) -> 
         axis.margins(x=0.01)
         axis.spines[["top", "right"]].set_visible(False)
     if any(labels):
-        axes[0].legend(frameon=False, fontsize="small", ncols=len(runs), loc="lower left", bbox_to_anchor=(0, 1.0))
+        axes[0].legend(
+            frameon=False, fontsize="small", ncols=len(runs), loc="lower left", bbox_to_anchor=(0, 1.0)
+        )
     if title:
         figure.suptitle(title, fontsize="medium")
     return ct.ControlPlot(lines, axes.reshape(2, 1), figure)

@@ -1,0 +1,117 @@
+"""The command line: answers, JSON, errors of one line with exit code 2, the demo's pictures."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from ctrl_df.cli import main
+from ctrl_df.model_file import EXAMPLE, read_model
+
+FIGURES = ("fig3", "fig4", "fig5", "fig7", "fig8", "fig9", "fig10")
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(EXAMPLE)
+    return path
+
+
+def test_example_of_the_help_is_the_papers_friction_loop(model):
+    read = read_model(model)
+    assert read.plant.parameters["coulomb.level"].value == 5.0
+    assert read.plant.mass == 9.0
+    assert read.omega[[0, -1]] == pytest.approx([4, 40])
+    assert read.columns["output_unit"] == "mm"
+
+
+def test_list_of_effects_is_the_same_model(tmp_path, model):
+    other = tmp_path / "list.toml"
+    listed = EXAMPLE.replace("[effects.coulomb] ", '[[effects]]\nid = "coulomb"\n')
+    other.write_text(listed.replace("[effects.viscous]", '[[effects]]\nid = "viscous"'))
+    assert read_model(other).plant == read_model(model).plant
+
+
+def test_limit_cycles_as_text_and_json(model, capsys):
+    assert main(["limit-cycles", str(model)]) == 0
+    text = capsys.readouterr().out
+    assert "13.79212" in text and "verdict" in text
+    assert main(["limit-cycles", str(model), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    exact = [c["exact"] for c in answer["cycles"] if c["exact"]]
+    assert exact[0]["omega"] == pytest.approx(13.792124, abs=1e-5)
+    assert exact[0]["stable"] is False
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("mass = 9.0 ", "mass = -9.0 ", ["mass > 0", "-9.0"]),
+        ("mass = 9.0 ", "", ["needs mass"]),
+        ("effects.coulomb", "effects.coulom", ["effect id", "coulom"]),
+        ("level = 5.0", "levl = 5.0", ["levl", "level"]),
+        ("level = 5.0", 'level = "five"', ["level", "five"]),
+        ('kind = "mass"', 'kind = "wheel"', ["two_mass", "wheel"]),
+        ("kp = 2000.0", "kq = 2000.0", ["kq", "kp"]),
+        ("omega = [4.0, 40.0]", "omega = [40.0, 4.0]", ["low < high"]),
+        ("omega = [4.0, 40.0]", "omega = [nan, 4.0]", ["low < high"]),
+        ("[plant]", "[plant", ["TOML"]),
+        ("[box]", "[bocks]", ["bocks", "box"]),
+    ],
+)
+def test_bad_model_is_one_line_and_exit_code_2(model, capsys, old, new, words):
+    assert old in EXAMPLE
+    model.write_text(EXAMPLE.replace(old, new))
+    assert main(["limit-cycles", str(model)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.startswith("ctrl-df: error:") and captured.err.count("\n") == 1
+    assert captured.out == ""
+    for word in words:
+        assert word in captured.err
+
+
+def test_missing_files_are_one_line(tmp_path, model, capsys):
+    assert main(["limit-cycles", str(tmp_path / "none.toml")]) == 2
+    assert main(["improve", str(tmp_path / "none.csv"), "--model", str(model)]) == 2
+    assert main(["improve", "x.csv", "--model", str(model), "--report", str(tmp_path / "no" / "x.html")]) == 2
+    assert capsys.readouterr().err.count("\n") == 3
+
+
+def test_no_command_shows_usage(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 2
+    with pytest.raises(SystemExit) as stop:
+        main(["limit-cycles", "--help"])
+    assert stop.value.code == 0
+    assert "[effects.coulomb]" in capsys.readouterr().out
+
+
+def test_demo_prints_the_exact_answers_and_draws_the_figures(tmp_path, capsys):
+    out = tmp_path / "pictures"
+    assert main(["demo", "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    # figures of the table of exact answers, digits as printed (cells are wrapped, numbers are not)
+    for number in ("13.792124", "8.600097", "11.628680", "13.175267", "14.733968", "156.045031"):
+        assert number in text, number
+    assert "paper's claim" in text and "grows without bound" in text
+    names = [p.name for p in out.glob("*.png")]
+    for figure in FIGURES:
+        assert any(n.startswith(figure) for n in names), figure
+    for path in out.glob("*.png"):
+        data = path.read_bytes()
+        width, height = struct.unpack(">II", data[16:24])
+        assert data[:8] == b"\x89PNG\r\n\x1a\n" and width > 600 and height > 400
+        import matplotlib.image as image
+
+        pixels = image.imread(path)[..., :3]
+        assert 0.003 < np.mean(pixels.min(axis=-1) < 0.6) < 0.6, path.name  # neither empty nor a blot
+
+
+def test_demo_refuses_a_file_as_directory(tmp_path, capsys):
+    path = tmp_path / "taken"
+    path.write_text("")
+    assert main(["demo", "--out", str(path)]) == 2
+    assert "directory" in capsys.readouterr().err
