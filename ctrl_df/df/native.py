@@ -1,7 +1,8 @@
 """Calling compiled code through its address.
 
-numba links what a function calls into it and optimises the whole again; with an engine inside, every caller would
-take half a minute to compile. Called through its address, the engine is compiled once and its callers in seconds.
+numba links what a function calls into it and optimises the whole again; with an engine inside, every caller
+would take half a minute to compile. Called through its address, the engine is compiled once and its callers
+in seconds.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from numba.extending import intrinsic
 
 
 def native_address(function, arguments) -> int:
-    """Return the address of a dispatcher's code for such arguments, compiled or loaded from the cache if need be."""
+    """Return the address of a dispatcher's code for such arguments, compiled now if need be."""
     signature = tuple(numba.typeof(a) for a in arguments)
     function.compile(signature)
     result = function.overloads[signature]
@@ -21,7 +22,7 @@ def native_address(function, arguments) -> int:
 
 @intrinsic
 def call_native(typingctx, address, arguments):
-    """Call a compiled function that returns an int64 at an address of `native_address`; `arguments` is a tuple."""
+    """Call the function at an address of `native_address` with a tuple of arguments; it returns an int64."""
     if not isinstance(arguments, types.BaseTuple):
         return None
     sig = types.int64(types.int64, arguments)
@@ -31,7 +32,9 @@ def call_native(typingctx, address, arguments):
         arguments = [builder.extract_value(values[1], i) for i in range(len(argument_types))]
         kind = context.call_conv.get_function_type(types.int64, argument_types)
         callee = builder.inttoptr(values[0], kind.as_pointer())
-        status, result = context.call_conv.call_function(builder, callee, types.int64, argument_types, arguments)
+        status, result = context.call_conv.call_function(
+            builder, callee, types.int64, argument_types, arguments
+        )
         with builder.if_then(status.is_error, likely=False):
             context.call_conv.return_status_propagate(builder, status)
         return result

@@ -1,8 +1,8 @@
 """What a system's laws leave unchanged, found by asking them: oddness, free positions, free speeds.
 
-A shooting method needs to know which states must repeat (a free mass may be anywhere), whether half a period tells
-the whole one (odd laws), and whether the laws depend on time at all. Lists of known effects would not hold for
-effects that users write; the compiled rates are evaluated at random states instead.
+A shooting method needs to know which states must repeat (a free mass may be anywhere), whether half a
+period tells the whole one (odd laws), and whether the laws depend on time at all. Lists of known effects
+would not hold for effects that users write; the compiled rates are evaluated at random states instead.
 """
 
 from __future__ import annotations
@@ -175,13 +175,13 @@ def find_symmetries(engine: Engine, block=None) -> Symmetries:
             offset, odd = trial, True
             break
     return Symmetries(
-        transform, np.linalg.inv(transform), odd, offset, np.flatnonzero(free), wrap, positions, inertial, lower, upper,
-        low, high, power, _autonomous(probe, samples), shifts,
+        transform, np.linalg.inv(transform), odd, offset, np.flatnonzero(free), wrap, positions, inertial,
+        lower, upper, low, high, power, _autonomous(probe, samples), shifts,
     )  # fmt: skip
 
 
 def _unmoved(probe, samples, direction, shift, rate=None, tol=_TOL):
-    """Whether a shift of some states changes no rate and no margin (but `rate`: the rates that shift along)."""
+    """Whether a shift of some states changes no margin and no rate (but `rate`, which shifts along)."""
     for x, u, (dx, g, _) in samples:
         other, other_g, _ = probe.at(x + shift * direction, u)
         expected = dx if rate is None else dx + shift * rate
@@ -206,7 +206,7 @@ def _is_odd(probe, samples, offset):
 
 
 def _on_motor(gaps):
-    """The mirror about the load instead of the motor."""
+    """Return the mirror about the load instead of the motor."""
     offset = np.zeros_like(gaps)
     at = np.flatnonzero(gaps)
     offset[at + 2] = -gaps[at]

@@ -1,0 +1,322 @@
+"""The search for one forced periodic orbit: transient, Newton's method, and what to try when it fails."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+
+from ..blocks.mechanism import Mechanism
+from ..simulate import driver, layout, pointers
+from ..simulate.engine import Engine, State, harmonic_drive
+from ..simulate.layout import EVENT_KINDS
+from ..status import Status
+from . import shooting
+from .shooting import CLOSED, SPENT, close_orbit
+from .shot import make_shot, place, shoot
+from .sweep import floor
+from .symmetries import Probe, find_symmetries
+
+RTOL = 5e-10
+_COARSE = 1e-7  # tolerance while a transient is followed
+LONGEST = 12  # periods of a subharmonic motion that is recognised
+BLOCKS = 8  # an average's spread is estimated from that many parts
+BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
+TOUCH = BIT["impact"] | BIT["contact"] | BIT["release"]
+
+
+class OrbitSearch:
+    """Finds forced periodic orbits of one block; `ctrl_df.df.orbits` names them.
+
+    Parameters
+    ----------
+    block : ct.NonlinearIOSystem or LTI system
+        One input.
+    output : str or int
+        Output described, the first by default.
+    transient, averages, max_steps : int
+        As in `ctrl_df.df.orbits.orbit_family`.
+    """
+
+    def __init__(self, block, output=None, *, transient=4, averages=64, max_steps=200_000):
+        self.transient, self.averages, self.max_steps = (
+            int(transient),
+            max(int(averages), BLOCKS),
+            int(max_steps),
+        )
+        self.block = block
+        if block.ninputs != 1:
+            raise ValueError(
+                f"a describing function needs one input; {block.name} has {block.ninputs}. "
+                "Fix the others inside the block."
+            )
+        self.row = _row(block, output)
+        self.delay, self.offset = 0.0, 0.0
+        self.engine = Engine(self._without_transparent(block))
+        prog = self.engine.program
+        if np.any(prog.nodes[:, layout.KIND] == layout.SAMPLED):
+            raise ValueError(
+                f"forced periodic orbits need continuous time; {block.name} holds a sampled system, whose "
+                "ticks have no common period with the forcing. Take its continuous equivalent here."
+            )
+        pointers.raised.clear()
+        self.symmetries = s = find_symmetries(self.engine, block)
+        self._check(s)
+        self.symmetric = s.odd
+        self.shot = make_shot(self.engine, s, self.row + 1)
+        self.mechanisms = [n for n in prog.nodes if n[layout.KIND] == layout.MECHANISM]
+        self.inertia = sum(
+            prog.par[n[layout.PAR] + b] for n in self.mechanisms for b in range(prog.ints[n[layout.AUX]])
+        ) or 1.0  # fmt: skip
+        self.free_row = self._row_is_free(s)
+        self.quantized = bool(np.any(prog.nodes[:, layout.KIND] == layout.QUANTIZER))
+        self.gap = any(prog.par[n[layout.PAR] + layout.P_GAP] > 0 for n in self.mechanisms)
+        self.contacts = self.gap or any(
+            prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms
+        )
+        self.previous: State | None = None
+        self._given: State | None = None
+        self.forget()
+
+    def _without_transparent(self, block):
+        """Delays turn the phase, offset and drift move the mean: all exactly, outside the simulation."""
+        if isinstance(block, ct.TransferFunction):
+            return ct.ss(block)
+        if not isinstance(block, Mechanism):
+            return block
+        rounded = any(e.id == "sensor_quantization" for e in block.effects)
+        kept = []
+        for effect in block.effects:
+            if effect.id == "input_delay":
+                self.delay += effect.delay
+            elif effect.id == "sensor_delay":
+                self.delay += effect.delay if self.row == 0 else 0.0
+            elif effect.id == "sensor_offset" and not rounded:
+                self.offset += effect.offset if self.row == 0 else 0.0
+            elif effect.id != "drift":
+                kept.append(effect)
+        return (
+            type(block)._make(block._values, kept, block.measured)
+            if len(kept) < len(block.effects)
+            else block
+        )
+
+    def _check(self, s):
+        if not s.autonomous:
+            raise ValueError(
+                "a describing function needs laws that do not depend on time itself; "
+                f"those of {self.block.name} do. Make the time-dependent signal an input."
+            )
+        if pointers.raised and not np.any(np.isfinite(self._rates(np.zeros(self.engine.nstates)))):
+            raise user_error(self.block, pointers.raised[-1])
+        pointers.raised.clear()
+
+    def _rates(self, x, force=0.0):
+        return Probe(self.engine).at(x, force)[0]
+
+    def _row_is_free(self, s):
+        """Whether the output described shifts with a free position."""
+        probe, x = Probe(self.engine), np.zeros(self.engine.nstates)
+        at_zero = probe.at(x, 0.0)[2][self.row]
+        return any(probe.at(x + 3.7 * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
+
+    def forget(self):
+        """Start the next point from rest."""
+        self.previous = None
+        self.shot.jacobian[:] = np.nan
+        self.shot.size[:] = 0.0
+
+    # --- the search -----------------------------------------------------------------------------------------
+
+    def _aim(self, A, omega):
+        self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
+        self.drive = harmonic_drive([[0.0, A]], omega)
+        self.atol = floor(self.symmetries.power, self.inertia, A, omega)
+
+    def _hmax(self, orders):
+        """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic.
+
+        Impacts are located on the interpolant of a step, which is less exact than its end.
+        """
+        return min(1 / 16 if self.contacts else 1 / 8, 9 / 8 / orders)
+
+    def _start(self, A):
+        """At rest, a joint off its faces; the sizes of the states from the motion of a free inertia."""
+        n = self.engine.nstates
+        y = np.zeros(n)
+        for node in self.mechanisms:
+            if self.engine.program.ints[node[layout.AUX]] == 2:
+                y[node[layout.X] + 2] = 0.3 * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
+        state = self._state(y)
+        self._resize(A)
+        return state
+
+    def _resize(self, A):
+        n = self.engine.nstates
+        self.shot.space[6][:] = (
+            1e-3 * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
+        )
+        self.shot.size[:n] = 0.0
+        self.shot.scale[:] = 1e-13
+        self.shot.jacobian[:] = np.nan
+
+    def _state(self, y, mode=None):
+        """State at coordinates y."""
+        x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
+        place(self.shot, np.array(y, float), x, mode)
+        return State(0.0, x, mode)
+
+    def _nudged(self, state):
+        """Return the state a little off: no motion stays on a repelling orbit by the grace of rounding."""
+        y = self.symmetries.transform @ state.x
+        y[self.symmetries.free] += 1e-3 * self.shot.size[self.symmetries.free]
+        return self._state(y, state.mode)
+
+    def _follow(self, state, periods, rtol=_COARSE):
+        """Return the state after some periods (twice as many shots where mirrored)."""
+        state = state.copy()
+        for _ in range(periods * 2 if self.mirrored else periods):
+            self._shoot(state, rtol)
+        return state
+
+    def _shoot(self, state, rtol=RTOL, periods=1, spectrum=None):
+        """One shot of the state, in place."""
+        shot = self.shot
+        orders = 1 if spectrum is None else spectrum.shape[1] - 1
+        if not shot.clock[2] > 0.0 or shot.clock[2] > 0.1 * self.period:
+            shot.clock[2] = 0.02 * self.period
+        reason = shoot(
+            shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
+            self._hmax(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum, self.budget,
+        )  # fmt: skip
+        self.budget -= int(shot.clock[3])
+        self._raise_if_raised()
+        if reason != driver.DONE or self.budget <= 0 or not np.all(np.isfinite(state.x)):
+            raise self._stopped(reason, state)
+        return int(shot.tally[2])
+
+    def _span(self, periods):
+        return self.period / 2 if self.mirrored else periods * self.period
+
+    def _periodic(self, state, periods=1, orders=9):
+        """Newton on the shot; (state, mismatch) of an attracting orbit, or None; its integrals are kept."""
+        state, shot = state.copy(), self.shot
+        spectrum = np.zeros((self.row + 1, orders + 1), complex)
+        shot.jacobian[:] = np.nan
+        shot.clock[2] = 0.02 * self.period
+        outcome, miss = close_orbit(
+            shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, RTOL, self.atol,
+            self._hmax(orders) * self.period, spectrum, self.budget, 24, False,
+        )  # fmt: skip
+        self.budget -= int(shot.clock[3]) * 4
+        self._raise_if_raised()
+        if outcome == SPENT or outcome == shooting.FAILED:
+            raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
+        if outcome != CLOSED:
+            return None
+        gained = np.abs(shot.trial[1][self.symmetries.inertial]) if not self.mirrored else np.zeros(0)
+        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
+            raise OutOfWork(
+                Status.DIVERGED
+            )  # nothing ties the mechanism to the ground, and something pushes it
+        if self.quantized:  # the harmonics of the centred motion
+            self._shoot(state.copy(), RTOL, periods, spectrum)
+        self.integrals, self.ends = spectrum[self.row], shot.ends[:, self.row].copy()
+        self.kinds, self.still = int(shot.tally[2]), bool(shot.tally[5])
+        return state, miss
+
+    def _touching(self, orders):
+        """Look for an orbit whose bodies touch, for a block with a gap that was found swinging freely
+        within it.
+
+        A motion without contact coexists with others at moderate force and is what a centred start leads
+        to. Returns the orbit or None, and a state from which the bodies keep touching or None.
+        """
+        prog, keeps = self.engine.program, None
+        node = next(m for m in self.mechanisms if prog.par[m[layout.PAR] + layout.P_GAP] > 0)
+        at, gap = node[layout.X], prog.par[node[layout.PAR] + layout.P_GAP]
+        speed = gap * self.omega + self.A / (prog.par[node[layout.PAR] + layout.P_M0 + 1] * self.omega)
+        for face, leaving in ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2)):
+            self.mirrored = self.symmetric
+            y = np.zeros(self.engine.nstates)
+            y[at + 2], y[at + 3] = face * gap, leaving * speed
+            self._resize(self.A)
+            state = self._follow(self._state(y), 20)
+            if not self.shot.tally[2] & TOUCH:
+                continue
+            orbit = self._periodic(state, orders=orders)
+            if orbit is None and self.symmetric:
+                self.mirrored = False
+                state = self._follow(self._nudged(state), 30)
+                if not self.shot.tally[2] & TOUCH:
+                    continue
+                orbit = self._periodic(state, orders=orders)
+            if orbit is not None and self.kinds & TOUCH:
+                return orbit, state
+            if orbit is None:
+                keeps = state if keeps is None else keeps
+        return None, keeps
+
+    def _stop_if_running_away(self, y):
+        """Raise where a state grows out of all bounds, or a speed steadily: nothing holds the mass back."""
+        half = len(y) // 2
+        if np.max(np.abs(y[-1])) > 100 * np.max(np.abs(y[half])) > 1e4 * np.max(np.abs(y[0])):
+            raise OutOfWork(Status.DIVERGED)
+        for i in np.flatnonzero(self.symmetries.power == 1):
+            early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
+            spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
+            if (
+                abs(early) > 1e-3 * self.A / (self.inertia * self.omega)
+                and abs(late / early - 1) < 1e-3
+                and spread < 0.5 * abs(early / half)
+            ):
+                raise OutOfWork(Status.DIVERGED)
+
+    # --- how a search can fail ------------------------------------------------------------------------
+
+    def _raise_if_raised(self):
+        if pointers.raised:
+            error = pointers.raised[0]
+            pointers.raised.clear()
+            raise user_error(self.block, error)
+
+    def _stopped(self, reason, state):
+        """Return what to raise for a run that ended early."""
+        if reason in (driver.STEPS, driver.DONE, driver.CHATTER, driver.FULL):
+            return OutOfWork(Status.WORK_LIMIT)
+        x = state.x
+        if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < 1e50:
+            force = self.A * np.cos(self.omega * self.shot.clock[0])
+            with np.errstate(all="ignore"):
+                slope = self._rates(x, force)
+                ahead = self._rates(x + slope * 1e-6 * self.period, force)
+            pointers.raised.clear()
+            if not (np.all(np.isfinite(slope)) and np.all(np.isfinite(ahead))):
+                return user_error(self.block, ValueError(f"a law returned NaN or inf near the state {x}"))
+        return OutOfWork(Status.DIVERGED)
+
+
+def user_error(block, error) -> RuntimeError:
+    """Return the one error for a law that raises or returns NaN."""
+    wrapped = RuntimeError(f"{Status.USER_ERROR} (block {block.name}: {error!r})")
+    wrapped.__cause__ = error
+    return wrapped
+
+
+class OutOfWork(Exception):
+    """A point's search ended: the state ran away, or the bound on work was hit."""
+
+    def __init__(self, status):
+        super().__init__(str(status))
+        self.status = status
+        self.regime = "diverged" if status is Status.DIVERGED else "work limit"
+
+
+def _row(block, output) -> int:
+    labels = list(block.output_labels)
+    if output is None:
+        return 0
+    if isinstance(output, int | np.integer) and 0 <= output < len(labels):
+        return int(output)
+    if output in labels:
+        return labels.index(output)
+    raise ValueError(f"output must be one of {', '.join(labels)}; got {output!r}.")

@@ -1,0 +1,103 @@
+"""Orbits of consecutive points, each started from those before."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ..simulate import layout as L
+from ..simulate.layout import Drive
+from .shooting import CLOSED, close_orbit
+from .shot import coordinates, place
+
+
+@njit(cache=True, error_model="numpy")
+def sweep(
+    shot, samples, coefficients, amplitudes, omegas, power, inertia, past, past_mode, known, mirrored, rtol, hmax,
+    budget, out, ends, miss, kinds, still,
+):  # fmt: skip
+    """Close the orbits of consecutive points, each started from those before; stop where one does not close.
+
+    `past` (4, n): scaled states of the points before, newest first, `known` of them, and the step size
+    relative to the period in ``past[3, 0]``; `past_mode` the newest modes. `coefficients`: (1, nh) scratch
+    of the drive. Returns points done, outcome of the last, points known.
+    """
+    n = power.shape[0]
+    x, mode, y = np.zeros(n), past_mode.copy(), np.zeros(n)
+    eager = False
+    before = -1
+    for p in range(amplitudes.shape[0]):
+        A, omega = amplitudes[p], omegas[p]
+        coefficients[0, 1] = A
+        drive = Drive(samples.time, samples.samples, samples.linear, coefficients, omega, samples.address)
+        # grids are even, linearly or in ratios: extrapolate in their index
+        for j in range(n):
+            value = past[0, j]
+            if known == 2:
+                value = 2.0 * past[0, j] - past[1, j]
+            elif known >= 3:
+                value = 3.0 * (past[0, j] - past[1, j]) + past[2, j]
+            x[j] = value * unit(power[j], A, omega)
+        mode[:] = past_mode
+        coordinates(shot, x, y)
+        _snap(shot, y, mode)
+        place(shot, y, x, mode)
+        period = 2.0 * math.pi / omega
+        shot.clock[2] = past[3, 0] * period
+        shot.tally[0] = 0
+        outcome, miss[p] = close_orbit(
+            shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol,
+            floor(power, inertia, A, omega), hmax * period, out[p], budget, 12, eager,
+        )  # fmt: skip
+        past[3, 0] = min(shot.clock[2] / period, 0.1)
+        if outcome != CLOSED:
+            return p, outcome, known
+        eager = shot.tally[0] <= 2
+        kinds[p] = shot.tally[2]
+        still[p] = shot.tally[5]
+        ends[p] = shot.ends
+        for j in range(n):
+            past[2, j] = past[1, j]
+            past[1, j] = past[0, j]
+            past[0, j] = x[j] / unit(power[j], A, omega)
+        past_mode[:] = mode
+        known = min(known + 1, 3)
+        if kinds[p] != before:
+            known = 1
+        before = kinds[p]
+    return amplitudes.shape[0], CLOSED, known
+
+
+@njit(cache=True, error_model="numpy")
+def unit(power, A, omega):
+    """Return what a state is measured in on a sweep: the motion of a free inertia under the force."""
+    return A / omega**power
+
+
+@njit(cache=True, error_model="numpy")
+def floor(power, inertia, A, omega):
+    """Absolute tolerance: far below the motion of a free inertia, but above the rounding of its positions."""
+    highest = 0
+    for j in range(power.shape[0]):
+        highest = max(highest, power[j])
+    return 1e-12 * unit(highest, A, omega) / inertia
+
+
+@njit(cache=True, error_model="numpy")
+def _snap(shot, y, mode):
+    """Contacts stay contacts when a state is scaled."""
+    prog = shot.prog
+    for k in range(prog.nodes.shape[0]):
+        if prog.nodes[k, L.KIND] != L.MECHANISM:
+            continue
+        at, first = prog.nodes[k, L.MODE], prog.nodes[k, L.X]
+        if prog.ints[prog.nodes[k, L.AUX] + L.A_JOINT] == L.J_IMPACT and mode[at + L.JOINT] != 0:
+            y[first + 2] = prog.par[prog.nodes[k, L.PAR] + L.P_GAP] if mode[at + L.JOINT] > 0 else 0.0
+            y[first + 3] = 0.0
+        if mode[at + L.WALL] != 0:
+            driven = first + 2 * (prog.ints[prog.nodes[k, L.AUX]] - 1)
+            stop = shot.high[driven] if mode[at + L.WALL] > 0 else shot.low[driven]
+            y[first] = stop if driven == first else stop - y[first + 2]
+            y[first + 1] = 0.0
