@@ -39,7 +39,7 @@ def run(folder: Path) -> list[Path]:
     findings: dict[str, Finding] = {}
     rows = []
     for loop in paper_loops():
-        finding = find(loop)
+        finding = find(loop, list(findings.values()))
         findings[loop.key] = finding
         claim, predicted, exact, simulated = finding.cells()
         rows.append((f"{loop.title}:\n{claim}", predicted, exact, simulated))

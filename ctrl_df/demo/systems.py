@@ -137,7 +137,7 @@ def paper_loops() -> list[PaperLoop]:
             BACKLASH_BOX,
             "a limit cycle, almost chaotic; larger errors, above all in amplitude",
             (0.009,),
-            200.0,
+            500.0,
             "Half of it: the irregular 14 rad/s motion of Fig. 10 is real but dies out. What remains is a rattle "
             "within the gap eleven times as fast, which the crossing near 126 rad/s announces and misplaces by 19 %.",
             search=False,
