@@ -254,16 +254,13 @@ def simulation() -> None:
 def imports() -> None:
     """Import time beyond python-control's, and the first family of a fresh process."""
 
-    def fresh(code):
-        begin = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True)
-        return time.perf_counter() - begin
-
-    control, both = [], []
-    for _ in range(7):
-        control.append(fresh("import control"))
-        both.append(fresh("import control, ctrl_df"))
-    extra = statistics.median(both) - statistics.median(control)
+    timed = "import time, control; t = time.perf_counter(); import ctrl_df; print(time.perf_counter() - t)"
+    extra = statistics.median(
+        float(
+            subprocess.run([sys.executable, "-c", timed], check=True, capture_output=True, text=True).stdout
+        )
+        for _ in range(7)
+    )
     row("import ctrl_df beyond import control", f"{extra:.3f} s", "0.3 s", extra <= 0.3)
     code = (
         "import time, numpy as np, ctrl_df as cdf; t = time.perf_counter();"
