@@ -234,7 +234,7 @@ def run(
                 )
             if not error < math.inf:
                 h = 0.2 * length
-                if h < 1e-13 * max(abs(t), 1e-3):
+                if not h >= 1e-13 * max(abs(t), 1e-3):
                     reason = NAN
                 continue
             if error > 1.0:
