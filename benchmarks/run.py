@@ -253,7 +253,6 @@ def simulation() -> None:
 
 def imports() -> None:
     """Import time beyond python-control's, and the first family of a fresh process."""
-
     timed = "import time, control; t = time.perf_counter(); import ctrl_df; print(time.perf_counter() - t)"
     extra = statistics.median(
         float(

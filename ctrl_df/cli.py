@@ -81,7 +81,7 @@ def _limit_cycles(options) -> int:
     if model.amplitudes is None:
         raise ValueError(f"{model.path} needs a section [box] (amplitude, omega: each [low, high]).")
     response = describing_function_response(model.controller, model.plant, model.amplitudes, model.omega)
-    check = verify(response, loop=closed_loop(model.controller, model.plant, model.dt))
+    check = verify(response, loop=closed_loop(model.controller, model.plant, dt=model.dt))  # type: ignore[arg-type]
     if options.json:
         _print_json(
             {
@@ -144,7 +144,7 @@ def _subject(model: ModelFile):
         return model.plant
     from .simulate.loop import closed_loop
 
-    return closed_loop(model.controller, model.plant, model.dt)
+    return closed_loop(model.controller, model.plant, model.dt)  # type: ignore[arg-type]
 
 
 def _study(study) -> dict[str, Any]:

@@ -64,7 +64,7 @@ class Finding:
             return "not periodic: the sampler's clock and the motion have no common period"
         lines = []
         for row in self.check.rows:
-            if row.verdict == NONE:
+            if row.verdict == NONE and row.predicted is not None:
                 lines.append(f"none near {row.predicted.omega:.2f} rad/s")
             elif row.exact is not None and row.exact.status.ok:
                 o = row.exact
@@ -86,7 +86,7 @@ def find(loop: PaperLoop, known: list[Finding] | None = None) -> Finding:
     """Predict, verify and simulate one loop; a prediction for the same plant is taken from `known` findings."""
     same = [f.response for f in known or () if f.loop.plant == loop.plant and f.loop.box is loop.box]
     response = same[0] if same else describing_function_response(loop.controller, loop.plant, *loop.box)
-    system = closed_loop(loop.controller, loop.plant, loop.dt)
+    system = closed_loop(loop.controller, loop.plant, dt=loop.dt)  # type: ignore[arg-type]
     check = verify(response, loop=system, search=loop.search) if not loop.dt else None
     runs = [(start, simulate(loop, start)) for start in loop.starts]
     return Finding(loop, response, check, runs)
@@ -94,13 +94,13 @@ def find(loop: PaperLoop, known: list[Finding] | None = None) -> Finding:
 
 def simulate(loop: PaperLoop, start: float, time: float | None = None, step: float = 2e-3) -> EventResponse:
     """Run the closed loop from rest, displaced by `start` [m], integral empty."""
-    system = closed_loop(loop.controller, loop.plant, loop.dt)
+    system = closed_loop(loop.controller, loop.plant, dt=loop.dt)  # type: ignore[arg-type]
     state = np.zeros(system.nstates)
     for i, label in enumerate(system.state_labels):
         if label in ("plant_x", "plant_x_motor"):
             state[i] = start
     times = np.arange(0.0, loop.time if time is None else time, step)
-    return event_response(system, times, 0, state, keep_events=False)
+    return event_response(system, times, 0, state, keep_events=False)  # type: ignore[arg-type]
 
 
 def ending(run: EventResponse) -> str:

@@ -82,7 +82,7 @@ def paper_loops() -> list[PaperLoop]:
             "a limit cycle; omega predicted well, amplitude less so",
             (0.0040, 0.0043), 12.0,
             "Does not hold: the only orbit is unstable, a boundary between decay and growth, and the second "
-            "crossing has no orbit at all. What Fig. 5 shows is the slow drift beside that boundary. The frequency "
+            "crossing has no orbit at all. Fig. 5 can only show the slow drift beside that boundary. The frequency "
             "of the boundary is right to 0.8 %.",
         )
     ]  # fmt: skip
