@@ -273,9 +273,8 @@ class OrbitFinder:
             orbit = self._from_state(states[-1], times[-1] - times[-1 - laps_per_period])
             if orbit is not None and orbit.status.ok and orbit.output_amplitude > 1e-6 * np.max(size):
                 return orbit
-        tenth = max(len(peaks) // 10, 2)
-        trend = np.mean(peaks[-tenth:]) / np.mean(peaks[-2 * tenth : -tenth])
-        if not 0.9 < trend < 1.1:
+        half = len(peaks) // 2
+        if len(laps) < swings or not 0.8 < np.mean(peaks[half:]) / np.mean(peaks[:half]) < 1.25:
             return None  # on its way to rest, or away
         return self._averaged(x0, times, laps)
 
