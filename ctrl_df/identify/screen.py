@@ -64,6 +64,7 @@ class Start:
 
     effect: object
     left: float
+    values: tuple[tuple[str, float], ...] = ()  # baseline parameters that go with it
 
 
 def make_screen(base: Fitted, runs, scales) -> Screen:
@@ -118,7 +119,8 @@ def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
     for effect in _proposals(cls, screen):
         found += _judged(effect, screen, total)
     found.sort(key=lambda s: s.left)
-    chosen: list[Start] = []
+    chosen: list[Start] = list(_regressed(cls, screen))
+    keep += len(chosen)
     for start in found:
         if all(_apart(start.effect, other.effect) for other in chosen):
             chosen.append(start)
@@ -162,6 +164,65 @@ def _apart(a, b):
     return any(
         abs(x - y) > 0.25 * max(abs(x), abs(y), 1e-300) for x, y in zip(a.values, b.values, strict=True)
     )
+
+
+def _regressed(cls, screen) -> Iterator[Start]:
+    """Yield start values for Stribeck friction and the baseline together, by regression of the force on motion.
+
+    The refitted baseline has bent its own friction towards the truth as far as it could; the right start lies
+    elsewhere for all parameters at once.
+    """
+    if cls is not library.Stribeck:
+        return
+    s = screen.scales
+    names = {"mass", "coulomb.level", "viscous.coefficient"} & set(screen.block.parameters)
+    if "mass" not in names or screen.block.core.bodies > 1:
+        return
+    scored = []
+    for speed in s.speed * np.array([0.04, 0.08, 0.15, 0.3, 0.6]):
+        weights, left = force_regression(
+            screen.runs, s, lambda v, speed=speed: np.sign(v) * np.exp(-np.square(v / speed)), friction=names
+        )
+        scored.append((left, speed, weights))
+    _, speed, w = min(scored, key=lambda x: x[0])
+    mass, kinetic, viscous, extra = w
+    if mass <= 0 or extra <= 0:
+        return
+    values = {"mass": mass, "coulomb.level": max(kinetic, 0.01 * s.force), "viscous.coefficient": max(viscous, 1e-3 * s.force / s.speed)}
+    kinetic = values["coulomb.level"] if "coulomb.level" in names else 0.0
+    yield Start(library.Stribeck(kinetic + extra, speed), 0.0, tuple((k, v) for k, v in values.items() if k in names))
+
+
+def force_regression(runs, scales, shape=None, friction=("coulomb.level", "viscous.coefficient")):
+    """Regress the force on acceleration, direction, speed (and a further shape of speed) where the mass moves.
+
+    Returns
+    -------
+    weights : array
+        mass [kg], Coulomb level [N], viscous coefficient [N s/m], weight of the shape [N]; 0 for those left out.
+    left : float
+        Mean squared force that remains [N^2].
+    """
+    rows, forces = [], []
+    for run in runs:
+        dt = float(np.median(np.diff(run.t)))
+        a = np.gradient(run.v, dt)
+        moving = np.abs(run.v) > 0.03 * scales.speed
+        moving[:5] = moving[-5:] = False
+        v = run.v[moving]
+        columns = [
+            a[moving],
+            np.sign(v) * ("coulomb.level" in friction),
+            v * ("viscous.coefficient" in friction),
+            np.zeros(len(v)) if shape is None else shape(v),
+        ]
+        rows.append(np.column_stack(columns))
+        forces.append(run.u[moving])
+    matrix, force = np.concatenate(rows), np.concatenate(forces)
+    size = np.linalg.norm(matrix, axis=0)
+    size[size == 0] = 1.0
+    weights = np.linalg.lstsq(matrix / size, force, rcond=None)[0] / size
+    return weights, float(np.mean((force - matrix @ weights) ** 2))
 
 
 # --- proposals ------------------------------------------------------------------------------------

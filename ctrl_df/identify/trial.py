@@ -316,12 +316,14 @@ class _Problem:
         limit = np.where(np.arange(len(z)) < len(self.coords), 0.7, 30.0)
         for _ in range(iterations):
             jacobian = self.jacobian(z, ys, e)
-            normal, gradient = jacobian @ jacobian.T, jacobian @ e
+            # A start that the data do not feel (at rest, friction holds) is kept near its estimate.
+            ridge = np.where(np.arange(len(z)) < len(self.coords), 0.0, cost / len(e) / 100.0)
+            normal, gradient = jacobian @ jacobian.T + np.diag(ridge), jacobian @ e + ridge * z
             diagonal = np.diag(normal) + 1e-12 * (np.max(np.diag(normal)) + 1e-300)
             accepted = None
             for _ in range(5):
                 move = -np.linalg.solve(normal + damping * np.diag(diagonal), gradient)
-                move /= max(1.0, float(np.max(np.abs(move) / limit)))
+                move = np.clip(move, -limit, limit)
                 trial = self.outputs(z + move)
                 if trial is not None:
                     errors = self.errors(trial)
