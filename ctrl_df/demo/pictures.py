@@ -90,7 +90,9 @@ def _figure_8(_):
         family = describing_function_family(plant, np.array([20.0]), np.geomspace(5, 60, 80))
         plot_harmonics(family, ax=ax)
         ax.set_title(f"restitution {restitution}", fontsize="medium")
-    axes[0].set_ylabel("|X_k| / a  [m/N]")
+    axes[0].set_ylabel(r"$|X_k|\,/\,a$ [m/N]")
+    axes[1].set_ylabel("")
+    axes[0].set_ylim(bottom=1e-8)
     figure.suptitle("Fig. 8: harmonic content of the load's position, a = 20 N", fontsize="medium")
     return figure
 
