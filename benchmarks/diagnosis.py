@@ -72,7 +72,11 @@ def run_pair(pair, seed):
     """Return whether both of two hidden effects end up in the model."""
     rig = rigs.draw(pair, seed, **options(seed))
     study = improve(
-        rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free=free_of(rig), max_effects=3
+        rig.baseline,
+        rig.train[0].measurement(),
+        rig.holdout[0].measurement(),
+        free=free_of(rig),
+        max_effects=3,
     )
     named = set(study.effects)
     for step in study.steps:
@@ -154,8 +158,13 @@ def main(arguments=None):
     none = [run_none(d, s) for d in (rigs.draw_none, rigs.draw_wrong_parameters) for s in seeds]
     print(f"| nothing hidden: none | {np.mean(none):.0%} | | | | |")
     outside = [run_outside(k, s) for k in rigs.OUTSIDE for s in seeds]
-    print(f"| outside the library: unknown | {np.mean([o[0] for o in outside]):.0%} | | | | region {np.mean([o[1] for o in outside]):.0%} |")
-    pairs = [("position_ripple", "input_delay"), ("stribeck", "linear_spring"), ("backlash", "input_saturation")]
+    seen, placed = (np.mean([o[i] for o in outside]) for i in (0, 1))
+    print(f"| outside the library: unknown | {seen:.0%} | | | | region {placed:.0%} |")
+    pairs = [
+        ("position_ripple", "input_delay"),
+        ("stribeck", "linear_spring"),
+        ("backlash", "input_saturation"),
+    ]
     both = [run_pair(p, s) for p in pairs[: args.pairs] for s in seeds]
     print(f"| two effects: both | {np.mean(both):.0%} | | | | |")
 

@@ -24,7 +24,7 @@ SIGNIFICANT = 20.0
 _SAMPLES = 2000  # of a record while screening
 _CONFIRM = 6
 # Effects whose error has many valleys over long windows: short ones first.
-_CURVED = frozenset({"stribeck", "stiction", "bristle", "backlash", "compliance"})
+_CURVED = frozenset({"stribeck", "stiction", "bristle", "backlash", "compliance", "position_ripple"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +302,9 @@ class _Study:
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
         for tried in found[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
-            again = fit(with_values(self.base.block, values), self.coarse, self.free, self.scales, iterations=10)
+            again = fit(
+                with_values(self.base.block, values), self.coarse, self.free, self.scales, iterations=10
+            )
             if again.rms < self.base.fitted.rms:
                 self.base = _Tried("", again, 0)
                 self._hold(self.base, self.coarse_held)
@@ -358,7 +360,8 @@ class _Study:
         ]
         thin = max(thinning(self.held, 10_000), 1) if self.held else 1
         fine_held = [
-            windowed(as_run(r, thin), len(old.windows)) for r, old in zip(self.held, self.coarse_held, strict=True)
+            windowed(as_run(r, thin), len(old.windows))
+            for r, old in zip(self.held, self.coarse_held, strict=True)
         ]
         base = self._polish(self.base, fine, fine_held)
         chosen = [self._polish(t, fine, fine_held) for t in found[:_CONFIRM]]
@@ -369,7 +372,9 @@ class _Study:
 
     def _polish(self, tried, runs, held):
         free = tried.fitted.names
-        better = fit(tried.block, runs, free, self.scales, starts=tried.fitted.starts, iterations=3, tolerance=1e-3)
+        better = fit(
+            tried.block, runs, free, self.scales, starts=tried.fitted.starts, iterations=3, tolerance=1e-3
+        )
         new = _Tried(tried.effect_key, better, tried.extra, confirmed=True)
         self._hold(new, held, tried.held.starts if tried.held is not None else None)
         return new
@@ -403,12 +408,16 @@ class _Study:
         ranking = []
         for i, t in enumerate(chosen):
             alike = tuple(o.effect_key for j, o in enumerate(chosen) if j != i and self._alike(t, o))
-            ranking.append(self._entry(t, self.errors(t, self.fine, self.fine_held), float(weights[i]), alike))
+            ranking.append(
+                self._entry(t, self.errors(t, self.fine, self.fine_held), float(weights[i]), alike)
+            )
         for t in rest:
             ranking.append(self._entry(t, self.errors(t, self.coarse, self.coarse_held), 0.0, ()))
         first = ranking[0] if ranking else None
         significant = (
-            first is not None and first.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * base_errors[1]
+            first is not None
+            and first.evidence > SIGNIFICANT
+            and first.nrmse_holdout < 0.995 * base_errors[1]
         )
         if self._unexplained(noise, structure, structure0):
             verdict = UNKNOWN
@@ -473,11 +482,17 @@ def _fit_one(start: Start, screen, free, runs, scales) -> _Tried | None:
     if block is None:
         return None
     key = list(block._keys)[-1]
-    own = [f"{key}.{n}" for n, p in start.effect.parameters.items() if p.free and f"{key}.{n}" in block.parameters]
+    own = [
+        f"{key}.{n}"
+        for n, p in start.effect.parameters.items()
+        if p.free and f"{key}.{n}" in block.parameters
+    ]
     rough = "sensor_quantization" in key
     names = (*free, *(() if rough else own))
     if start.effect.id in _CURVED:
         short = [windowed(r, 4 * len(r.windows)) for r in runs]
         block = fit(block, short, names, scales, iterations=8, tolerance=3e-3).block
-    fitted = fit(block, runs, names, scales, starts=screen.base.starts, iterations=1 if rough else 12, tolerance=1e-3)
+    fitted = fit(
+        block, runs, names, scales, starts=screen.base.starts, iterations=1 if rough else 12, tolerance=1e-3
+    )
     return _Tried(start.effect.id, fitted, len(own))

@@ -53,6 +53,8 @@ def next_experiment(diagnosis, *, force=None, stroke=None, duration=None, dt=Non
     duration, dt : float or None
         [s]; None: as the first record.
 
+    Without a stroke given, twice the stroke of the first record is allowed.
+
     Returns
     -------
     Experiment or None
@@ -65,7 +67,7 @@ def next_experiment(diagnosis, *, force=None, stroke=None, duration=None, dt=Non
     given = diagnosis.limits
     force = float(force or given.get("force") or np.max(np.abs(record.u)))
     centre = float(record.y[0])
-    reach = float(stroke or given.get("stroke") or np.max(np.abs(record.y - centre)))
+    reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(record.y - centre)))
     duration, dt = float(duration or record.duration), float(dt or record.dt)
     if not (force > 0 and reach > 0 and duration > 20 * dt):
         raise ValueError(
@@ -75,19 +77,18 @@ def next_experiment(diagnosis, *, force=None, stroke=None, duration=None, dt=Non
     models += [c.model for c in remaining]
     names = tuple(c.id for c in remaining)
     t = dt * np.arange(int(round(duration / dt)))
+    scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
     best = None
     for kind, shape in _shapes(t, record).items():
-        for size in (1.0, 0.6, 0.35, 0.15):
+        for size in (1.0, 0.8, 0.6, 0.45, 0.35, 0.25, 0.15):
             u = force * size * shape
-            run = as_run(record._with(t=t, u=u, y=np.zeros_like(t), velocity=None, channels={}), max(1, len(t) // 2500))
+            run = as_run(record._with(t=t, u=u, y=scale, velocity=None, channels={}), max(1, len(t) // 2500))
             start = np.array([[centre, 0.0, 0.5]])
             ys = [simulate(m, run, start) for m in models]
             far = max(float(np.max(np.abs(y - centre))) for y in ys)
             if not np.isfinite(far) or far > reach * 1.0001:
                 continue
-            gaps = [
-                math.sqrt(float(np.mean((a - b) ** 2))) for i, a in enumerate(ys) for b in ys[i + 1 :]
-            ]
+            gaps = [math.sqrt(float(np.mean((a - b) ** 2))) for i, a in enumerate(ys) for b in ys[i + 1 :]]
             separation = min(gaps) / max(diagnosis.noise, 1e-300)
             if best is None or separation > best.separation:
                 best = Experiment(t, u, kind, names, separation, far, "")
@@ -119,9 +120,10 @@ def _shapes(t, record):
     chirp = np.sin(2 * math.pi * low * span / rate * (np.exp(rate * t / span) - 1))
     # each period + - - +: neither speed nor place is left over
     quarter = np.floor(4 * t * 0.5 * f0) % 4
-    pulses = np.where((quarter == 0) | (quarter == 3), 1.0, -1.0) * (0.4 + 0.6 * rng.uniform(size=400))[
-        np.floor(t * 0.5 * f0).astype(int) % 400
-    ]
+    pulses = (
+        np.where((quarter == 0) | (quarter == 3), 1.0, -1.0)
+        * (0.4 + 0.6 * rng.uniform(size=400))[np.floor(t * 0.5 * f0).astype(int) % 400]
+    )
     triangle = 2 / math.pi * np.arcsin(np.cos(2 * math.pi * 0.4 * f0 * t))
     return {
         "multisine": sum_of_sines / np.max(np.abs(sum_of_sines)), "chirp": chirp, "steps": pulses, "triangle": triangle,

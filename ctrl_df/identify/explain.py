@@ -23,7 +23,9 @@ def named(effect) -> str:
 
 def values_of(effect) -> str:
     """Return fitted parameters as text with units."""
-    return ", ".join(f"{k.replace('_', ' ')} {p.value:.4g} {p.unit}".rstrip() for k, p in effect.parameters.items())
+    return ", ".join(
+        f"{k.replace('_', ' ')} {p.value:.4g} {p.unit}".rstrip() for k, p in effect.parameters.items()
+    )
 
 
 def explain(diagnosis, structure0) -> str:
@@ -33,7 +35,8 @@ def explain(diagnosis, structure0) -> str:
     if d.verdict == "none":
         return (
             f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} (held out "
-            f"{d.nrmse_holdout:.2%}), which is the noise of these data. No effect of the library improves on it beyond chance."
+            f"{d.nrmse_holdout:.2%}), which is the noise of these data. "
+            "No effect of the library improves on it beyond chance."
         )
     places = d.where.significant[:2] if d.where is not None else ()
     where = " ".join(r.sentence for r in places)
@@ -47,7 +50,11 @@ def explain(diagnosis, structure0) -> str:
     size = f"{d.nrmse:.2%} to {first.nrmse:.2%} (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
     same = ""
     if first.equivalents:
-        same = " On these data the same map as " + ", ".join(e.replace("_", " ") for e in first.equivalents) + "."
+        same = (
+            " On these data the same map as "
+            + ", ".join(e.replace("_", " ") for e in first.equivalents)
+            + "."
+        )
     if d.verdict == "effect":
         sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
         return (

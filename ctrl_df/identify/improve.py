@@ -103,7 +103,10 @@ class Study:
         """Return the outcome in plain words."""
         first, last = self.steps[0], self.steps[-1]
         if self.verdict == NONE:
-            head = f"Nothing is missing: with refitted parameters the model errs by {first.nrmse:.2%}, the noise of these data."
+            head = (
+                f"Nothing is missing: with refitted parameters the model errs by {first.nrmse:.2%}, "
+                "the noise of these data."
+            )
         else:
             added = ", ".join(e.replace("_", " ") for e in self.effects) or "nothing"
             head = (
@@ -176,17 +179,40 @@ def improve(
         block = diagnosis.model
         values = {k: p.value for k, p in block.parameters.items()}
         steps.append(
-            Step(effect, dropped, block, diagnosis.nrmse, diagnosis.nrmse_holdout, evidence, values, same, diagnosis)
+            Step(
+                effect,
+                dropped,
+                block,
+                diagnosis.nrmse,
+                diagnosis.nrmse_holdout,
+                evidence,
+                values,
+                same,
+                diagnosis,
+            )
         )
         best = diagnosis.ranking[0] if diagnosis.ranking else None
-        if best is None or best.evidence < SIGNIFICANT or best.nrmse_holdout > _LESS * diagnosis.nrmse_holdout:
+        if (
+            best is None
+            or best.evidence < SIGNIFICANT
+            or best.nrmse_holdout > _LESS * diagnosis.nrmse_holdout
+        ):
             break
         effect, evidence, same = best.id, best.evidence, best.equivalents
         block, dropped = _without_idle(best.model, start, study, best, names)
-    spread = math.sqrt(sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records)))
+    spread = math.sqrt(
+        sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records))
+    )
     verdict = UNKNOWN if diagnosis.verdict == UNKNOWN else NONE if len(steps) == 1 else "effect"
     return Study(
-        tuple(steps), steps[-1].model, verdict, diagnosis.noise / spread, start, records, held, time.perf_counter() - began
+        tuple(steps),
+        steps[-1].model,
+        verdict,
+        diagnosis.noise / spread,
+        start,
+        records,
+        held,
+        time.perf_counter() - began,
     )
 
 

@@ -13,7 +13,8 @@ _PAGE = Template("""<!doctype html>
 <title>$title</title>
 <style>
 :root { --ink: #1b2430; --soft: #5b6675; --line: #dfe4ea; --blue: #1f4e9c; --paper: #fff; }
-body { font: 16px/1.55 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: var(--ink); background: #f4f6f8; margin: 0; }
+body { font: 16px/1.55 system-ui, "Segoe UI", Arial, sans-serif; color: var(--ink); background: #f4f6f8;
+  margin: 0; }
 main { max-width: 960px; margin: 0 auto; padding: 2.5rem 1.5rem 4rem; background: var(--paper); }
 h1 { font-size: 1.75rem; line-height: 1.2; margin: 0 0 .3rem; }
 h2 { font-size: 1.15rem; margin: 2.4rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
@@ -85,7 +86,15 @@ def _steps(study):
         name = "+ " + s.effect.replace("_", " ") if s.effect else "start, refitted"
         name += "".join(f"; {d.replace('_', ' ')} became idle and was dropped" for d in s.dropped)
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
-        rows.append([name, f"{s.nrmse:.3%}", f"{s.nrmse_holdout:.3%}", f"{s.evidence:,.0f}" if s.effect else "–", same])
+        rows.append(
+            [
+                name,
+                f"{s.nrmse:.3%}",
+                f"{s.nrmse_holdout:.3%}",
+                f"{s.evidence:,.0f}" if s.effect else "–",
+                same,
+            ]
+        )
     rows.append(["noise floor", f"{study.noise:.3%}", "", "", ""])
     return _table(["Step", "Error", "Held out", "Evidence", "Same on these data"], rows, numeric=(1, 2, 3))
 
@@ -98,7 +107,9 @@ def _section(number, step):
     body = [f"<h2>{html.escape(title)}</h2>", f"<p>{html.escape(d.explanation)}</p>"]
     body.append(_picture(d.plot, "Held-out error of every candidate"))
     if d.where is not None and d.where.significant:
-        body.append("<ul>" + "".join(f"<li>{html.escape(r.sentence)}</li>" for r in d.where.significant[:4]) + "</ul>")
+        body.append(
+            "<ul>" + "".join(f"<li>{html.escape(r.sentence)}</li>" for r in d.where.significant[:4]) + "</ul>"
+        )
     return "\n".join(body)
 
 

@@ -188,9 +188,15 @@ def _regressed(cls, screen) -> Iterator[Start]:
     mass, kinetic, viscous, extra = w
     if mass <= 0 or extra <= 0:
         return
-    values = {"mass": mass, "coulomb.level": max(kinetic, 0.01 * s.force), "viscous.coefficient": max(viscous, 1e-3 * s.force / s.speed)}
+    values = {
+        "mass": mass,
+        "coulomb.level": max(kinetic, 0.01 * s.force),
+        "viscous.coefficient": max(viscous, 1e-3 * s.force / s.speed),
+    }
     kinetic = values["coulomb.level"] if "coulomb.level" in names else 0.0
-    yield Start(library.Stribeck(kinetic + extra, speed), 0.0, tuple((k, v) for k, v in values.items() if k in names))
+    yield Start(
+        library.Stribeck(kinetic + extra, speed), 0.0, tuple((k, v) for k, v in values.items() if k in names)
+    )
 
 
 def force_regression(runs, scales, shape=None, friction=("coulomb.level", "viscous.coefficient")):
@@ -270,8 +276,14 @@ def _kinetic(block):
 
 def _stiction(screen):
     kinetic, force = _kinetic(screen.block), screen.scales.force
-    levels = {kinetic * f for f in (1.03, 1.08, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0)} if kinetic > 0.01 * force else set()
-    return [library.Stiction(x) for x in sorted(levels | {0.1 * force, 0.3 * force, 0.6 * force}) if x > kinetic]
+    levels = (
+        {kinetic * f for f in (1.03, 1.08, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0)}
+        if kinetic > 0.01 * force
+        else set()
+    )
+    return [
+        library.Stiction(x) for x in sorted(levels | {0.1 * force, 0.3 * force, 0.6 * force}) if x > kinetic
+    ]
 
 
 def _stribeck(screen):

@@ -62,7 +62,7 @@ def _cut(edges) -> Windows:
 def windowed(run: Run, count: int | None = None) -> Run:
     """Cut a run into windows of about two to-and-fro motions, or into `count`, each with a start of its own."""
     n, span = len(run.t), run.t[-1] - run.t[0]
-    count = count or int(min(max(round(span / max(2.5 * facts(run.record).swing, 60 * span / n)), 1), 40))
+    count = count or int(min(max(round(span / max(2.5 * facts(run.record).swing, 60 * span / n)), 4), 40))
     return replace(run, windows=_cut(np.linspace(0, n, count + 1).astype(int)))
 
 
@@ -93,7 +93,9 @@ _STARTS = ("x", "v", "slack")
 def with_values(block, values):
     """`block.with_parameters` with static levels kept at or above the kinetic one."""
     values = dict(values)
-    static = [k for k, e in zip(block._keys, block.effects, strict=True) if isinstance(e, Stiction | Stribeck)]
+    static = [
+        k for k, e in zip(block._keys, block.effects, strict=True) if isinstance(e, Stiction | Stribeck)
+    ]
     if static:
         # lift the static levels out of the way, read the kinetic one, then put them back above it
         table = block.parameters
@@ -263,7 +265,9 @@ class _Problem:
         at, moved = len(self.coords), []
         for s, n in zip(self.starts, self.counts, strict=True):
             new = s.copy()
-            new[:, : self.kinds] += z[at : at + self.kinds * n].reshape(n, self.kinds) * self.sizes[: self.kinds]
+            new[:, : self.kinds] += (
+                z[at : at + self.kinds * n].reshape(n, self.kinds) * self.sizes[: self.kinds]
+            )
             new[:, 2] = np.clip(new[:, 2], 0.0, 1.0)
             moved.append(new)
             at += self.kinds * n

@@ -36,10 +36,18 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
         ax.text(x - 0.19, a * 1.05, f"{a:.3g}", ha="center", fontsize=8)
         ax.text(x + 0.19, b * 1.05, f"{b:.3g}", ha="center", fontsize=8)
     ax.text(at[0] - 0.19, train[0] * 0.8, "train", ha="center", va="top", fontsize=8, rotation=90)
-    ax.text(at[0] + 0.19, held[0] * 0.8, "held out", ha="center", va="top", fontsize=8, rotation=90, color="w")
+    ax.text(
+        at[0] + 0.19, held[0] * 0.8, "held out", ha="center", va="top", fontsize=8, rotation=90, color="w"
+    )
     ax.text(at[-1] + 0.45, 100 * study.noise, "noise", va="top", ha="right", fontsize=8)
     names = ["refitted", *("+ " + s.effect.replace("_", " ") for s in steps[1:])]
-    ax.set_xticks(at, [n + "".join(f"\n- {d.replace('_', ' ')}" for d in s.dropped) for n, s in zip(names, steps, strict=True)])
+    ax.set_xticks(
+        at,
+        [
+            n + "".join(f"\n- {d.replace('_', ' ')}" for d in s.dropped)
+            for n, s in zip(names, steps, strict=True)
+        ],
+    )
     ax.set_ylabel("Error [% of the output's rms]")
     ax.spines[["top", "right"]].set_visible(False)
     fig.suptitle("Error of every step" if title is None else title, fontsize=11)

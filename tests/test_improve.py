@@ -1,0 +1,67 @@
+"""The ladder: it climbs, it stops, it reports."""
+
+import re
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+import rigs
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+
+from ctrl_df.identify.experiment import next_experiment
+from ctrl_df.identify.improve import improve
+
+FEW = ("constant_force", "linear_spring", "input_delay")
+
+
+@pytest.fixture(scope="module")
+def study():
+    rig = rigs.draw(("linear_spring", "input_delay"), 21, snr_db=60)
+    return rig, improve(
+        rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), candidates=FEW
+    )
+
+
+def test_both_effects_are_found(study):
+    rig, found = study
+    assert set(found.effects) == {"linear_spring", "input_delay"}
+    assert found.verdict == "effect"
+    errors = [s.nrmse_holdout for s in found.steps]
+    assert errors[-1] < 1.3 * rig.holdout[0].noise / np.std(rig.holdout[0].y)
+    assert all(a > b for a, b in zip(errors[:-1], errors[1:], strict=True))
+    assert found.model.parameters["linear_spring.stiffness"].value == pytest.approx(
+        rig.truth["linear_spring.stiffness"], rel=0.05
+    )
+
+
+def test_the_report_stands_alone(study, tmp_path):
+    path = tmp_path / "report.html"
+    study[1].report(path)
+    text = path.read_text(encoding="utf-8")
+    assert "linear spring" in text and "data:image/png;base64," in text
+    assert not re.search(r'(src|href)="(?!data:)', text)
+
+
+def test_pictures_show_every_step(study):
+    drawn = study[1].plot()
+    assert len(drawn.lines[0]) == len(study[1].steps)
+    plt.close("all")
+    drawn = study[1].steps[0].diagnosis.plot()
+    assert len(drawn.lines[0]) == 1 + len(study[1].steps[0].diagnosis.ranking)
+    plt.close("all")
+
+
+def test_an_experiment_keeps_its_limits(study):
+    diagnosis = study[1].steps[0].diagnosis
+    plan = next_experiment(diagnosis, force=2.0 * np.max(np.abs(study[0].train[0].u)))
+    t, u = plan
+    assert len(t) == len(u) and np.max(np.abs(u)) <= 2.0 * np.max(np.abs(study[0].train[0].u))
+    assert plan.separation > 0 and plan.reason
+
+
+def test_summary_tells_the_outcome(study):
+    text = study[1].summary()
+    assert "held-out" in text and "noise floor" in text
