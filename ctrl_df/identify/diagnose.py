@@ -324,11 +324,15 @@ class _Study:
     # every effect, coarsely
 
     def candidates(self, classes, executor):
-        screen = make_screen(self.base.fitted, self.coarse, self.scales)
+        # Start values are read off short windows: there even a strong effect changes the output nearly linearly.
+        short = [windowed(r, 4 * len(r.windows)) for r in self.coarse]
+        near = fit(self.base.block, short, self.free, self.scales, iterations=6)
+        screen = make_screen(near, short, self.scales)
         kinds = [c for c in classes if applicable(c, screen.block)]
         run = map if executor is None else executor.map
         jobs = [(cls, screen, self.free, self.coarse, self.scales) for cls in kinds]
-        fitted = [t for t in run(_try, jobs) if t is not None]
+        span = max(float(np.ptp(r.y)) for r in self.coarse)
+        fitted = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
         for tried in fitted:
             self._hold(tried, self.coarse_held)
         self._judge(fitted, self.base)
@@ -462,6 +466,11 @@ class _Study:
         )  # fmt: skip
 
 
+def _periodic_enough(tried, span) -> bool:
+    """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
+    return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+
+
 def _try(job) -> _Tried | None:
     """Fit one effect class from its best start values (a job of its own, for executors)."""
     cls, screen, free, runs, scales = job
@@ -490,9 +499,8 @@ def _fit_one(start: Start, screen, free, runs, scales) -> _Tried | None:
     rough = "sensor_quantization" in key
     names = (*free, *(() if rough else own))
     if start.effect.id in _CURVED:
-        short = [windowed(r, 4 * len(r.windows)) for r in runs]
-        block = fit(block, short, names, scales, iterations=8, tolerance=3e-3).block
-    fitted = fit(
-        block, runs, names, scales, starts=screen.base.starts, iterations=1 if rough else 12, tolerance=1e-3
-    )
+        block = fit(
+            block, screen.runs, names, scales, starts=screen.base.starts, iterations=8, tolerance=3e-3
+        ).block
+    fitted = fit(block, runs, names, scales, iterations=1 if rough else 12, tolerance=1e-3)
     return _Tried(start.effect.id, fitted, len(own))
