@@ -184,9 +184,9 @@ def diagnose(
 
     records = as_records(data, "data")
     if any(isinstance(r, FrequencyMeasurement) for r in records):
-        from .frequency_diagnosis import diagnose_frequency
-
-        return diagnose_frequency(model, records, candidates=candidates)
+        raise NotImplementedError(
+            "diagnose needs records over time (Measurement); a FrequencyMeasurement cannot be diagnosed yet."
+        )
     held = as_records(holdout, "holdout") if holdout is not None else ()
     block = block_of(model)
     free = free_names(block, free)
