@@ -1,0 +1,1 @@
+"""Limit cycles: predicted, graded, traced exactly and verified."""

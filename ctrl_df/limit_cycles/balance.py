@@ -25,10 +25,11 @@ _ROUNDS, _MEMORY = 40, 8
 
 @dataclass(frozen=True)
 class Balance:
-    """The outcome: corrected amplitude and frequency, or None with the reason."""
+    """The outcome: corrected amplitude and frequency with the block's input as Fourier coefficients, or why there is none."""
 
     solution: tuple[float, float] | None
     reason: str = ""
+    waveform: np.ndarray | None = None
 
 
 def balance(respond: Callable, harmonics: int, linear, amplitude, omega, jacobian) -> Balance:
@@ -68,9 +69,9 @@ def balance(respond: Callable, harmonics: int, linear, amplitude, omega, jacobia
         if np.abs(x - start).max() > 1.5:
             return Balance(None, "with its harmonics the cycle moves out of reach")
         if np.abs(step).max() < 1e-5:
-            return Balance((float(np.exp(x[0])), float(np.exp(x[1]))))
+            return Balance((float(np.exp(x[0])), float(np.exp(x[1]))), waveform=U)
     if abs(D) < 1e-3:
-        return Balance((float(np.exp(x[0])), float(np.exp(x[1]))))
+        return Balance((float(np.exp(x[0])), float(np.exp(x[1]))), waveform=U)
     return Balance(None, "with its harmonics no cycle is found near")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -56,6 +56,8 @@ class LimitCycle:
         The reason, a sentence.
     regime : str
         What the block does there.
+    waveform : ndarray of complex or None
+        Fourier coefficients k = 0, 1, ... of the block's input on that corrected cycle.
     corrected : tuple of float or None
         (amplitude, omega) with the fed-back harmonics taken into account, for memoryless blocks.
     bound : tuple or None
@@ -75,6 +77,7 @@ class LimitCycle:
     why: str
     regime: str = ""
     corrected: tuple[float, float] | None = None
+    waveform: np.ndarray | None = field(default=None, repr=False, compare=False)
     bound: tuple[tuple[float, float], tuple[float, float]] | None = None
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -39,9 +40,9 @@ class LinearPart:
                 f"H must have one input and one output; got {H.ninputs} inputs, {H.noutputs} outputs. "
                 "Select one channel, H[i, j]."
             )
-        self.H = H
+        self.H: Any = H  # control's stubs know less of it than it can
         self.measured = isinstance(H, ct.FrequencyResponseData)
-        self.dt = 0.0 if not H.isdtime(strict=True) else (1.0 if H.dt is True else float(H.dt))
+        self.dt = 0.0 if not H.isdtime(strict=True) else (1.0 if H.dt is True else float(self.H.dt))
         self.top = math.pi / self.dt if self.dt else math.inf
         self.bottom = 0.0
         if self.measured:

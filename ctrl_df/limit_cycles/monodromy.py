@@ -10,6 +10,7 @@ a body sticks, and is singular where the margin is grazed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class Tracer:
         """Return the state with its modes in line (no time passes)."""
         return self.engine.run(state, state.time, self.drive, rtol=RTOL).state
 
-    def rate(self, t, x, mode, margins=False):
+    def rate(self, t, x, mode, margins=False) -> Any:
         """Rates of a state in a mode; with `margins` the event margins too."""
         dx = np.zeros(self.n)
         rates(self.engine.program, self.drive, 0, t, x, mode, self._work, dx, self._g, margins)
@@ -94,7 +95,7 @@ class Tracer:
                 node = self.engine.node_names[self._owner(run.margin)]
                 if differentiate:
                     saltation, transversal = self._saltation(run, now.mode, size)
-                    grazing = min(grazing, transversal)
+                    grazing = float(min(grazing, transversal))
                     phi = saltation @ phi
             segments.append(Segment(now, span, kind, node, saltation))
             now = run.state
@@ -147,7 +148,7 @@ class Tracer:
         return reset + np.outer(f_plus - reset @ f_minus, normal) / speed, transversal
 
     def _reset(self, run, mode, size):
-        """Derivative of the jump at the event, by differences of the engine's own event map."""
+        """Differentiate the jump at the event, by differences of the engine's own event map."""
         columns = []
         for j in range(self.n):
             h = 1e-6 * size[j]

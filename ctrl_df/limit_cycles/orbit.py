@@ -128,11 +128,11 @@ class OrbitFinder:
     def __init__(self, loop, max_iterations=40):
         if not isinstance(loop, ct.NonlinearIOSystem):
             raise TypeError(f"find_limit_cycle needs a loop, e.g. closed_loop(pid, block); got {type(loop).__name__}.")
-        self.loop = loop
+        self.loop: Any = loop
         self.engine = Engine(loop)
         self.tracer = Tracer(self.engine)
         self.max_iterations = max_iterations
-        self.parts = getattr(loop, "parts", None)
+        self.parts: Any = getattr(loop, "parts", None)
         self.sampled = bool(getattr(self.parts, "dt", 0))
         self.force_row = self.engine.noutputs - 1
 
@@ -153,33 +153,40 @@ class OrbitFinder:
         if self.sampled:
             return self._from_simulation(start)
         orbit = self._from_state(start, 2 * np.pi / omega)
+        better, waveform = getattr(guess, "corrected", None), getattr(guess, "waveform", None)
+        if orbit is None and better is not None and waveform is not None:
+            orbit = self._from_state(self.harmonic_start(waveform, better[1]), 2 * np.pi / better[1])
         return orbit if orbit is not None else self._from_simulation(start)
 
-    def harmonic_start(self, amplitude: float, omega: float, output_amplitude=None) -> np.ndarray:
-        """State of the loop when its block moves as under ``amplitude cos(omega t)``, at t = 0."""
+    def harmonic_start(self, amplitude, omega: float, output_amplitude=None) -> np.ndarray:
+        """State of the loop at t = 0 when its block is driven by ``amplitude cos(omega t)``.
+
+        `amplitude` may be an array of Fourier coefficients U_k of the block's input, k = 0, 1, ...
+        """
         if self.parts is None:
             raise ValueError(
                 "a guess of amplitude and frequency needs a loop made by closed_loop; give a state instead, or no guess."
             )
-        x_block, y1, v1 = self._forced_motion(amplitude, omega, output_amplitude)
+        U = np.array([0.0, amplitude], complex) if np.ndim(amplitude) == 0 else np.asarray(amplitude, complex)
+        x_block, Y = self._forced_motion(U, omega, output_amplitude)
         controller = self.loop.syslist[0]
         nc = controller.nstates or 0
         x_control = np.zeros(nc)
         if nc and isinstance(controller, ct.StateSpace):
-            error = np.array([-y1, v1])[: controller.ninputs]
             a, b = np.asarray(controller.A), np.asarray(controller.B)
-            x_control = np.real(np.linalg.solve(1j * omega * np.eye(nc) - a, b @ error))
+            for k in range(1, len(Y)):
+                inputs = np.array([-Y[k], 1j * k * omega * Y[k]])[: controller.ninputs]
+                x_control = x_control + np.real(np.linalg.solve(1j * k * omega * np.eye(nc) - a, b @ inputs))
         return np.concatenate([x_control, x_block])
 
-    def _forced_motion(self, amplitude, omega, wanted=None):
-        """Block alone under the guessed input: its state at phase 0, mean position removed, fundamentals of x and v.
+    def _forced_motion(self, U, omega, wanted=None):
+        """Block alone under the guessed input: its state at t = 0, mean position removed, and its output's coefficients.
 
         Several motions may coexist; the one nearest to the output amplitude wanted is taken, else the largest.
         """
-        block = self.parts.block
+        block, amplitude = self.parts.block, abs(U[1])
         if not block.nstates:
-            y1 = complex(describing_function(block, amplitude)) * amplitude
-            return np.zeros(0), y1, 1j * omega * y1
+            return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])
         engine = Engine(block)
         core = getattr(block, "core", None)
         starts = [np.zeros(engine.nstates)]
@@ -195,26 +202,28 @@ class OrbitFinder:
                     x[3] = speed * core.gap * omega
                     x[1] = -core.masses[1] / core.masses[0] * x[3]  # no net momentum: the pair must not drift away
                     starts.append(x)
-        found = [self._forced_from(engine, core, x, amplitude, omega) for x in starts]
+        found = [self._forced_from(engine, core, x, U, omega) for x in starts]
         if wanted is not None:
-            x, y1 = min(found, key=lambda f: abs(abs(f[1]) - wanted))
-        else:
-            x, y1 = max(found, key=lambda f: abs(f[1]))
-        return x, y1, 1j * omega * y1
+            return min(found, key=lambda f: abs(abs(f[1][1]) - wanted))
+        return max(found, key=lambda f: abs(f[1][1]))
 
     @staticmethod
-    def _forced_from(engine, core, x0, amplitude, omega, periods=40):
-        drive, period = harmonic_drive([[0.0, amplitude]], omega), 2 * np.pi / omega
-        options = dict(rtol=1e-8, max_step=period / 8, log=1, max_steps=200_000)
+    def _forced_from(engine, core, x0, U, omega, periods=40):
+        drive, period = harmonic_drive([U], omega), 2 * np.pi / omega
+        options = dict(rtol=1e-8, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=400_000)
         state = engine.run(engine.start(x0), periods * period, drive, **options).state
         if not np.all(np.isfinite(state.x)):
-            return np.zeros(engine.nstates), 0.0
+            return np.zeros(engine.nstates), np.zeros(2, complex)
         state.time, state.fresh = 0.0, True
-        spectrum = np.zeros((engine.noutputs, 2), complex)
-        x = engine.run(state, period, drive, spectrum=spectrum, omega=omega, **options).state.x.copy()
+        spectrum = np.zeros((engine.noutputs, len(U)), complex)
+        run = engine.run(state, period, drive, np.array([0.0, period]), spectrum=spectrum, omega=omega, **options)
+        x, Y = run.state.x.copy(), 2 * spectrum[0] / period
+        drift = run.outputs[-1, 0] - run.outputs[0, 0]
+        k = np.arange(1, len(U))
+        Y[1:] -= 1j * drift / (np.pi * k)
         if core is not None:
-            x[: 2 * core.bodies : 2] -= spectrum[0, 0].real / period
-        return x, 2 * spectrum[0, 1] / period
+            x[: 2 * core.bodies : 2] -= Y[0].real / 2 + drift / 2
+        return x, Y
 
     def search(self, search_time=None) -> list[Orbit]:
         """Orbits that simulations from kicks of many sizes end on."""
@@ -283,17 +292,18 @@ class OrbitFinder:
         engine = self.engine
         state = engine.start(x0)
         watch = self._output_signal()
-        laps, quiet = [], 0
+        laps, quiet, work = [], 0, 0
+        bound = 1e4 * max(float(np.max(np.abs(k))) for k in [x0, *self._kicks()])
         limit = search_time if search_time is not None else np.inf
         while len(laps) < count and state.time < limit:
             # ahead in bounded strides: a loop at rest never crosses again
             t_end = min(state.time + self._stride(laps), limit)
             run = engine.run(state, t_end, rtol=1e-8, watch=watch, direction=1, log=1, max_steps=400_000)
-            state = run.state
-            if not run.status.ok or not np.all(np.isfinite(state.x)):
+            state, work = run.state, work + run.steps
+            if not run.status.ok or not np.max(np.abs(state.x)) < bound:
                 return []
-            if np.max(np.abs(state.x)) > 1e9 * (1 + np.max(np.abs(x0))):
-                return []
+            if work > 300_000:
+                break
             if run.reason == driver.SECTION:
                 laps.append((state.time, state.x.copy(), float(np.max(np.abs(state.x)))))
                 quiet = 0
@@ -311,7 +321,7 @@ class OrbitFinder:
         return self._time_scale()
 
     def _time_scale(self):
-        """A time within which the loop moves: ten over its fastest plausible rate, from the controller's corner."""
+        """Return a time within which the loop moves: ten over its fastest plausible rate, from the controller's corner."""
         if self.parts is not None:
             omega = _corner_frequency(self.parts)
             if omega:
@@ -381,7 +391,7 @@ class OrbitFinder:
             return None
         return self._finished(start, period, lap, size, Status.CONVERGED if best < 1e-7 else status)
 
-    def _free_state(self, x0, period):
+    def _free_state(self, x0, period) -> tuple[Any, Any]:
         """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
         state = self.engine.start(x0)
         lap = self.tracer.lap(state, period, differentiate=False)
@@ -402,7 +412,7 @@ class OrbitFinder:
         return self.tracer.settle(middle), size
 
     def _constraints(self, mode):
-        """Number of constraints active in a mode: stuck bodies, closed impact joints, walls."""
+        """Count the constraints active in a mode: stuck bodies, closed impact joints, walls."""
         count = 0
         program = self.engine.program
         for node in program.nodes:
@@ -419,12 +429,12 @@ class OrbitFinder:
         return bool(np.max(speed) < 1e-9 * (1e-3 + np.max(np.abs(start.x)))) and bool(np.max(moved) < 1e-9)
 
     def _rebuilt(self, start, x):
-        """The moved start in freshly settled modes; rigid joints kept closed, gaps and stops respected."""
+        """Return the moved start in freshly settled modes; rigid joints kept closed, gaps and stops respected."""
         state = self.tracer.settle(self.engine.start(self.feasible(x)))
         return state if np.all(np.isfinite(state.x)) else None
 
     def feasible(self, x):
-        """The nearest state with rigid joints closed, stretches within gaps and bodies within stops."""
+        """Return the nearest state with rigid joints closed, stretches within gaps and bodies within stops."""
         core = getattr(self.parts.block, "core", None) if self.parts is not None else None
         x = np.array(x, dtype=float)
         if core is None:
@@ -462,7 +472,7 @@ class OrbitFinder:
             run.outputs.T, run.states.T, self.loop,
         )  # fmt: skip
 
-    def _live_states(self):
+    def _live_states(self) -> Any:
         """States the engine moves; a block may carry others for ordinary solvers only."""
         nodes = self.engine.program.nodes
         live = np.zeros(self.engine.nstates, bool)
@@ -471,7 +481,7 @@ class OrbitFinder:
         return np.flatnonzero(live)
 
     def _averaged(self, x0, times, laps, swings=40) -> Orbit | None:
-        """A motion that never quite repeats (sampled or aperiodic): figures averaged over many swings."""
+        """Average the figures of a motion that never quite repeats (sampled or aperiodic) over many swings."""
         if len(times) < 8:
             return None
         count = min(swings, len(times) - 1)
@@ -510,7 +520,7 @@ def _amplitude_omega(guess):
 def _corner_frequency(parts):
     """Frequency at which the controller balances the block's inertia, |H(jw)| = m w^2 [rad/s]."""
     core = getattr(parts.block, "core", None)
-    if core is None or not hasattr(parts.controller, "__call__"):
+    if core is None or not callable(parts.controller):
         return None
     omega = np.geomspace(1e-2, 1e4, 400)
     s = 1j * omega if not getattr(parts.controller, "dt", 0) else np.exp(1j * omega * float(parts.controller.dt))

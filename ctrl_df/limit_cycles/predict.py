@@ -15,7 +15,7 @@ from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 from ..df.describing import _amplitudes, describing_function, describing_function_family, points
 from ..df.dispatch import Method, method_for
 from ..df.family import Family, minus_inverse
-from .balance import balance, responder
+from .balance import Balance, balance, responder
 from .bound import mees_bergen
 from .crossings import Crossing, Scan, find_crossings, linear_zeros
 from .grade import UNRELIABLE, LimitCycle, band, graded, loeb, sensitivity
@@ -319,7 +319,7 @@ class _Assessor:
                 (1, f"H is not measured at {beyond} and above: its last value stood in for the harmonics")
             )
         sense = sensitivity(crossing.jacobian)
-        spread, better, remark = self._spread(crossing, distortion, sense, regime)
+        spread, found, remark = self._spread(crossing, distortion, sense, regime)
         notes += remark
         stable = loeb(crossing.jacobian)
         if self.method.name == "memory":
@@ -344,7 +344,8 @@ class _Assessor:
             grade=grade,
             why=why,
             regime=regime,
-            corrected=better,
+            corrected=found.solution,
+            waveform=found.waveform,
             bound=bound,
         )
 
@@ -364,17 +365,17 @@ class _Assessor:
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
         if self.answer is None or regime in ("aperiodic", "subharmonic"):
-            return spread, None, []
+            return spread, Balance(None), []
         respond, count = self.answer
         found = balance(respond, count, self.linear, a, w, crossing.jacobian)
         if found.solution is None:
             return (
                 spread,
-                None,
+                found,
                 [(2 if "no cycle" in found.reason or "reach" in found.reason else 1, found.reason)],
             )
         shift = abs(math.log(found.solution[0] / a)), abs(math.log(found.solution[1] / w))
-        return tuple(SAFETY * s + FLOOR for s in shift), found.solution, []
+        return tuple(SAFETY * s + FLOOR for s in shift), found, []
 
     def _neighbour(self, crossing) -> bool:
         step_a = np.diff(self.log_a).max(initial=0)

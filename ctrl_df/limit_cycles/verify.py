@@ -88,7 +88,7 @@ class Check:
     def table(self) -> str:
         """Return the rows as text: predicted | exact | simulated, errors and verdict."""
         head = ("predicted a @ w", "exact a @ w", "multiplier", "simulated y @ w", "error a", "error w", "grade", "verdict")
-        lines = [head]
+        lines: list[tuple[str, ...]] = [head]
         for row in self.rows:
             p, e, s = row.predicted, row.exact, row.simulated
             shown = None if row.verdict == NONE else e

@@ -1,0 +1,1 @@
+"""The event-driven engine and the loops it runs."""

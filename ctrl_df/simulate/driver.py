@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """The event-driven run: adaptive steps within a mode, events located as roots of their margins."""
 
 from __future__ import annotations
@@ -135,8 +137,9 @@ def run(
     """Run from clock[0] to t_end; see `ctrl_df.simulate.engine.Engine.run` for the arguments.
 
     ``clock``: [time, next output index, last step size, steps used, events so far, events in this log, segment,
-    on section, margin of the last event]. ``before``: state just before the event that stopped the run. ``scale``: running scale of each margin.
-    ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
+    on section, margin of the last event]. ``before``: state just before the event that stopped the run.
+    ``scale``: running scale of each margin. ``fresh``: 1 to settle modes first (a new state), 0 to go on.
+    ``space``: scratch arrays of `workspace`.
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are added; no
     columns, no integrals. Returns the reason (module constants).
     """
@@ -242,9 +245,6 @@ def run(
                 if t + h == t:
                     reason = TINY
                 continue
-            for j in range(n):
-                # a size that forgets slowly: tolerances do not tighten as a state swings through zero
-                size[j] = max(abs(x1[j]), 0.98 * size[j])
             grow = 5.0 if error == 0.0 else min(5.0, 0.9 * error ** (-1.0 / order))
             h_next = length * max(grow, 0.3)
             if truncated:
@@ -268,7 +268,7 @@ def run(
             if needed:
                 if order == 8:
                     prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
-                    rough = roughness(x1, size, rtol, atol, poly)
+                    rough = roughness(size, rtol, atol, poly)
                     if rough > 1.0:
                         h = length * max(0.3, 0.9 * rough ** (-0.125))
                         continue
@@ -301,6 +301,9 @@ def run(
                     copy(x, x1)
             t = reached
             copy(x1, x)
+            for j in range(n):
+                # a size that forgets slowly: tolerances do not tighten as a state swings through zero
+                size[j] = max(abs(x[j]), 0.98 * size[j])
             h = h_next
             if at < 0:
                 if locate:
@@ -315,6 +318,9 @@ def run(
                     next_tick = next_sample(prog, t)
                     known = False
                 continue
+        if theta < 1.0 and theta * length > 0.0:
+            # a step that ran far beyond its event says little of what follows
+            h = min(h, 3.0 * theta * length)
         # --- an event at (t, x)
         if at == ng - 1:
             blocked = at
@@ -360,7 +366,7 @@ def run(
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _first_step(x, dx, rtol, atol, room, hmax):
-    """A first step from the size of state and rates (Hairer, Norsett & Wanner, II.4, step a)."""
+    """Estimate a first step from the size of state and rates (Hairer, Norsett & Wanner, II.4, step a)."""
     d0 = d1 = 0.0
     for j in range(x.shape[0]):
         scale = atol + rtol * abs(x[j])
@@ -389,14 +395,16 @@ def _locate(
             inner = True
     end_value, end_at = value_right, at
     if inner or value_right < 0.0:
-        pieces = 8 if inner else 1
+        # a margin may have gone below zero and come back before it went again: look from the left
+        pieces = 12
         for p in range(1, pieces + 1):
             theta = p / pieces
             if p == pieces:
                 value, at = end_value, end_at
             else:
                 inside(order, theta, x, poly, xi)
-                margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)  # fmt: skip
+                margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch,
+                        watch_level, watch_sign)  # fmt: skip
                 value, at = _worst(g, gtol, scale, blocked)
             if value < 0.0:
                 right, value_right = theta, value

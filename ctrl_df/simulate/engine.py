@@ -200,8 +200,8 @@ class Engine:
             chunk = min(room, 1_000_000)
             reason = driver.run(
                 self.program, drive, clock, now.x, now.mode, t_end, times, xout, yout, order, rtol, atol, max_step, locate,
-                stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k, before, scale, fresh, self._space,
-                spectrum, omega,
+                stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k, before, scale, fresh,
+                self._space, spectrum, omega,
             )  # fmt: skip
             fresh = 0
             used = min(int(clock[5]), len(log_t))
@@ -213,7 +213,7 @@ class Engine:
         status = _STATUS[reason]
         if pointers.raised:
             status = Status.USER_ERROR
-        events = tuple(np.concatenate(c) for c in zip(*kept, strict=True)) if kept else (log_t[:0], log_n[:0], log_k[:0])
+        events: Any = tuple(np.concatenate(c) for c in zip(*kept, strict=True)) if kept else (log_t[:0], log_n[:0], log_k[:0])
         after = State(
             float(clock[0]), now.x, now.mode, float(clock[2]), int(clock[6]), clock[7] > 0.5, False, scale
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -28,7 +29,7 @@ class Node:
     nout: int
     x: int = 0
     nx: int = 0
-    par: Sequence[float] = ()
+    par: Sequence[float] | np.ndarray = ()
     nmode: int = 0
     ng: int = 0
     aux: Sequence[int] = ()
@@ -118,8 +119,8 @@ def _fold_gains(flat: Flat) -> Flat:
     gain = [n.kind == L.LTI and n.nx == 0 for n in flat.nodes]
     if not any(gain) or all(gain):
         return flat
-    s_gain = np.repeat(gain, [n.nout for n in flat.nodes])
-    u_gain = np.repeat(gain, [n.nin for n in flat.nodes])
+    s_gain: Any = np.repeat(gain, [n.nout for n in flat.nodes])
+    u_gain: Any = np.repeat(gain, [n.nin for n in flat.nodes])
     d = _stack([np.reshape(n.par, (n.nout, n.nin)) for n, g in zip(flat.nodes, gain, strict=True) if g])
     # s_gain = d (us s + ur r), solved for the gains' outputs
     loop = np.eye(d.shape[0]) - d @ flat.us[np.ix_(u_gain, s_gain)]
@@ -140,7 +141,7 @@ def _fold_gains(flat: Flat) -> Flat:
 def _stack(matrices):
     # scipy's block_diag drops the shape of empty blocks of older versions; keep rows and columns apart
     rows, cols = sum(m.shape[0] for m in matrices), sum(m.shape[1] for m in matrices)
-    return block_diag(*matrices).reshape(rows, cols) if rows and cols else np.zeros((rows, cols))
+    return np.asarray(block_diag(*matrices)).reshape(rows, cols) if rows and cols else np.zeros((rows, cols))
 
 
 # --- nodes ------------------------------------------------------------------------------------------------
@@ -152,7 +153,7 @@ def _lti_node(system, x0) -> Node:
             f"event_response runs in continuous time; got a discrete system with dt={system.dt}. "
             "Use closed_loop(..., dt=) or ctrl_df.sampled for a digital controller."
         )
-    ss = ct.ss(system)
+    ss: Any = ct.ss(system)
     a, b, c, d = (np.asarray(m, float) for m in (ss.A, ss.B, ss.C, ss.D))
     par = np.concatenate([a.ravel(), b.ravel(), c.ravel(), d.ravel()])
     return Node(L.LTI, b.shape[1], c.shape[0], x0, a.shape[0], par, feed=int(np.any(d != 0)))
@@ -195,7 +196,7 @@ def _primitive_node(primitive, x0) -> Node:
     raise TypeError(f"unknown element {primitive!r}.")
 
 
-def _user_node(system: ct.NonlinearIOSystem, x0):
+def _user_node(system, x0):
     if system.dt not in (None, 0):
         raise ValueError(
             f"event_response runs in continuous time; got {system.name} with dt={system.dt}. "

@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Signals and rates of a program in a fixed mode, and the margins of its events.
 
 Every margin g is positive while the mode holds; an event is its passage below zero.
@@ -24,7 +26,6 @@ from .layout import (
     DIR1,
     FEED,
     FREE,
-    G_BODY0,
     G_BODY1,
     G_JOINT_HIGH,
     G_JOINT_LOW,
@@ -61,12 +62,12 @@ from .layout import (
     PLAY,
     PWA,
     QUANTIZER,
-    RAMP,
     R_ADDRESS,
     R_BODY,
     R_PAR,
     R_SIZE,
     R_STATE,
+    RAMP,
     RATE,
     SAMPLED,
     SMOOTH,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -15,12 +16,12 @@ from .sampled import Sampled
 class LoopParts:
     """What a loop of `closed_loop` was made of; kept on the loop as ``loop.parts``."""
 
-    controller: object
+    controller: Any
     block: ct.NonlinearIOSystem
     dt: float
 
 
-def closed_loop(pid, block, dt=0, *, output=None, name=None) -> ct.InterconnectedSystem:
+def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> ct.InterconnectedSystem:
     """Close a loop: ``F = pid (r - x)`` drives the block, x is its first output.
 
     Parameters
@@ -90,7 +91,7 @@ def split_improper(controller) -> tuple[float, ct.StateSpace]:
         return 0.0, controller
     num, den = (np.trim_zeros(np.asarray(p[0][0], float), "f") for p in (controller.num, controller.den))
     if len(num) <= len(den):
-        return 0.0, ct.ss(controller)
+        return 0.0, ct.ss(controller)  # pyright: ignore[reportReturnType]
     if len(num) > len(den) + 1 or controller.isdtime(strict=True):
         raise ValueError(
             f"a controller may exceed its denominator by one degree (an ideal derivative), in continuous time; got "
@@ -99,7 +100,7 @@ def split_improper(controller) -> tuple[float, ct.StateSpace]:
     quotient, rest = np.polydiv(num, den)
     kd, kp = quotient[0], quotient[1] if len(quotient) > 1 else 0.0
     rest = np.atleast_1d(rest)
-    return float(kd), ct.ss(ct.tf(np.polyadd(kp * den, rest), den))
+    return float(kd), ct.ss(ct.tf(np.polyadd(kp * den, rest), den))  # pyright: ignore[reportReturnType]
 
 
 def _controller(proper: ct.StateSpace, kd: float, dt, force: str, name: str):
@@ -124,7 +125,7 @@ def _discretized(a, b, c, d, dt):
     return tuple(np.asarray(m, float) for m in (ss.A, ss.B, ss.C, ss.D))
 
 
-def _as_block(block) -> ct.NonlinearIOSystem:
+def _as_block(block: Any) -> ct.NonlinearIOSystem:
     if not isinstance(block, ct.NonlinearIOSystem):
         if callable(block):
             return ct.NonlinearIOSystem(
@@ -136,7 +137,7 @@ def _as_block(block) -> ct.NonlinearIOSystem:
     return block
 
 
-def _as_lti(pid):
+def _as_lti(pid) -> Any:
     if isinstance(pid, ct.FrequencyResponseData):
         raise ValueError("closed_loop cannot run measured frequency points (FRD) in time; fit a transfer function first.")
     if isinstance(pid, int | float):

@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """What happens at an event: resolve modes, apply impacts, settle a program into consistent modes."""
 
 from __future__ import annotations
@@ -38,7 +40,6 @@ from .layout import (
     G_JOINT_HIGH,
     G_JOINT_LOW,
     G_WALL_HIGH,
-    G_WALL_LOW,
     H_SCRATCH,
     H_U,
     J_ELASTIC,
@@ -63,10 +64,8 @@ from .layout import (
     PWA,
     QUANTIZER,
     RATE,
-    SAMPLED,
     STUCK,
     WALL,
-    G,
     X,
 )
 
@@ -106,8 +105,8 @@ def _direction(prog, node, body, d):
 @njit(cache=True, error_model="numpy", _nrt=False)
 def resolve(prog, node, t, x, mode, force, f, dx):
     """Bring a mechanism's modes in line with its velocities and forces; returns whether any changed."""
-    nodes, par, aux = prog.nodes, prog.par, prog.ints
-    xo, po, mo = nodes[node, X], nodes[node, PAR], nodes[node, MODE]
+    nodes, aux = prog.nodes, prog.ints
+    xo, mo = nodes[node, X], nodes[node, MODE]
     bodies = aux[nodes[node, AUX] + A_BODIES]
     driven = bodies - 1
     joint = aux[nodes[node, AUX] + A_JOINT]
@@ -345,7 +344,6 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
         return E_ENGAGE
 
     bodies = aux[nodes[node, AUX] + A_BODIES]
-    driven = bodies - 1
     joint = aux[nodes[node, AUX] + A_JOINT]
     joined = bodies == 2 and closed(prog, node, mode)
     if slot <= G_BODY1:

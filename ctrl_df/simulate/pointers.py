@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import weakref
 from collections.abc import Callable
+from typing import Any
 
 import numba
 from llvmlite import ir
@@ -36,7 +37,7 @@ _CALLBACKS = {
     "input": ctypes.CFUNCTYPE(None, _C_D, _C_P),
 }
 
-_compiled: weakref.WeakKeyDictionary[Callable, tuple[int, object]] = weakref.WeakKeyDictionary()
+_compiled: weakref.WeakKeyDictionary[Callable, tuple[Any, object]] = weakref.WeakKeyDictionary()
 raised: list[BaseException] = []
 """Exceptions of laws called back in Python, newest last; the engine sees them as NaN."""
 
@@ -56,7 +57,7 @@ def _compile(law, kind):
             return compiled.address, compiled
         except RuntimeError:  # no place to keep the cache (a law typed at the prompt)
             continue
-        except numba.core.errors.NumbaError:
+        except numba.core.errors.NumbaError:  # pyright: ignore[reportAttributeAccessIssue]
             break
     return callback(law, kind)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -33,8 +34,8 @@ class EventResponse(ct.TimeResponseData):
 def event_response(
     sys,
     timepts,
-    inputs=0,
-    initial_state=0,
+    inputs: Any = 0,
+    initial_state: Any = 0,
     *,
     params=None,
     input_hold="linear",
@@ -141,7 +142,9 @@ def check_positions(system, x0) -> None:
             low, high = core.stop.span
             at = x[2 * core.driven]
             if not low <= at <= high:
-                raise ValueError(f"the initial position of {name} must lie between its stops {low:g} and {high:g} m; got {at:g}.")
+                raise ValueError(
+                    f"the initial position of {name} must lie between its stops {low:g} and {high:g} m; got {at:g}."
+                )
 
 
 def _cores(system, first=0):

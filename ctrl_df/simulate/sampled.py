@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import control as ct
 import numpy as np
 
@@ -55,7 +57,7 @@ def sampled(system, **keywords) -> Sampled:
         raise ValueError(f"sampled needs a discrete-time TransferFunction or StateSpace; got {system!r}.")
     if system.dt is True:
         raise ValueError("sampled needs a sample time in seconds; got dt=True. Give the system its dt.")
-    ss = ct.ss(system)
+    ss: Any = ct.ss(system)
     keywords.setdefault("inputs", system.input_labels)
     keywords.setdefault("outputs", system.output_labels)
-    return Sampled(ss.A, ss.B, ss.C, ss.D, float(system.dt), **keywords)
+    return Sampled(ss.A, ss.B, ss.C, ss.D, float(system.dt), **keywords)  # pyright: ignore[reportArgumentType]

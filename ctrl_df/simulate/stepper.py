@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """One Runge-Kutta step with its error, and the state anywhere inside it.
 
 Two tableaux, both from SciPy's public solver classes: Dormand-Prince 8(5,3) for long steps, 5(4) for the short
@@ -26,7 +28,8 @@ E5_5, P5 = RK45.E.copy(), RK45.P.copy()
 def step8(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rtol, atol, want_g):
     """One step of DOP853 from x to x1, with k[0] known; fills k[1:13], g (at the end); returns the scaled error.
 
-    `size` is the running size of each state, what the relative tolerance refers to.
+    `size` is the running size of each state, what the relative tolerance refers to: not the end of the step, which may
+    lie far behind a wall the step has yet to find.
     `lowest` receives the smallest margin met at the inner stages.
     """
     n = x.shape[0]
@@ -43,7 +46,7 @@ def step8(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rto
                 lowest[m] = min(lowest[m], g[m])
     e3 = e5 = 0.0
     for j in range(n):
-        scale = atol + rtol * max(size[j], abs(x1[j]))
+        scale = atol + rtol * max(size[j], min(abs(x1[j]), 2.0 * size[j]))
         v3 = v5 = 0.0
         for m in range(13):
             v3 += E3[m] * k[m, j]
@@ -68,7 +71,7 @@ def step5(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rto
         rates(prog, drive, segment, t + C5[i] * h, x1, mode, work, k[i], g, want_g and i == 6)
     error = 0.0
     for j in range(n):
-        scale = atol + rtol * max(size[j], abs(x1[j]))
+        scale = atol + rtol * max(size[j], min(abs(x1[j]), 2.0 * size[j]))
         value = 0.0
         for m in range(7):
             value += E5_5[m] * k[m, j]
@@ -101,15 +104,15 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def roughness(x1, size, rtol, atol, poly):
+def roughness(size, rtol, atol, poly):
     """Error of the 7th-order interpolant relative to tolerance, judged by its last term.
 
     A long step can be right at its end and poor inside; events and outputs are taken from inside.
     """
     worst = 0.0
-    for j in range(x1.shape[0]):
+    for j in range(size.shape[0]):
         # 0.0084 is the largest value of the last basis function, theta^4 (1 - theta)^3
-        worst = max(worst, 0.0084 * abs(poly[6, j]) / (atol + rtol * max(size[j], abs(x1[j]))))
+        worst = max(worst, 0.0084 * abs(poly[6, j]) / (atol + rtol * size[j]))
     return ROUGH * worst
 
 
