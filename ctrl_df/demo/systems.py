@@ -136,7 +136,7 @@ def paper_loops() -> list[PaperLoop]:
             backlash_pid(),
             BACKLASH_BOX,
             "a limit cycle, almost chaotic; larger errors, above all in amplitude",
-            (0.009,),
+            (0.02,),
             500.0,
             "Half of it: the irregular 14 rad/s motion of Fig. 10 is real but dies out. What remains is a rattle "
             "within the gap eleven times as fast, which the crossing near 126 rad/s announces and misplaces by 19 %.",
@@ -151,7 +151,7 @@ def paper_loops() -> list[PaperLoop]:
             backlash_pid(),
             BACKLASH_BOX,
             "(not in the paper, which says nothing of the sampling of its simulations)",
-            (0.009,),
+            (0.02,),
             200.0,
             "A 2 ms zero-order hold keeps the irregular motion going: the sample time decides what one sees.",
             dt=0.002,
