@@ -73,6 +73,8 @@ class OrbitSearch:
         self.contacts = self.gap or any(
             prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms
         )
+        # contacts are closed within it: not below the rounding of positions. A mass may barely slip.
+        self.least = 1e-12 if self.contacts else 1e-18
         self.previous: State | None = None
         self._given: State | None = None
         self.forget()
@@ -121,7 +123,7 @@ class OrbitSearch:
 
     def forget(self):
         """Start the next point from rest."""
-        self.previous = None
+        self.previous = self.first = None
         self.shot.jacobian[:] = np.nan
         self.shot.size[:] = 0.0
 
@@ -130,7 +132,7 @@ class OrbitSearch:
     def _aim(self, A, omega):
         self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([[0.0, A]], omega)
-        self.atol = floor(self.symmetries.power, self.inertia, A, omega)
+        self.atol = floor(self.least, self.symmetries.power, self.inertia, A, omega)
 
     def _hmax(self, orders):
         """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic.
@@ -225,8 +227,7 @@ class OrbitSearch:
         return state, miss
 
     def _touching(self, orders):
-        """Look for an orbit whose bodies touch, for a block with a gap that was found swinging freely
-        within it.
+        """Look for an orbit whose bodies touch, for a block found swinging freely within its gap.
 
         A motion without contact coexists with others at moderate force and is what a centred start leads
         to. Returns the orbit or None, and a state from which the bodies keep touching or None.

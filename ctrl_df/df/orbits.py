@@ -37,7 +37,7 @@ ORBIT_REGIMES = (
 """Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
 without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
 periods; none; no dry friction and no contact; the state runs away (NaN); the bound on work was hit (NaN);
-the mass travels steadily besides swinging (its mean motion is no part of the harmonics); a load never touched."""
+the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
 
@@ -93,8 +93,8 @@ def orbit_family(
     a_order = np.argsort(A)[::-1]  # downwards: large motions are the simple ones
     w_order = np.argsort(omega)
     along_a = len(A) > 1
+    solver.forget()
     for line in w_order if along_a else [0]:
-        solver.forget()
         row, column = (a_order, np.full(len(A), line)) if along_a else (np.zeros(len(omega), int), w_order)
         solver.line(A[row], omega[column], harmonics, regime, residual, row, column)
     return harmonics, regime, residual
@@ -129,12 +129,19 @@ class OrbitSolver(OrbitSearch):
         samples, scratch = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros((1, 2), complex)
         power, past = self.symmetries.power, np.zeros((4, max(self.engine.nstates, 1)))
         p = 0
+        if self.previous is not None and self.first is not None:  # the line before starts where this one does
+            x, mode, units = self.first
+            self.previous = State(0.0, x / units * A[0] / omega[0] ** power, mode)
         while p < n:
             # the point by itself: its start, its regime, its checks
             harmonics[row[p], column[p]], name, residual[row[p], column[p]] = self.solve(
                 A[p], omega[p], orders
             )
             regime[row[p], column[p]] = _CODE[name]
+            if p == 0:
+                self.first = None
+                if self.previous is not None and self.simple and name not in ("stuck", "free"):
+                    self.first = (self.previous.x, self.previous.mode, A[0] / omega[0] ** power)
             p += 1
             if p == n or self.previous is None or not self.simple:
                 continue
@@ -143,8 +150,9 @@ class OrbitSolver(OrbitSearch):
             past[3, 0] = 0.02
             mode = self.previous.mode.copy()
             done, _, _ = sweep(
-                self.shot, samples, scratch, A[p:], omega[p:], power, self.inertia, past, mode, 1,
-                self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[p:], ends[p:], miss[p:], kinds[p:], still[p:],
+                self.shot, samples, scratch, A[p:], omega[p:], self.least, power, self.inertia, past, mode, 1,
+                self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[p:], ends[p:],
+                miss[p:], kinds[p:], still[p:],
             )  # fmt: skip
             self._raise_if_raised()
             for q in range(p, p + done):

@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Forced periodic orbits by Newton's method on the shots of `ctrl_df.df.shot`, all in compiled code.
 
 The Jacobian of the shot is kept from point to point of a sweep and corrected by Broyden's formula, the
@@ -20,25 +22,26 @@ from .shot import coordinates, place
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
 
-TOLERANCE = 1e-9  # error of an orbit's state, relative to its size
+TOLERANCE = 3e-10  # error of an orbit's state, relative to its size
 
 
 @njit(cache=True, error_model="numpy")
 def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
     """Close an orbit from (x, mode), in place, by chord and Broyden steps.
 
-    The harmonics' integrals over the closed shot go to `spectrum`. `shots` bounds the shots, `budget` the integration steps; with `eager` the first shot takes harmonics
-    already. Returns outcome and closing error.
+    The integrals of the closed shot go to `spectrum`. `shots` bounds the shots, `budget` the integration
+    steps; with `eager` the first shot takes integrals already. Returns outcome and error of the state.
     """
     n, nf = x.shape[0], shot.free.shape[0]
     y0, y1, change, x0 = shot.trial[0], shot.trial[1], shot.trial[2], shot.trial[3]
     last, end = shot.trial[7], shot.trial[6]
     jacobian, m0 = shot.jacobian, mode.copy()
+    shot.size[:] = 0.0
     fresh_jacobian = False
     moved = False  # `change` is the step that led to the present point, `last` the closing error before it
     previous, best = math.inf, math.inf
     jacobians = 0
-    take = eager
+    take, centered = eager, False
     expected = 1e-2  # closing error of the shot to come
     for _ in range(shots):
         copy(x, x0)
@@ -79,12 +82,14 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
                     error = max(error, abs(change[f]) / shot.size[shot.free[f]])
         stale = miss > 0.5 * previous
         if not rests and (
-            error < TOLERANCE or (miss < TOLERANCE and error < 100 * TOLERANCE and stale and fresh_jacobian)
+            error < TOLERANCE or (miss < 100 * rtol and error < 1e3 * rtol and stale and fresh_jacobian)
         ):
             copy(x0, x)
             mode[:] = m0
-            if not take:
-                take, moved, previous = True, False, math.inf
+            far_off = mirrored and not centered and _center(shot, y1, x)
+            if not take or far_off:
+                # tolerances are relative to the state: a small motion far from its centre is not yet exact
+                take, centered, moved, previous = True, True, False, math.inf
                 continue
             if known and miss > 0.0 and not _attracts(shot, jacobian):
                 if not fresh_jacobian:
@@ -93,8 +98,6 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
                         return OPEN, error
                 if not _attracts(shot, jacobian):
                     return UNSTABLE, error
-            if mirrored:
-                _center(shot, y1, x)
             return CLOSED, error
         if nf == 0:
             return OPEN, miss
@@ -131,27 +134,37 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
         copy(y0, y1)
         mode[:] = m0
         place(shot, y0, x, mode)
+        if mirrored:
+            _center(shot, last, x)
         moved = True
         for f in range(nf):
             i = shot.free[f]
             if y0[i] != y1[i]:
                 moved = False  # clipped
+        # a secant's errors multiply
+        expected = miss * min(previous, 1e-2)
         previous = miss
-        expected = 1e-2 * miss
-        take = take or expected < 1e-6
+        take = take or expected < 1e-8
     return OPEN, best
 
 
 @njit(cache=True, error_model="numpy")
 def _center(shot, step, x):
-    """Move free positions to where half a period mirrors them onto themselves."""
+    """Move free positions to where half a period mirrors them onto themselves; tell whether that was far.
+
+    Far: more than a tenth of what the position travels from the start to the end of the shot.
+    """
+    far = False
     for k in range(shot.shifts.shape[0]):
         amount = 0.0
         for j in range(x.shape[0]):
             if shot.shifts[k, j] != 0.0:
                 if amount == 0.0:
                     amount = 0.5 * step[j]
+                    travel = shot.offset[j] - step[j] - 2.0 * x[j]
+                    far = far or abs(amount) > 0.1 * abs(travel)
                 x[j] += amount
+    return far
 
 
 @njit(cache=True, error_model="numpy")

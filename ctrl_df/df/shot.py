@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """One shot of the event engine: half a period, mirrored afterwards, or whole periods.
 
 A `Shot` holds what stays the same from shot to shot, so that compiled code allocates nothing. Coordinates y
@@ -68,14 +70,15 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     no_spectrum = np.zeros((rows, 0), complex)
     log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
     arguments = (
-        engine.program, drive, np.zeros(9), vector, modes, 1.0, none, rows_x, rows_y, 8, 1e-9, 1e-12, 1.0, True,
-        False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, vector, 0, engine._space, no_spectrum, 1.0,
+        engine.program, drive, np.zeros(9), vector, modes, 1.0, none, rows_x, rows_y, 8, 1e-9, 1e-12, 1.0,
+        True, False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, vector, 0, engine._space, no_spectrum, 1.0,
     )  # fmt: skip
     shot = Shot(
         native_address(run, arguments), 0, engine.program, engine._space, np.full(ng, 1e-13), np.zeros(9),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
-        np.full((nf, nf), np.nan), np.zeros((8, max(n, 1))), np.zeros((3, nf, nf)), np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(6, np.int64),
+        np.full((nf, nf), np.nan), np.zeros((8, max(n, 1))), np.zeros((3, nf, nf)),
+        np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(6, np.int64),
     )  # fmt: skip
     return shot._replace(
         shoot=native_address(shoot, (shot, drive, 1.0, vector, modes, True, 1e-9, 1e-12, 1.0, no_spectrum, 1))
@@ -87,8 +90,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
 
 @njit(cache=True, error_model="numpy")
 def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
-    """Run (x, mode), in place, from t = 0 over `time`, mirrored afterwards if asked; returns the engine's
-    reason.
+    """Run (x, mode), in place, from t = 0 over `time`, mirrored afterwards if asked; return why it ended.
 
     With columns in `spectrum` the integrals of the outputs against exp(-j k omega t) are written to it, and
     the outputs at both ends to ``shot.ends``.
@@ -97,6 +99,9 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     work = shot.space[0]
     clock[0] = clock[1] = clock[3] = clock[4] = clock[5] = clock[6] = clock[7] = 0.0
     clock[8] = -1.0
+    for j in range(x.shape[0]):
+        # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
+        shot.space[6][j] = max(abs(x[j]), 0.1 * shot.space[6][j])
     settle(prog, drive, 0, 0.0, x, mode, work, shot.space[5])
     wanted = spectrum.shape[1] > 0
     if wanted:
@@ -109,8 +114,8 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
             shot.run,
             (
                 prog, drive, clock, x, mode, time, shot.none, shot.none_x, shot.none_y, 8, rtol, atol, hmax,
-                True, False, -1, 0.0, -1, max(rtol, 1e-10), budget, shot.log_t, shot.log_n, shot.log_k, shot.before,
-                shot.scale, 0, shot.space, spectrum, drive.omega,
+                True, False, -1, 0.0, -1, max(rtol, 1e-10), budget, shot.log_t, shot.log_n, shot.log_k,
+                shot.before, shot.scale, 0, shot.space, spectrum, drive.omega,
             ),
         )  # fmt: skip
         for i in range(min(int(clock[5]), shot.log_t.shape[0])):

@@ -15,8 +15,8 @@ from .shot import coordinates, place
 
 @njit(cache=True, error_model="numpy")
 def sweep(
-    shot, samples, coefficients, amplitudes, omegas, power, inertia, past, past_mode, known, mirrored, rtol, hmax,
-    budget, out, ends, miss, kinds, still,
+    shot, samples, coefficients, amplitudes, omegas, least, power, inertia, past, past_mode, known, mirrored, rtol,
+    hmax, budget, out, ends, miss, kinds, still,
 ):  # fmt: skip
     """Close the orbits of consecutive points, each started from those before; stop where one does not close.
 
@@ -49,7 +49,7 @@ def sweep(
         shot.tally[0] = 0
         outcome, miss[p] = close_orbit(
             shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol,
-            floor(power, inertia, A, omega), hmax * period, out[p], budget, 12, eager,
+            floor(least, power, inertia, A, omega), hmax * period, out[p], budget, 12, eager,
         )  # fmt: skip
         past[3, 0] = min(shot.clock[2] / period, 0.1)
         if outcome != CLOSED:
@@ -77,12 +77,12 @@ def unit(power, A, omega):
 
 
 @njit(cache=True, error_model="numpy")
-def floor(power, inertia, A, omega):
-    """Absolute tolerance: far below the motion of a free inertia, but above the rounding of its positions."""
+def floor(least, power, inertia, A, omega):
+    """Absolute tolerance, `least` of the motion of a free inertia."""
     highest = 0
     for j in range(power.shape[0]):
         highest = max(highest, power[j])
-    return 1e-12 * unit(highest, A, omega) / inertia
+    return least * unit(highest, A, omega) / inertia
 
 
 @njit(cache=True, error_model="numpy")
