@@ -55,7 +55,7 @@ _LAZY = {
     "improve": "identify.improve",
 }
 
-__all__ = [
+__all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     "Effect",
     "Mass",
     "Mechanism",

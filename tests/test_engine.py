@@ -20,7 +20,8 @@ def friction_reference(mass, coulomb, viscous, static, a, omega, t_end):
             if abs(force) <= static * (1 + 1e-12):
                 # the next time |F| reaches the static level
                 phases = [(s * math.acos(static / a) + k * math.pi) / omega for k in range(1000) for s in (1, -1)]
-                t_next = min((p for p in phases if p > t + 1e-12 and abs(a * math.cos(omega * (p + 1e-9))) > static), default=t_end)
+                later = (p for p in phases if p > t + 1e-12 and abs(a * math.cos(omega * (p + 1e-9))) > static)
+                t_next = min(later, default=t_end)
                 t = min(t_next, t_end)
             stuck = False
             sign = math.copysign(1.0, math.cos(omega * t))

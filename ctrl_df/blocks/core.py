@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from .effect import Effect
 from .effects import Backlash, Bristle, Compliance, HardStop
@@ -124,7 +125,7 @@ def level(effects: Sequence[Effect], moving: float, direction: float, speed: flo
     return value
 
 
-def _only(effects, cls):
+def _only(effects, cls) -> Any:
     found = [e for e in effects if isinstance(e, cls)]
     if len(found) > 1:
         raise ValueError(f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters.")

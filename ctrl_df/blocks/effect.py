@@ -26,7 +26,7 @@ import dataclasses
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from .parameter import Parameter, checked
 from .primitives import Primitive
@@ -34,6 +34,7 @@ from .primitives import Primitive
 ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
 
 _LIBRARY: dict[str, type[Effect]] = {}
+_EffectClass = TypeVar("_EffectClass", bound="type[Effect]")
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class Effect:
         return dataclasses.replace(self, **changes)
 
 
-def register_effect(cls: type[Effect]) -> type[Effect]:
+def register_effect(cls: _EffectClass) -> _EffectClass:
     """Class decorator: add an effect to the library, so that diagnosis screens it and blocks accept it.
 
     Raises

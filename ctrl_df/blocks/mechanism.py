@@ -223,7 +223,7 @@ class TwoMass(Mechanism):
 
 
 def friction_mass(mass, coulomb, viscous=0.0, static=None, *, name=None) -> Mass:
-    """A mass with Coulomb and viscous friction, and stiction if `static` is given.
+    """Build a mass with Coulomb and viscous friction, and stiction if `static` is given.
 
     Parameters
     ----------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,9 @@ class Parameter:
         return self.value
 
 
-def parameter(unit, *, lower=0.0, upper=math.inf, strict=False, free=True, default=dataclasses.MISSING, meaning=""):
+def parameter(
+    unit, *, lower=0.0, upper=math.inf, strict=False, free=True, default: Any = dataclasses.MISSING, meaning=""
+) -> Any:
     """Declare a dataclass field that is a physical parameter (unit, bounds, what it means)."""
     bounds = dict(unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning)
     return dataclasses.field(default=default, metadata={"parameter": bounds})

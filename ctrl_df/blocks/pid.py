@@ -40,4 +40,4 @@ def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
         den.pop(0)
     while len(num) > 1 and num[0] == 0:
         num.pop(0)
-    return ct.tf(num, den, inputs="e", outputs="F", name=name)
+    return ct.tf(num, den, inputs="e", outputs="F", name=name)  # pyright: ignore[reportReturnType]

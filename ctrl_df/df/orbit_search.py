@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import control as ct
 import numpy as np
 
@@ -37,7 +39,7 @@ class OrbitSearch:
         As in `ctrl_df.df.orbits.orbit_family`.
     """
 
-    def __init__(self, block, output=None, *, transient=4, averages=64, max_steps=200_000):
+    def __init__(self, block, output=None, *, transient=4, averages=64, max_steps=1_000_000):
         self.transient, self.averages, self.max_steps = (
             int(transient),
             max(int(averages), BLOCKS),
@@ -87,6 +89,7 @@ class OrbitSearch:
             return block
         rounded = any(e.id == "sensor_quantization" for e in block.effects)
         kept = []
+        effect: Any
         for effect in block.effects:
             if effect.id == "input_delay":
                 self.delay += effect.delay

@@ -1,0 +1,1 @@
+"""Identification: compare, refit and diagnose a model against measurements."""

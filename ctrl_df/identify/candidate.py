@@ -502,7 +502,7 @@ class _Problem:
         held = np.zeros(p, bool)
         step = np.zeros(p)
         for _ in range(p):
-            free = ~held
+            free: Any = ~held
             step[:] = 0.0
             if not free.any():
                 break

@@ -233,10 +233,13 @@ def free_names(block, free=None) -> tuple[str, ...]:
     return tuple(free)
 
 
-def _classes(candidates):
+def _classes(candidates: Any) -> list[Any]:
     if candidates is None:
         return list(effect_library().values())
-    return [c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c) for c in candidates]
+    return [
+        c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c)  # pyright: ignore[reportArgumentType]
+        for c in candidates
+    ]
 
 
 # --- the study ------------------------------------------------------------------------------------
@@ -383,7 +386,7 @@ class _Study:
         self._hold(new, held, tried.held.starts if tried.held is not None else None)
         return new
 
-    def errors(self, tried, runs, held):
+    def errors(self, tried, runs, held) -> tuple[float, float]:
         spread = math.sqrt(np.mean([np.var(r.y) for r in runs]))
         inside = np.concatenate([e[r.use] for e, r in zip(tried.fitted.residuals, runs, strict=True)])
         if tried.held is not None:
@@ -425,7 +428,7 @@ class _Study:
         )
         if self._unexplained(noise, structure, structure0):
             verdict = UNKNOWN
-        elif not significant:
+        elif first is None or not significant:
             verdict = NONE
         else:
             others = [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
@@ -457,7 +460,7 @@ class _Study:
     def _alike(self, a, b):
         return indistinguishable(self._outputs(a), self._outputs(b), self.noise)
 
-    def _entry(self, t, errors, probability, alike):
+    def _entry(self, t, errors: tuple[float, float], probability, alike):
         effect = t.block.effects[-1]
         values = {k: p.value for k, p in effect.parameters.items()}
         return CandidateEffect(

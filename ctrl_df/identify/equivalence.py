@@ -77,7 +77,7 @@ def coloured_floor(residual, velocity, dt: float) -> tuple[float, float]:
 
     n = len(residual)
     length = min(n, max(64, n // 4))
-    f, p = welch(residual - np.mean(residual), 1 / dt, nperseg=length, detrend=False)
+    f, p = welch(residual - np.mean(residual), 1 / dt, nperseg=length, detrend=False)  # pyright: ignore[reportArgumentType]
     _, py = welch(velocity, 1 / dt, nperseg=length, detrend="constant")
     energy = np.cumsum(py)
     edge = f[min(int(np.searchsorted(energy, 0.97 * energy[-1])), len(f) - 1)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 
@@ -31,7 +33,7 @@ def values_of(effect) -> str:
 def explain(diagnosis, structure0) -> str:
     """Return the verdict in sentences."""
     d = diagnosis
-    first = d.ranking[0] if d.ranking else None
+    first: Any = d.ranking[0] if d.ranking else None
     if d.verdict == "none":
         return (
             f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} (held out "

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..blocks import effects as library
 from ..blocks.core import level
+from ..blocks.effect import Effect
 from .trial import Fitted, Run, Scales, simulate, with_values
 
 # Effects of which a block holds one at most, or a second of which is the first one again.
@@ -62,7 +63,7 @@ class Screen:
 class Start:
     """An effect with start values and the share of the residual it is expected to leave (1: explains nothing)."""
 
-    effect: object
+    effect: Effect
     left: float
     values: tuple[tuple[str, float], ...] = ()  # baseline parameters that go with it
 
@@ -132,7 +133,7 @@ def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
 def _judged(effect, screen, total) -> Iterator[Start]:
     block = attach(screen.block, effect)
     change = None if block is None else screen.change(block)
-    if change is None or total == 0:
+    if block is None or change is None or total == 0:
         return
     change = screen.project(change)
     power = float(change @ change)
@@ -147,7 +148,7 @@ def _judged(effect, screen, total) -> Iterator[Start]:
         if scaled is not None and not 0.8 < factor < 1.25:
             again = attach(screen.block, scaled)
             moved = None if again is None else screen.change(again)
-            if moved is not None:
+            if again is not None and moved is not None:
                 left = screen.residual - screen.project(moved)
                 yield Start(again.effects[-1], float(left @ left) / total)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -183,7 +184,7 @@ def coordinates(block, names, scales: Scales) -> list[Coordinate]:
 class Fitted:
     """A block fitted to runs: simulated outputs, residuals, starts, and the Jacobian of the last step."""
 
-    block: object
+    block: Any
     starts: tuple[np.ndarray, ...]
     outputs: tuple[np.ndarray, ...]
     residuals: tuple[np.ndarray, ...]
@@ -311,7 +312,7 @@ class _Problem:
         rows[~np.isfinite(rows)] = 0.0
         return rows
 
-    def solve(self, iterations, tolerance):
+    def solve(self, iterations, tolerance) -> tuple[Any, Any, Any, Any]:
         """Levenberg-Marquardt; returns unknowns, outputs, errors and the last Jacobian."""
         z = np.concatenate([self.z0, np.zeros(self.total - len(self.coords))])
         ys = self.outputs(z)

@@ -128,9 +128,11 @@ def _discretized(a, b, c, d, dt):
 def _as_block(block: Any) -> ct.NonlinearIOSystem:
     if not isinstance(block, ct.NonlinearIOSystem):
         if callable(block):
+            static: Any = block
             return ct.NonlinearIOSystem(
-                None, lambda t, x, u, params: np.array([float(block(u[0]))]), inputs=["u"], outputs=["y"], name="nonlinearity"
-            )
+                None, lambda t, x, u, params: np.array([float(static(u[0]))]),
+                inputs=["u"], outputs=["y"], name="nonlinearity",
+            )  # fmt: skip
         raise TypeError(f"closed_loop needs a block (ct.NonlinearIOSystem) or a static function; got {block!r}.")
     if block.ninputs != 1:
         raise ValueError(f"closed_loop needs a block with one input; {block.name} has {block.ninputs}.")

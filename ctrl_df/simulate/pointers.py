@@ -47,7 +47,7 @@ def address(law: Callable, kind: str) -> int:
     known = _compiled.get(law)
     if known is None:
         known = _compiled[law] = _compile(law, kind)
-    return known[0]
+    return known[0]  # pyright: ignore[reportReturnType]
 
 
 def _compile(law, kind):
