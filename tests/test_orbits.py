@@ -152,7 +152,7 @@ def test_friction_mass_agrees_with_its_closed_form(static):
         assert held.any() and np.isnan(y[held]).all()
         error = np.abs(y - exact)[~held] / np.abs(exact[..., 1:2])[~held]
         worst = max(worst, error.max())
-    assert worst < 1e-8  # measured WORST_FRICTION
+    assert worst < 1e-8  # measured 2.1e-9
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.2, 0.5])
@@ -165,7 +165,7 @@ def test_backlash_agrees_with_the_wall_map(restitution):
     same = names == expected
     assert same.mean() > 0.85  # where motions coexist both may be right
     error = np.abs(y[..., 1] / exact[..., 1] - 1)
-    assert error[same & (names != "aperiodic")].max() < 1e-8  # measured WORST_BACKLASH
+    assert error[same & (names != "aperiodic")].max() < 1e-8  # measured 5.5e-10; 8.6e-9 at restitution 0.8
     assert error[same].max() < 0.1
 
 
@@ -187,7 +187,7 @@ def test_linear_systems_are_their_frequency_response():
     for row in (0, 1):
         y, regime, _ = orbit_family(H, [1.0, 3.0], omega, output=row)
         expected = H(1j * omega)[row, 0]
-        assert np.abs(y[..., 1] / expected - 1).max() < 5e-9  # measured WORST_LTI
+        assert np.abs(y[..., 1] / expected - 1).max() < 5e-9  # measured 1.7e-9
         assert (regime == ORBIT_REGIMES.index("smooth")).all()
         assert np.abs(y[..., 2:]).max() < 1e-8
     T = ct.tf([1, 2], [1, 3, 4, 0])  # its integral has no mean of its own
@@ -234,7 +234,11 @@ def test_smooth_compositions_repeat_and_agree(seed):
     viscous, joint = cdf.Viscous(B), cdf.Compliance(kc, cc)
     saturation, lag = cdf.InputSaturation(top), cdf.InputLag(tau)
     cases = (
-        (duffing, 50, block(Mass(m), viscous, cdf.LinearSpring(k), cdf.CubicSpring(k3), cdf.QuadraticDrag(q))),
+        (
+            duffing,
+            50,
+            block(Mass(m), viscous, cdf.LinearSpring(k), cdf.CubicSpring(k3), cdf.QuadraticDrag(q)),
+        ),
         (lugre, 50, block(Mass(m), viscous, cdf.Coulomb(K), cdf.Bristle(s0, s1))),
         (coupled, 50, block(TwoMass(m, m2), viscous, joint)),
         (with_gap, 1000, block(TwoMass(m, m2), viscous, joint, cdf.Backlash(gap))),
@@ -251,7 +255,7 @@ def test_smooth_compositions_repeat_and_agree(seed):
             reference[0], change[[0] if len(change) < 4 else [0, 2]] = 0, 0
         size = abs(reference[1]) * A
         assert np.abs(change).max() < 1e-7 * size * max(1, omega), (rates.__name__, change)
-        assert disagreement(y, reference) < 1e-7, rates.__name__  # measured WORST_SMOOTH
+        assert disagreement(y, reference) < 3e-8, rates.__name__  # measured 8.2e-9 over 25 seeds
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -284,7 +288,7 @@ def test_dry_compositions_repeat_and_agree(seed):
             reference[0] = 0  # stops not reached: no mean of its own
         size = abs(reference[1]) * A
         assert np.abs(change).max() < 1e-6 * size * max(1, omega), (regime, change)
-        assert disagreement(y, reference) < 1e-6, regime  # measured WORST_DRY
+        assert disagreement(y, reference) < 1e-8, regime  # measured 8.8e-10 over 25 seeds
 
 
 # --- channels -----------------------------------------------------------------------------------------------
@@ -341,7 +345,9 @@ def test_steady_travel_is_drifting():
         block(Mass(9), cdf.Coulomb(1), cdf.ConstantForce(3)),
         block(Mass(9), cdf.ConstantForce(3)),
         block(Mass(1), cdf.LinearSpring(25)),  # undamped, forced at its resonance
-        ct.nlsys(lambda t, x, u, p: [x[1], u[0] + x[0]], lambda t, x, u, p: x[:1], inputs=1, outputs=1, states=2),
+        ct.nlsys(
+            lambda t, x, u, p: [x[1], u[0] + x[0]], lambda t, x, u, p: x[:1], inputs=1, outputs=1, states=2
+        ),
         ct.nlsys(lambda t, x, u, p: [x[0] ** 3 + 1 + u[0]], None, inputs=1, outputs=1, states=1),
     ],
 )

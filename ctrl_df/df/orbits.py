@@ -42,7 +42,7 @@ _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
 
 def orbit_family(
-    block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=200_000, **keywords
+    block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000, **keywords
 ):
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 

@@ -82,7 +82,7 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
                     error = max(error, abs(change[f]) / shot.size[shot.free[f]])
         stale = miss > 0.5 * previous
         if not rests and (
-            error < TOLERANCE or (miss < 100 * rtol and error < 1e3 * rtol and stale and fresh_jacobian)
+            error < TOLERANCE or (jacobians > 1 and stale and miss < 100 * rtol and error < 1e3 * rtol)
         ):
             copy(x0, x)
             mode[:] = m0
