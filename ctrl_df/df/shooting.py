@@ -322,7 +322,7 @@ def _mismatch(shot, y0, y1):
             size = shot.upper[i] - shot.lower[i]
         elif shot.transform[i, i] == 1.0:
             size = max(size, seen[i])
-        shot.size[i] = max(size, 0.5 * shot.size[i])
+        shot.size[i] = max(size, 0.05 * shot.size[i])
     worst = 0.0
     for i in range(n):
         y1[i] -= y0[i]

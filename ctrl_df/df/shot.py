@@ -101,7 +101,7 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     clock[8] = -1.0
     for j in range(x.shape[0]):
         # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
-        shot.space[6][j] = max(abs(x[j]), 0.01 * shot.space[6][j])
+        shot.space[6][j] = max(abs(x[j]), 0.1 * shot.space[6][j])
     settle(prog, drive, 0, 0.0, x, mode, work, shot.space[5])
     wanted = spectrum.shape[1] > 0
     if wanted:
