@@ -15,9 +15,16 @@ from importlib import import_module as _import_module
 from .blocks.effect import Effect, effect_class, effect_library, register_effect
 from .blocks.effects import *  # noqa: F403
 from .blocks.effects import __all__ as _effects
-from .blocks.hysteresis import play, rate_limiter, relay_with_hysteresis
+from .blocks.hysteresis import (
+    friction_backlash_nonlinearity,
+    play,
+    rate_limiter,
+    relay_hysteresis_nonlinearity,
+    relay_with_hysteresis,
+)
 from .blocks.mechanism import Mass, Mechanism, TwoMass, backlash_masses, friction_mass
 from .blocks.memoryless import (
+    DescribingFunctionNonlinearity,
     cubic,
     dead_zone,
     piecewise_linear,
@@ -26,6 +33,7 @@ from .blocks.memoryless import (
     relay,
     relay_with_dead_zone,
     saturation,
+    saturation_nonlinearity,
 )
 from .blocks.parameter import Parameter, parameter
 from .blocks.pid import pid
@@ -56,6 +64,7 @@ _LAZY = {
 }
 
 __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
+    "DescribingFunctionNonlinearity",
     "Effect",
     "Mass",
     "Mechanism",
@@ -67,6 +76,7 @@ __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     "dead_zone",
     "effect_class",
     "effect_library",
+    "friction_backlash_nonlinearity",
     "friction_mass",
     "parameter",
     "pid",
@@ -77,9 +87,11 @@ __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     "rate_limiter",
     "register_effect",
     "relay",
+    "relay_hysteresis_nonlinearity",
     "relay_with_dead_zone",
     "relay_with_hysteresis",
     "saturation",
+    "saturation_nonlinearity",
     *_effects,
     *_LAZY,
 ]
