@@ -158,6 +158,11 @@ def test_linear_loop_agrees_with_forced_response():
     np.testing.assert_allclose(got.outputs, expected.outputs, atol=1e-7 * np.abs(expected.outputs).max())
 
 
+def test_a_transfer_function_is_run_by_its_states():
+    response = cdf.event_response(ct.tf([1], [1, 1]), [0, 1], 1.0)
+    assert np.ravel(response.outputs)[-1] == pytest.approx(1 - math.exp(-1), rel=1e-8)
+
+
 def test_relay_switches_are_located():
     """An integrator driven by a constant crosses the relay's hysteresis at a time known exactly."""
     relay = cdf.relay_with_hysteresis(1.0, 0.25)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from ..status import Status
@@ -114,6 +115,8 @@ class Engine:
     """
 
     def __init__(self, system):
+        if isinstance(system, ct.TransferFunction):
+            system = ct.ss(system)  # a transfer function has no state to integrate
         self.system = system
         self._flat = flatten(system)
         self.nstates = system.nstates or 0
