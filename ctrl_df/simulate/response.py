@@ -86,8 +86,8 @@ def event_response(
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     times = _times(timepts)
-    system = _with_params(ct.ss(sys) if isinstance(sys, ct.TransferFunction) else sys, params)
-    engine = Engine(system)
+    engine = Engine(_with_params(sys, params))
+    system = engine.system
     x0 = _initial(system, initial_state)
     check_positions(system, x0)
     drive, samples, keep = _drive(inputs, engine.ninputs, times, input_hold)
