@@ -205,7 +205,9 @@ class Problem:
         for i, variable in enumerate(self.variables):
             for k, column in enumerate(self._column(i, variable, theta, nuisance, base, central)):
                 columns[k].append(column)
-        by_parameter = [np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)]
+        by_parameter = [
+            np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)
+        ]
         return by_parameter, [self._by_start(k, theta, nuisance, base) for k in range(len(self.records))]
 
     def _column(self, i, variable, theta, nuisance, base, central) -> Signals:

@@ -348,6 +348,30 @@ class Simulator:
         return engine.start(x0, time)
 
 
+def free_run(
+    model, record: Measurement, *, position=0.0, velocity=0.0, slack=0.5, thin: int = 1
+) -> np.ndarray:
+    """Return the output of a model over a whole record, shape (n,), from a state that is known.
+
+    Parameters
+    ----------
+    model : block
+        Driven by the record's input.
+    position, velocity : float
+        Reported by the model at the first sample [m], [m/s].
+    slack : float
+        Share of a gap taken up there, 0 to 1.
+    thin : int
+        Samples a step of the input; 1 is exact.
+    """
+    simulator = Simulator(model, record, thin=thin)
+    known = {"x": position, "v": velocity, "slack": slack}
+    one = np.zeros(1)
+    whole = Windows(np.array([0]), np.array([len(record)]), one, one, one, one, one)
+    start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
+    return simulator.run(whole, None, start, rounded=True)
+
+
 def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
     """Return the values with static levels raised to the kinetic one where they fell below it."""
     values = dict(values)
