@@ -184,7 +184,8 @@ def _split(tried: Trial, study: Study) -> tuple[float, float]:
 
 def _errors(tried: Trial, study: Study) -> tuple[float, float]:
     """Return nrmse over the windows to learn from and over those to be judged by."""
-    return tried.train.rmse / study.data.train.spread, tried.held.rmse / study.data.held.spread
+    held = tried.held.rmse / study.data.held.spread if tried.held is not None else math.nan
+    return tried.train.rmse / study.data.train.spread, held
 
 
 def _entry(t: Trial, study: Study, probability, same) -> CandidateEffect:

@@ -10,6 +10,7 @@ from typing import Any
 from .diagnose import SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
 from .diagnosis import NONE, UNKNOWN, Diagnosis
 from .study import Study as Fits
+from .trial import Trial
 
 _LESS = 0.98  # the held-out error a step must reach, relative to the one before
 
@@ -213,9 +214,11 @@ def _without_idle(block, start, fits, names):
     for key in [k for k in block._keys[:-1] if k not in own]:
         less = block.without_effect(key)
         free = [k for k in free_names(less) if k in set(names) or k.startswith(less._keys[-1] + ".")]
-        fits.base = data.judged("", data.fit(less, free, iterations=8))
+        fits.base = data.judged(Trial("", data.fit(less, free, iterations=8)))
         full_free = [k for k in free_names(block) if k in set(names) or k.startswith(block._keys[-1] + ".")]
-        whole = data.judged(key, data.fit(block, full_free, iterations=4), len(full_free) - len(free))
+        whole = data.judged(
+            Trial(key, data.fit(block, full_free, iterations=4), extra=len(full_free) - len(free))
+        )
         if fits.ranked([whole])[0].evidence < SIGNIFICANT:
             block = fits.base.block
             dropped.append(key)

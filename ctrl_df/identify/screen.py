@@ -49,13 +49,14 @@ class Screen:
     Parameters
     ----------
     base : Candidate
-        The baseline fitted to the short windows.
+        The baseline fitted to windows that are short: there even a strong effect changes the output nearly linearly.
     data : Data
+        In those windows.
     """
 
     def __init__(self, base: Candidate, data: Data):
         self.base, self.data = base, data
-        self.view = data.short
+        self.view = data.train
         self.motion = motion_of(data.train, data.thin)
         self.tangent = base.tangent
         self.residual = self.project(base.residual)

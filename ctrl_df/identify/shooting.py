@@ -147,6 +147,12 @@ class Problem:
         if self.fresh:
             self._scan_slack(theta)
             self.fresh = False
+        theta = self._descend(theta, iterations, tolerance, robust)
+        if self._rescue_starts(theta):
+            theta = self._descend(theta, max(iterations // 2, 3), tolerance, robust)
+        return theta
+
+    def _descend(self, theta, iterations, tolerance, robust):
         damping, self.converged = 1e-3, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
@@ -178,6 +184,51 @@ class Problem:
                 break
         self.nuisance, self.last = nuisance, residual
         return theta
+
+    def _rescue_starts(self, theta) -> bool:
+        """Try other speeds where single windows err far more than the rest; whether any was better.
+
+        Stick and slip make the error of a window a rough function of the speed it begins with: a start that is
+        estimated badly may lie in another valley. What the window before ends with is tried first.
+        """
+        found, values = False, self.values(theta)
+        for k, simulator in enumerate(self.simulators):
+            if "v" not in simulator.nuisances:
+                continue
+            column, windows, starts = simulator.nuisances.index("v"), self.windows[k], self.nuisance[k]
+            rms = np.array([math.sqrt(float(np.mean(self.last[k][w] ** 2))) for w in windows.slices])
+            bad = (rms > 1.5 * np.median(rms)) & (rms > 2 * self.noise)
+            if not bad.any():
+                continue
+            some = windows.only(bad)
+            measured, least = self.records[k].y[some.samples], 0.7 * rms[bad] ** 2
+            self.priors[k][bad, column] *= 3
+            reach, chosen = self.priors[k][bad, column], starts[bad].copy()
+            before = self._speeds_before(k)[bad] - some.v
+            tries = [before, *(f * reach for f in (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1))]
+            for speed in tries:
+                trial = starts[bad].copy()
+                trial[:, column] = speed
+                e = measured - simulator.run(some, values, trial)
+                for w, where in enumerate(some.slices):
+                    shift = 0.0 if simulator.tied else float(np.mean(e[where]))
+                    power = float(np.mean((e[where] - shift) ** 2))
+                    if power < least[w]:
+                        least[w], chosen[w], found = power, trial[w], True
+                        chosen[w, 0] += shift
+            starts[bad] = chosen
+            self.nfev += len(tries) * len(some) / len(windows)
+        return found
+
+    def _speeds_before(self, k) -> np.ndarray:
+        """Return the simulated speed (nw,) with which the window before each ends; the estimate for the first."""
+        windows, y = self.windows[k], self.measured[k] - self.last[k]
+        t, speeds = self.records[k].t[windows.samples], np.array(windows.v)
+        for w in range(1, len(windows)):
+            end = windows.slices[w - 1].stop
+            if windows.begins[w] == windows.ends[w - 1] and end >= 4:
+                speeds[w] = (y[end - 1] - y[end - 4]) / (t[end - 1] - t[end - 4])
+        return speeds
 
     def _scan_slack(self, theta):
         """Find where in its gap each window begins, by trying five places (the cost has several minima)."""

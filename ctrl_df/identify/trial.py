@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from .windows import Windows, cut, facts
 
 SAMPLES = 2500
 """Steps of the input a record is thinned to while candidates are screened."""
+
+SHORTEST = 16
+"""How many times as many the shortest windows are as the longest."""
 
 PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
@@ -47,10 +50,10 @@ class View:
     windows: tuple[Windows, ...]
 
     def shorter(self, factor: int) -> View:
-        """Return windows `factor` times as many, over the same samples."""
+        """Return windows up to `factor` times as many, over the same samples; none is shorter than 50 samples."""
         finer = []
         for record, old in zip(self.records, self.windows, strict=True):
-            new = cut(record, factor * _count(record))
+            new = cut(record, min(factor * _count(record), max(len(record) // 50, 4)))
             inside = np.zeros(len(record), bool)
             inside[old.samples] = True
             middle = (new.begins + new.ends - 1) // 2
@@ -76,11 +79,11 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A model fitted to the windows to learn from, and run over those to be judged by."""
+    """A model fitted to the windows to learn from, and (once judged) run over those to be judged by."""
 
     key: str
     train: Candidate
-    held: Candidate
+    held: Candidate | None = None
     extra: int = 0  # parameters beyond the baseline's
     evidence: float = 0.0
     confirmed: bool = False
@@ -93,12 +96,12 @@ class Trial:
     @property
     def residuals(self) -> list[np.ndarray]:
         """Of all windows."""
-        return [*self.train.residual, *self.held.residual]
+        return [*self.train.residual, *(self.held.residual if self.held is not None else ())]
 
     @property
     def outputs(self) -> list[np.ndarray]:
         """Simulated, of all windows."""
-        return [*self.train.simulated, *self.held.simulated]
+        return [*self.train.simulated, *(self.held.simulated if self.held is not None else ())]
 
     @property
     def size(self) -> float:
@@ -108,17 +111,18 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """Everything the fits of one diagnosis share."""
+    """Everything the fits of one diagnosis share: windows of one length, and those of others."""
 
     train: View
     held: View
     thin: int
     scales: Scales
-    short: View = field(init=False)
+    whole: tuple[View, View] | None = None
 
-    def __post_init__(self):
-        """Cut the short windows once."""
-        object.__setattr__(self, "short", self.train.shorter(4))
+    def level(self, factor: int) -> Data:
+        """Return the same data in windows `factor` times as many as the longest."""
+        train, held = self.whole or (self.train, self.held)
+        return replace(self, train=train.shorter(factor), held=held.shorter(factor), whole=(train, held))
 
     @property
     def fine(self) -> Data:
@@ -133,19 +137,26 @@ class Data:
             tolerance=tolerance,
         )  # fmt: skip
 
-    def judged(self, key, train: Candidate, extra=0, before: Trial | None = None, confirmed=False) -> Trial:
+    def moved(self, found: Candidate, iterations=8) -> Candidate:
+        """Fit a model found over other windows to these; windows that begin at one sample share initial states."""
+        starts = same_begins(found, self.train.windows)
+        return self.fit(found.model, found.names, starts=starts, iterations=iterations)
+
+    def judged(self, tried: Trial) -> Trial:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
-        starts = before.held.starts if before is not None else None
-        held = self.fit(train.model, (), view=self.held, starts=starts, iterations=4, tolerance=1e-2)
-        return Trial(key, train, held, extra, confirmed=confirmed)
+        # Those of short windows are found without fail; the others begin at the same places.
+        short = self.level(SHORTEST).held
+        near = self.fit(tried.block, (), view=short, iterations=6, tolerance=1e-2)
+        starts = same_begins(near, self.held.windows)
+        held = self.fit(tried.block, (), view=self.held, starts=starts, iterations=4, tolerance=1e-2)
+        return replace(tried, held=held)
 
 
 def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] = ()) -> Data:
     """Cut records into windows; without records held out, every third ninth of each is."""
     records = tuple(records)
-    whole = [cut(r, _count(r)) for r in records]
     if held:
-        learn = View(records, tuple(whole))
+        learn = View(records, tuple(cut(r, _count(r)) for r in records))
         judge = View(tuple(held), tuple(cut(r, _count(r)) for r in held))
     else:
         whole = [cut(r, PARTS * max(round(_count(r) / PARTS), 1)) for r in records]
@@ -174,6 +185,18 @@ def _scales(block, records) -> Scales:
     speed = math.sqrt(np.mean([np.mean(facts(r).velocity ** 2) for r in records]))
     mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
     return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
+
+
+def same_begins(found: Candidate, windows) -> list[np.ndarray]:
+    """Return initial states for windows from a fit over others: theirs where both begin at one sample, else none."""
+    starts = []
+    for old, new, states in zip(found.windows, windows, found.starts, strict=True):
+        at = np.searchsorted(old.begins, new.begins)
+        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
+        rows = np.zeros((len(new), states.shape[1]))
+        rows[same] = states[at[same]]
+        starts.append(rows)
+    return starts
 
 
 def carried(simulator: Simulator, windows: Windows, before: Simulator, starts: np.ndarray) -> np.ndarray:

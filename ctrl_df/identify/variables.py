@@ -33,7 +33,9 @@ class Variable:
 
     def p(self, q: float) -> float:
         """Return the physical value of a scaled one."""
-        return self.scale * math.exp(min(max(q, -40.0), 40.0)) if self.log else q * self.scale
+        if self.log:
+            return self.scale * math.exp(min(max(q, -40.0), 40.0))
+        return min(max(q * self.scale, self.lower), self.upper)
 
     def clip(self, q: float) -> float:
         """Return the scaled value within the bounds nearest to `q`."""
