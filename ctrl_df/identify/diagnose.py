@@ -17,11 +17,13 @@ from .lack_of_fit import lacks
 from .measurement import Measurement
 from .study import Study
 from .trial import Trial
+from .windows import facts
 
 SIGNIFICANT = 20.0
 """Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
 
 _LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
+_NOISIER = 1.4  # error on held-out windows over that on fitted ones that may be chance
 
 
 def diagnose(
@@ -146,9 +148,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     significant = (
         first is not None and first.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * base_errors[1]
     )
-    structure = missed[0].rms if missed and missed[0].evidence > SIGNIFICANT else 0.0
-    noise = math.sqrt(max(best.rms**2 - structure**2, 0.0))
-    if structure > _LEFT * math.sqrt(max(base.rms**2 - noise**2, 0.0)):
+    noise, structure, share = _left(best, base, missed, study)
+    if share > _LEFT:
         verdict = UNKNOWN
     elif first is None or not significant:
         verdict = NONE
@@ -166,6 +167,26 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     )  # fmt: skip
     object.__setattr__(result, "explanation", explain(result, missed))
     return result
+
+
+def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float, float]:
+    """Return the noise, the structure that the best candidate leaves (rms), and its share of what was there.
+
+    Structure shows on the windows fitted by what free forces explain, and on those held out by an error beyond
+    the noise: that of the fitted windows, times what the records' own noise floors say of the two.
+    """
+    structure = missed[0].rms if missed and missed[0].evidence > SIGNIFICANT else 0.0
+    noise = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
+    there = math.sqrt(max(base.train.rmse**2 - noise**2, structure**2, 1e-300))
+    assert best.held is not None and base.held is not None
+    data = study.data
+    floors = [
+        math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records]))) for v in (data.train, data.held)
+    ]
+    expected = _NOISIER * noise * floors[1] / floors[0]
+    outside = math.sqrt(max(best.held.rmse**2 - expected**2, 0.0))
+    there_outside = math.sqrt(max(base.held.rmse**2 - expected**2, outside**2, 1e-300))
+    return noise, max(structure, outside), max(structure / there, outside / there_outside)
 
 
 def _errors(tried: Trial, study: Study) -> tuple[float, float]:

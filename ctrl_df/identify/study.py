@@ -88,10 +88,9 @@ class Study:
 
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
-        stages, fits = [], [t.train for t in (self.base, *found[:CONFIRMED])]
-        for level in self.levels:
-            fits = [level.moved(f) for f in fits]
-            stages.append(fits)
+        shortest, middle, longest = self.levels
+        fits = [middle.moved(t.train) for t in (self.base, *found[:CONFIRMED])]
+        stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
         self.data = self.levels[at]
         fine = self.data.fine
