@@ -372,14 +372,12 @@ def _frequencies(omega) -> np.ndarray:
 
 def _real(name, values) -> np.ndarray:
     array = np.asarray(values)
-    if array.dtype.kind not in "biuf":
-        try:
-            array = array.astype(float)
-        except (TypeError, ValueError):
-            raise TypeError(f"{name} must be real numbers; got {values!r}.") from None
-        if np.iscomplexobj(np.asarray(values)):
-            raise TypeError(f"{name} must be real numbers; got complex ones. An amplitude is a peak value.")
-    return array.astype(float)
+    if np.iscomplexobj(array):
+        raise TypeError(f"{name} must be real numbers; got complex ones. An amplitude is a peak value.")
+    try:
+        return array.astype(float)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be real numbers; got {values!r}.") from None
 
 
 def _axis(name, values, unit) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,7 +107,8 @@ class Family:
             upper = int(np.clip(np.searchsorted(grid, np.log(amplitude)), 1, grid.size - 1))
             share = (np.log(amplitude) - grid[upper - 1]) / (grid[upper] - grid[upper - 1])
             response = (1 - share) * table[upper - 1] + share * table[upper]
-        return ct.frd(np.array(response), self.omega, name=f"N({amplitude:g})")
+        name = f"N({amplitude:g})".replace(".", "_")  # python-control allows no point in a name
+        return ct.frd(np.array(response), self.omega, name=name)
 
     def plot(self, **kwargs) -> ct.ControlPlot:
         """Draw -1/N in the complex plane, at constant amplitude and at constant frequency."""
@@ -180,7 +182,7 @@ def read_arrays(path) -> dict[str, np.ndarray]:
     try:
         with np.load(path, allow_pickle=False) as file:
             data = {key: file[key] for key in file.files}
-    except (ValueError, EOFError, OSError) as error:
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
         if isinstance(error, FileNotFoundError):
             raise
         raise ValueError(f"a family file must be an npz without pickled objects; {path}: {error}.") from None
