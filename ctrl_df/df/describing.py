@@ -67,7 +67,7 @@ def describing_function(
         num_points, zero_check, try_method, omega = shifted, bool(num_points), zero_check, None
     A = _amplitudes(A)
     omega = None if omega is None else _frequencies(omega)
-    shape = A.shape if omega is None else np.broadcast_shapes(A.shape, omega.shape)
+    shape = _common_shape(A, omega)
     largest = float(A.max()) if A.size and A.max() > 0 else 1.0
     method = method_for(F, output, try_method, num_points, largest, options)
     _check_options(method, options)
@@ -131,7 +131,7 @@ def describing_function_family(
             "a family needs A > 0; got A=0. Leave it out, or ask describing_function for the slope."
         )
     omega = None if omega is None else _axis("omega", _frequencies(omega), "rad/s")
-    if isinstance(orders, bool) or int(orders) != orders or orders < 1:
+    if not isinstance(orders, int | np.integer) or isinstance(orders, bool) or orders < 1:
         raise ValueError(f"a family needs orders as an integer >= 1 (highest harmonic); got {orders!r}.")
     method = method_for(F, output, try_method, num_points, float(A.max()), options)
     _check_options(method, options)
@@ -154,7 +154,7 @@ class _Work:
             method.name == "orbit"
         )  # along amplitudes one orbit starts the next: keep columns whole
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
-        self.save = None if save is None else Path(save)
+        self.save = None if save is None else _in_a_folder(Path(save))
         self.saved_at = time.monotonic()
         if self.save is not None and self.save.exists():
             self._resume()
@@ -252,6 +252,13 @@ class _Work:
             description=describe(self.F),
             output=self.method.output,
         )
+
+
+def _in_a_folder(path: Path) -> Path:
+    """Refuse a file in a folder that does not exist, before the work and not after it."""
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
+    return path
 
 
 def compute_part(method: Method, A, omega, orders):
@@ -378,6 +385,18 @@ def _real(name, values) -> np.ndarray:
         return array.astype(float)
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be real numbers; got {values!r}.") from None
+
+
+def _common_shape(A, omega):
+    if omega is None:
+        return A.shape
+    try:
+        return np.broadcast_shapes(A.shape, omega.shape)
+    except ValueError:
+        raise ValueError(
+            f"A and omega must broadcast; got shapes {A.shape} and {omega.shape}. "
+            "For every pair of both use describing_function_family."
+        ) from None
 
 
 def _axis(name, values, unit) -> np.ndarray:

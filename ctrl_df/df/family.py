@@ -166,6 +166,8 @@ def minus_inverse(N) -> np.ndarray:
 def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
     """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
     path = Path(path)
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     try:
         with os.fdopen(handle, "wb") as file:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
+from .finder import OrbitFinder
 from .grade import LimitCycle
-from .orbit import Orbit, OrbitFinder
+from .orbit import Orbit
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "not tested"
@@ -143,10 +144,18 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    if not hasattr(resp, "limit_cycles"):
+        raise TypeError(
+            f"verify needs the answer of describing_function_response; got {type(resp).__name__}. "
+            "python-control's own result does not keep H and the block."
+        )
     cycles = list(resp.limit_cycles)
     if loop is None:
         try:
-            loop = closed_loop(resp.H, translated(resp.block))
+            block = translated(resp.block)
+            described = resp.family.output if resp.family is not None else None
+            output = described if described in getattr(block, "output_labels", ()) else None
+            loop = closed_loop(resp.H, block, output=output)
             finder = OrbitFinder(loop)
         except (ValueError, TypeError) as error:
             return Check(tuple(Row(c, None, None, UNTESTED) for c in cycles), [], f"not simulated: {error}")
@@ -209,7 +218,7 @@ def simulated(finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 
         return None
     if orbit.stable is None:
         return orbit.omega, orbit.output_amplitude
-    swings = finder._swings(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps, None)
+    swings = finder.swings.follow(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps)
     if len(swings) < 8:
         return None
     t = np.array([s[0] for s in swings])

@@ -236,10 +236,13 @@ def short(text: str, most=46) -> str:
 
 def unbroken(curve, regime):
     """Cut a curve (by NaN) where it jumps between different motions: no motion lies on the line between."""
+    if curve.size < 2:
+        return curve.astype(complex)
     step = np.abs(np.diff(curve))
     size = np.maximum(np.abs(curve[1:]), np.abs(curve[:-1]))
+    usual = np.median(step[np.isfinite(step)]) if np.isfinite(step).any() else np.inf
     with np.errstate(invalid="ignore"):
-        jump = (step > 4 * np.nanmedian(step)) & (step > 0.25 * size) & (regime[1:] != regime[:-1])
+        jump = (step > 4 * usual) & (step > 0.25 * size) & (regime[1:] != regime[:-1])
     return np.insert(curve.astype(complex), np.nonzero(jump)[0] + 1, np.nan)
 
 
