@@ -165,7 +165,7 @@ class _Work:
             return
         quick = self.method.name != "orbit" and self.method.name not in ("backlash", "memory")
         parts = [lines] if quick and executor is None else [lines[i : i + 1] for i in range(lines.size)]
-        bar = _bar(lines.size, progress)
+        bar = progress_bar(lines.size, progress)
         try:
             if executor is None:
                 for part in parts:
@@ -421,10 +421,9 @@ def _check_options(method, options):
         raise TypeError(f"unrecognized keywords: {', '.join(options)}")
 
 
-def _bar(total: int, progress) -> Any:
+def progress_bar(total: int | None, progress, what="describing function", unit="line") -> Any:
+    """Return a bar that shows itself after two seconds, on a terminal only unless `progress` says otherwise."""
     from tqdm import tqdm
 
     disable = None if progress is None else not progress
-    return tqdm(
-        total=total, delay=0 if progress else 2, disable=disable, unit="line", desc="describing function"
-    )
+    return tqdm(total=total, delay=0 if progress else 2, disable=disable, unit=unit, desc=what, leave=False)

@@ -47,12 +47,12 @@ class Orbit:
     floquet: np.ndarray
     stable: bool | None
     residual: float
-    events: tuple[Event, ...]
+    events: tuple[Event, ...] = field(repr=False)
     status: Status
     grazing: float
-    time: np.ndarray
-    outputs: np.ndarray
-    states: np.ndarray
+    time: np.ndarray = field(repr=False)
+    outputs: np.ndarray = field(repr=False)
+    states: np.ndarray = field(repr=False)
     loop: Any = field(repr=False, default=None)
 
     @property
@@ -62,8 +62,10 @@ class Orbit:
 
     @property
     def multiplier(self) -> float:
-        """Largest |Floquet multiplier|, nan if unknown."""
-        return float(np.max(np.abs(self.floquet))) if len(self.floquet) else float("nan")
+        """Largest |Floquet multiplier|; nan if unknown, 0 if the orbit is all there is (one state)."""
+        if not len(self.floquet):
+            return float("nan") if self.stable is None else 0.0
+        return float(np.max(np.abs(self.floquet)))
 
     def same_as(self, other: Orbit, tolerance: float = 1e-4) -> bool:
         """Whether two orbits are one, up to a shift in time."""

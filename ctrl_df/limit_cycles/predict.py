@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
-from ..df.describing import _amplitudes, describing_function, describing_function_family
+from ..df.describing import _amplitudes, describing_function, describing_function_family, progress_bar
 from ..df.dispatch import method_for
 from ..df.family import Family, minus_inverse
 from .assess import Assessor
@@ -166,9 +166,10 @@ def describing_function_response(
         with_zero = describing_function(F, amplitudes, zero_check=False, **given)
         N_vals = minus_inverse(with_zero)
 
-    D = defect(method, linear)
     log_a, log_w, values = scan_grid(method, linear, family)
-    scan = find_crossings(D, log_a, log_w, values, refine)
+    with progress_bar(None, progress, "refining crossings", "point") as bar:
+        D = defect(method, linear, bar)
+        scan = find_crossings(D, log_a, log_w, values, refine)
     assessor = Assessor(method, linear, F, D, (log_a, log_w), scan, family, orders)
     cycles = assessor.cycles()
     return DescribingFunctionResponse(

@@ -15,12 +15,17 @@ FAST = ("element", "law", "rate", "linear", "friction")
 _NOISE = 1e-6  # spread of an average from which N jumps from point to point
 
 
-def defect(method: Method, linear: LinearPart):
-    """D(ln a, ln omega) = 1 + N H, for matching 1-D arrays; NaN where N is a noisy average."""
+def defect(method: Method, linear: LinearPart, bar=None):
+    """D(ln a, ln omega) = 1 + N H, for matching 1-D arrays; NaN where N is a noisy average.
+
+    `bar`, a progress bar, counts the points asked.
+    """
 
     def D(p, q):
         a, w = np.exp(p), np.exp(q)
         h, _ = linear.clamped(w)
+        if bar is not None:
+            bar.update(a.size)
         N, regime, spread = points(method, a, w)
         with np.errstate(all="ignore"):
             return np.where(noisy(regime, spread), np.nan, 1 + N * h)

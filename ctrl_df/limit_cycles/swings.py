@@ -15,6 +15,7 @@ from ..simulate.layout import H_OUT
 from ..simulate.sampled import Sampled
 
 _WORK = 300_000  # integration steps of one simulation
+_FEW = 12  # swings within that work, below which it is no use
 _QUIET = 40  # strides without a passage after which a loop is called at rest
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _GONE = 1e4  # times the largest kick: a loop beyond it has run away
@@ -69,7 +70,7 @@ class Swings:
         Returns
         -------
         list of Lap
-            Empty if the loop runs away.
+            Empty if the loop runs away, or spends all its work within a few swings.
         """
         state, laps, quiet, work = self.engine.start(x0), [], 0, 0
         limit = np.inf if longest is None else longest
@@ -84,6 +85,8 @@ class Swings:
             quiet = 0 if found else quiet + 1
             if len(laps) > 12 and _repeats(laps):
                 break
+        if work > _WORK and len(laps) < _FEW:
+            return []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
         return laps
 
     def _by_passage(self, state, laps, limit):
