@@ -165,6 +165,9 @@ class _Work:
             return
         quick = self.method.name != "orbit" and self.method.name not in ("backlash", "memory")
         parts = [lines] if quick and executor is None else [lines[i : i + 1] for i in range(lines.size)]
+        if len(parts) == 1 and executor is None:  # no bar: importing one takes longer than most of them
+            self._take(parts[0], compute_part(self.method, *self._grid(parts[0]), self.orders))
+            return self._finish()
         bar = progress_bar(lines.size, progress)
         try:
             if executor is None:
@@ -181,8 +184,11 @@ class _Work:
                     bar.update(len(part))
         finally:  # an interruption must not lose what is done
             bar.close()
-            if self.save is not None and self.done.any():
-                self._write()
+            self._finish()
+
+    def _finish(self):
+        if self.save is not None and self.done.any():
+            self._write()
 
     def _grid(self, part):
         return (self.A, self._omega[part]) if self.by_omega else (self.A[part], self.omega)
