@@ -17,6 +17,9 @@ from .orbit import Orbit
 from .swings import Swings
 
 
+_STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
+
+
 def find_limit_cycle(loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False, **keywords):
     """Find an exact periodic orbit of an autonomous loop (input r = 0).
 
@@ -233,11 +236,13 @@ class OrbitFinder:
             x[o + 2] = x[o] + np.clip(x[o + 2] - x[o], 0.0, core.gap)
         return x
 
-    def _finished(self, start, period, lap, size, status) -> Orbit:
+    def _finished(self, start, period, lap, size, status) -> Orbit | None:
         times = np.linspace(0.0, period, 1025)
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         run = self.engine.run(start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8)
+        if np.max(np.ptp(run.states, axis=0) / size) < _STILL:
+            return None  # an equilibrium, periodic with any period
         live = self._live_states()
         values = np.linalg.eigvals(lap.monodromy[np.ix_(live, live)])
         trivial = int(np.argmin(np.abs(values - 1.0)))
