@@ -13,6 +13,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..drawing import draw
+
 FORMAT = 1
 
 
@@ -112,11 +114,11 @@ class Family:
 
     def plot(self, **kwargs) -> ct.ControlPlot:
         """Draw -1/N in the complex plane, at constant amplitude and at constant frequency."""
-        return _drawing("ctrl_df.plot.family").plot_family(self, **kwargs)
+        return draw("family", self, **kwargs)
 
     def plot_harmonics(self, **kwargs) -> ct.ControlPlot:
         """Draw |Y_k| / A over frequency or over amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
-        return _drawing("ctrl_df.plot.family").plot_harmonics(self, **kwargs)
+        return draw("harmonics", self, **kwargs)
 
     def save(self, path) -> Path:
         """Write the family to an ``.npz`` file (no pickle inside), whole or not at all."""
@@ -209,10 +211,3 @@ def _arrays(family: Family) -> dict[str, Any]:
         description=family.description,
         output=family.output,
     )
-
-
-def _drawing(module: str):
-    """Import the drawing layer, which lies above this one, only when a picture is asked for."""
-    import importlib
-
-    return importlib.import_module(module)

@@ -16,7 +16,6 @@ from .monodromy import RTOL, Tracer
 from .orbit import Orbit
 from .swings import Swings
 
-
 _STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..drawing import draw
 from ..simulate.engine import Event
 from ..status import Status
 
@@ -77,6 +78,4 @@ class Orbit:
 
     def plot(self, **keywords) -> ct.ControlPlot:
         """Draw one period of outputs and the phase portrait."""
-        from ..plot.orbit import orbit_plot
-
-        return orbit_plot(self, **keywords)
+        return draw("orbit", self, **keywords)

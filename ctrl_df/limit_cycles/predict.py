@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import control as ct
@@ -12,6 +11,7 @@ from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 from ..df.describing import _amplitudes, describing_function, describing_function_family, progress_bar
 from ..df.dispatch import method_for
 from ..df.family import Family, minus_inverse
+from ..drawing import draw
 from .assess import Assessor
 from .crossings import Scan, find_crossings
 from .grade import LimitCycle
@@ -69,7 +69,7 @@ class DescribingFunctionResponse(_PythonControlResponse):
 
     def plot(self, **kwargs) -> ct.ControlPlot:
         """Draw the Nyquist plot with the -1/N curves; see `describing_function_plot`."""
-        return importlib.import_module("ctrl_df.plot.describing").describing_function_plot(self, **kwargs)
+        return draw("analysis", self, **kwargs)
 
     def __repr__(self) -> str:
         """Return the status."""
