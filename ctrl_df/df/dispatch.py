@@ -10,9 +10,10 @@ import control as ct
 import numpy as np
 from control import descfcn
 
+from ..blocks.element import Element
 from ..blocks.hysteresis import play, relay_with_hysteresis
 from ..blocks.mechanism import Mass, Mechanism, TwoMass
-from ..blocks.memoryless import Element, saturation
+from ..blocks.memoryless import saturation
 from .memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
 
 # python-control's own classes, held at import: someone may put ours in their place.

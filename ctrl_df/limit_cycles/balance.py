@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
-from ..blocks.memoryless import Element
+from ..blocks.element import Element
 from ..blocks.primitives import PiecewiseAffine, Play
 from ..df.dispatch import Method
 

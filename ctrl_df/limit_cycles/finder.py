@@ -19,7 +19,9 @@ from .swings import Swings
 _STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
 
 
-def find_limit_cycle(loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False, **keywords):
+def find_limit_cycle(
+    loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False, **keywords
+):
     """Find an exact periodic orbit of an autonomous loop (input r = 0).
 
     Parameters
@@ -62,7 +64,9 @@ class OrbitFinder:
 
     def __init__(self, loop, max_iterations=40):
         if not isinstance(loop, ct.NonlinearIOSystem):
-            raise TypeError(f"find_limit_cycle needs a loop, e.g. closed_loop(pid, block); got {type(loop).__name__}.")
+            raise TypeError(
+                f"find_limit_cycle needs a loop, e.g. closed_loop(pid, block); got {type(loop).__name__}."
+            )
         self.loop: Any = loop
         self.engine = Engine(loop)
         self.tracer = Tracer(self.engine)
@@ -205,7 +209,9 @@ class OrbitFinder:
             if node[KIND] == MECHANISM:
                 m = mode[node[MODE] : node[MODE] + 4]
                 bodies = program.ints[node[AUX]]
-                count += int(m[0] == 0) + (int(m[1] == 0) if bodies == 2 else 0) + int(m[2] != 0) + int(m[3] != 0)
+                count += (
+                    int(m[0] == 0) + (int(m[1] == 0) if bodies == 2 else 0) + int(m[2] != 0) + int(m[3] != 0)
+                )
         return count
 
     def _at_rest(self, start, lap):
@@ -239,7 +245,9 @@ class OrbitFinder:
         times = np.linspace(0.0, period, 1025)
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
-        run = self.engine.run(start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8)
+        run = self.engine.run(
+            start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
+        )
         if np.max(np.ptp(run.states, axis=0) / size) < _STILL:
             return None  # an equilibrium, periodic with any period
         live = self._live_states()
@@ -282,7 +290,9 @@ class OrbitFinder:
         t0 = state.time
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         times = t0 + np.linspace(0, min(4, count) * period, 2049)
-        run = self.engine.run(state, t0 + span, times=times, rtol=1e-8, spectrum=spectrum, omega=omega, max_step=period / 8)
+        run = self.engine.run(
+            state, t0 + span, times=times, rtol=1e-8, spectrum=spectrum, omega=omega, max_step=period / 8
+        )
         if not run.status.ok:
             return None
         amplitudes = 2 * np.abs(spectrum[:, 1]) / span

@@ -69,7 +69,9 @@ def _forced_motion(loop, U, omega, wanted):
                 x = starts[0].copy()
                 x[2] += stretch * core.gap
                 x[3] = speed * core.gap * omega
-                x[1] = -core.masses[1] / core.masses[0] * x[3]  # no net momentum: the pair must not drift away
+                x[1] = (
+                    -core.masses[1] / core.masses[0] * x[3]
+                )  # no net momentum: the pair must not drift away
                 starts.append(x)
     found = [_forced_from(engine, core, row, x, U, omega) for x in starts]
     if wanted is not None:

@@ -81,7 +81,9 @@ class Tracer:
             if len(segments) >= self.max_events:
                 status = Status.WORK_LIMIT
                 break
-            run = self.engine.run(now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=2, max_steps=200_000)
+            run = self.engine.run(
+                now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=2, max_steps=200_000
+            )
             if not run.status.ok:
                 status = run.status
                 break
@@ -116,7 +118,9 @@ class Tracer:
                 moved = state.copy()
                 moved.x[j] += sign * h
                 ends.append(
-                    self.engine.run(moved, state.time + span, self.drive, rtol=RTOL, locate=False, log=1).state.x
+                    self.engine.run(
+                        moved, state.time + span, self.drive, rtol=RTOL, locate=False, log=1
+                    ).state.x
                 )
             columns.append((ends[0] - ends[1]) / (2 * h))
         return np.array(columns).T

@@ -8,9 +8,10 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
-from ..df.describing import _amplitudes, describing_function, describing_function_family, progress_bar
+from ..df.describing import _amplitudes, describing_function, describing_function_family
 from ..df.dispatch import method_for
 from ..df.family import Family, minus_inverse
+from ..df.work import progress_bar
 from ..drawing import draw
 from .assess import Assessor
 from .crossings import Scan, find_crossings

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..df.describing import points
 from ..df.dispatch import Method
 from ..df.family import Family
+from ..df.points import points
 from .linear import LinearPart
 
 FAST = ("element", "law", "rate", "linear", "friction")

@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ..blocks.core import level
-from ..blocks.memoryless import Element
+from ..blocks.element import Element
 from ..simulate import driver
 from ..simulate.engine import Engine
 from ..simulate.layout import H_OUT

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..blocks.memoryless import Element
+from ..blocks.element import Element
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from .finder import OrbitFinder
@@ -90,7 +90,16 @@ class Check:
 
     def table(self) -> str:
         """Return the rows as text: predicted | exact | simulated, errors and verdict."""
-        head = ("predicted a @ w", "exact a @ w", "multiplier", "simulated y @ w", "error a", "error w", "grade", "verdict")
+        head = (
+            "predicted a @ w",
+            "exact a @ w",
+            "multiplier",
+            "simulated y @ w",
+            "error a",
+            "error w",
+            "grade",
+            "verdict",
+        )
         lines: list[tuple[str, ...]] = [head]
         for row in self.rows:
             p, e, s = row.predicted, row.exact, row.simulated
@@ -100,7 +109,9 @@ class Check:
                     f"{p.amplitude:.6g} @ {p.omega:.6g}" if p else "-",
                     f"{shown.amplitude:.7g} @ {shown.omega:.7g}" if shown else "-",
                     _multiplier(shown),
-                    f"{s[1]:.4g} @ {s[0]:.6g}" if s else ("leaves" if shown is not None and shown.stable is False else "-"),
+                    f"{s[1]:.4g} @ {s[0]:.6g}"
+                    if s
+                    else ("leaves" if shown is not None and shown.stable is False else "-"),
                     _percent(row.amplitude_error),
                     _percent(row.omega_error),
                     p.grade if p else "-",
@@ -108,7 +119,9 @@ class Check:
                 )
             )
         if len(lines) == 1:
-            lines.append(("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found"))
+            lines.append(
+                ("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found")
+            )
         widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
         text = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
         text.insert(1, "  ".join("-" * w for w in widths))
@@ -188,7 +201,9 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
             rows.append(Row(cycle, None, None, NONE))
             continue
         worst = max(abs(cycle.omega / match.omega - 1), abs(cycle.amplitude / match.amplitude - 1))
-        rows.append(Row(cycle, match, simulated(finder, match), CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED))
+        rows.append(
+            Row(cycle, match, simulated(finder, match), CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED)
+        )
     paired = {id(orbit) for orbit in partner.values()}
     for orbit in orbits:
         if id(orbit) not in paired:
@@ -222,8 +237,12 @@ def _pairs(cycles, orbits) -> dict[int, Orbit]:
     for cycle in cycles:
         for orbit in orbits:
             if _close(cycle, orbit):
-                distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(np.log(cycle.amplitude / orbit.amplitude))
-                disagree = orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
+                distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(
+                    np.log(cycle.amplitude / orbit.amplitude)
+                )
+                disagree = (
+                    orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
+                )
                 near.append((distance * (2.0 if disagree else 1.0), len(near), cycle, orbit))
     partner: dict[int, Orbit] = {}
     taken: set[int] = set()
@@ -234,7 +253,9 @@ def _pairs(cycles, orbits) -> dict[int, Orbit]:
     return partner
 
 
-def simulated(finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01) -> tuple[float, float] | None:
+def simulated(
+    finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01
+) -> tuple[float, float] | None:
     """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves the orbit."""
     if orbit.stable is False:
         return None
@@ -252,7 +273,9 @@ def simulated(finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 
     engine = finder.engine
     spectrum = np.zeros((engine.noutputs, 2), complex)
     period = 2 * np.pi / omega
-    run = engine.run(engine.start(swings[-1][1]), period, rtol=1e-8, max_step=period / 8, spectrum=spectrum, omega=omega)
+    run = engine.run(
+        engine.start(swings[-1][1]), period, rtol=1e-8, max_step=period / 8, spectrum=spectrum, omega=omega
+    )
     amplitude = 2 * abs(spectrum[0, 1]) / period
     if not run.status.ok or not 0.2 < amplitude / orbit.output_amplitude < 5:
         return None
@@ -274,5 +297,3 @@ def _multiplier(orbit) -> str:
 
 def _percent(value) -> str:
     return "-" if np.isnan(value) else f"{100 * value:+.2f} %"
-
-
