@@ -32,8 +32,10 @@ figure, ax = plt.subplots(layout="constrained")
 for a, row in zip(A, change, strict=True):
     ax.semilogy(omega, row, "k", lw=1)
     ax.annotate(f"{a:g} N", (omega[-1], row[-1]), xytext=(4, 0), textcoords="offset points", va="center")
+ax.margins(x=0.1)
 ax.set_xlabel("omega [rad/s]")
 ax.set_ylabel("|N / N without Stribeck - 1|")
+ax.set_title("Change of N by the Stribeck curve, by force amplitude", fontsize=10)
 finish(figure)
 
 # %%

@@ -36,7 +36,10 @@ _ANALYSIS = (
 )
 
 
-def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None, **kwargs) -> ct.ControlPlot:
+_POINT_LABEL = "%5.2g @ %-5.2g"  # python-control's
+
+
+def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **kwargs) -> ct.ControlPlot:
     """Nyquist plot of H with the -1/N curves of the block; crossings carry amplitude and frequency.
 
     Called as ``describing_function_plot(response)`` or ``describing_function_plot(H, F, A[, omega])``; the
@@ -50,7 +53,8 @@ def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None,
     *sysdata
         A response, or H, F, A and optionally omega.
     point_label : str or None
-        Format of the crossings' labels, two numbers: amplitude and frequency. None: no labels.
+        Format of the crossings' labels, two numbers: amplitude and frequency. None: no labels. The default is
+        python-control's, for a mechanism with units and more digits.
     label : str, False or None
         Name of the Nyquist curve.
     ax, title
@@ -156,6 +160,9 @@ def _name_curve(ax, curve, name):
 
 def _mark(ax, response, point_label):
     """Mark the crossings: filled where Loeb calls the cycle stable, open otherwise."""
+    force = units(response.family)[0]
+    if force and point_label == _POINT_LABEL:
+        point_label = f"%.4g{force} @ %.4g rad/s"
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     places = [
         ((p.real - left) / (right - left), (p.imag - bottom) / (top - bottom)) for p in response.positions
