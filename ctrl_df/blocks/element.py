@@ -1,4 +1,4 @@
-"""What all memoryless and simple hysteretic elements share: a value, python-control's dialect, a builder's name."""
+"""What memoryless and hysteretic elements share: a value, python-control's dialect, a builder's name."""
 
 from __future__ import annotations
 

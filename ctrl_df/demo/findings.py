@@ -84,7 +84,7 @@ class Finding:
 
 
 def find(loop: PaperLoop, known: list[Finding] | None = None) -> Finding:
-    """Predict, verify and simulate one loop; a prediction for the same plant is taken from `known` findings."""
+    """Predict, verify and simulate one loop; `known` findings lend a prediction for the same plant."""
     same = [f.response for f in known or () if f.loop.plant == loop.plant and f.loop.box is loop.box]
     response = same[0] if same else describing_function_response(loop.controller, loop.plant, *loop.box)
     system = closed_loop(loop.controller, loop.plant, dt=loop.dt)  # type: ignore[arg-type]

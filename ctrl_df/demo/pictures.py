@@ -103,7 +103,8 @@ def _figure_9(findings):
     return loop_response_plot(
         run,
         window=(0, 6),
-        title=f"Fig. 9: backlash, restitution 0.2: settles to {end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
+        title="Fig. 9: backlash, restitution 0.2: settles to "
+        f"{end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
     ).figure
 
 

@@ -1,4 +1,4 @@
-"""A family computed in parts: in this process or by an executor, saved as it goes, resumed where it stopped."""
+"""A family computed in parts: here or by an executor, saved as it goes, resumed where it stopped."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def identity(F) -> str:
 
 
 def progress_bar(total: int | None, progress, what="describing function", unit="line") -> Any:
-    """Return a bar that shows itself after two seconds, on a terminal only unless `progress` says otherwise."""
+    """Return a bar that shows itself after two seconds; only on a terminal, unless `progress` says more."""
     from tqdm import tqdm
 
     disable = None if progress is None else not progress

@@ -27,17 +27,18 @@ def find_limit_cycle(
     Parameters
     ----------
     loop : ct.InterconnectedSystem
-        From `closed_loop`, or any interconnection that `event_response` runs; with loops of one's own the first output
-        is taken as the output and the last one as the block's input.
+        From `closed_loop`, or any interconnection that `event_response` runs; with loops of one's own the
+        first output is taken as the output and the last one as the block's input.
     guess : LimitCycle, Orbit, (amplitude, omega), state array, or None
-        Where to start. A prediction starts from the block's forced motion at its amplitude and frequency; None searches
-        from simulations of several sizes and returns the first orbit found, stable ones first.
+        Where to start. A prediction starts from the block's forced motion at its amplitude and frequency;
+        None searches from simulations of several sizes and returns the first orbit found, stable ones first.
     max_iterations : int
         Bound on Newton steps.
     search_time : float
         Longest simulation of the search [s]; by default some hundred swings.
     raise_on_failure : bool
-        Raise RuntimeError (with the best estimate as ``.orbit``) instead of returning an orbit whose status says why.
+        Raise RuntimeError (with the best estimate as ``.orbit``) instead of returning an orbit whose status
+        says why.
 
     Returns
     -------
@@ -77,7 +78,7 @@ class OrbitFinder:
         self.swings = Swings(loop, self.engine)
 
     def from_guess(self, guess) -> Orbit | None:
-        """Refine a guess; for a sampled loop simulate from it instead (its cycles are not periodic to the sample)."""
+        """Refine a guess; a sampled loop, not periodic to the sample, is simulated from it instead."""
         if isinstance(guess, Orbit):
             return self._from_state(guess.states[:, 0], guess.period)
         if isinstance(guess, np.ndarray) and guess.shape == (self.engine.nstates,):
@@ -221,12 +222,12 @@ class OrbitFinder:
         return bool(np.max(speed) < 1e-9 * (1e-3 + np.max(np.abs(start.x)))) and bool(np.max(moved) < 1e-9)
 
     def _rebuilt(self, start, x):
-        """Return the moved start in freshly settled modes; rigid joints kept closed, gaps and stops respected."""
+        """Return the moved start in freshly settled modes: rigid joints closed, within gaps and stops."""
         state = self.tracer.settle(self.engine.start(self.feasible(x)))
         return state if np.all(np.isfinite(state.x)) else None
 
     def feasible(self, x):
-        """Return the nearest state with rigid joints closed, stretches within gaps and bodies within stops."""
+        """Return the nearest state with rigid joints closed, within gaps and stops."""
         core = getattr(self.parts.block, "core", None) if self.parts is not None else None
         x = np.array(x, dtype=float)
         if core is None:
@@ -277,7 +278,7 @@ class OrbitFinder:
         return np.flatnonzero(live)
 
     def _averaged(self, x0, times, laps, swings=40) -> Orbit | None:
-        """Average the figures of a motion that never quite repeats (sampled or aperiodic) over many swings."""
+        """Average over many swings of a motion that never quite repeats (sampled or aperiodic)."""
         if len(times) < 8:
             return None
         count = min(swings, len(times) - 1)
@@ -297,9 +298,9 @@ class OrbitFinder:
             return None
         amplitudes = 2 * np.abs(spectrum[:, 1]) / span
         return Orbit(
-            omega, period, float(amplitudes[self.force_row]), float(amplitudes[0]), np.zeros(0, complex), None, np.nan,
-            tuple(self.engine.name_events(run.events))[:200], Status.NO_PERIOD, np.nan, times - t0,
-            run.outputs.T, run.states.T, self.loop,
+            omega, period, float(amplitudes[self.force_row]), float(amplitudes[0]), np.zeros(0, complex),
+            None, np.nan, tuple(self.engine.name_events(run.events))[:200], Status.NO_PERIOD, np.nan,
+            times - t0, run.outputs.T, run.states.T, self.loop,
         )  # fmt: skip
 
 
@@ -315,7 +316,8 @@ def _amplitude_omega(guess, nstates):
         ) from None
     if not (0 < amplitude < np.inf and 0 < omega < np.inf):
         raise ValueError(
-            f"a guess needs amplitude > 0 and omega > 0 [rad/s], both finite; got ({amplitude:g}, {omega:g}). "
+            "a guess needs amplitude > 0 and omega > 0 [rad/s], both finite; got "
+            f"({amplitude:g}, {omega:g}). "
             "Leave the guess out to search."
         )
     return amplitude, omega

@@ -51,7 +51,7 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None) ->
 
 
 def _forced_motion(loop, U, omega, wanted):
-    """Block alone under the guessed input: its state at t = 0, mean position removed, and its output's Y_k."""
+    """State of the block alone at t = 0 under the guessed input, its mean position removed, and its Y_k."""
     block, amplitude = loop.parts.block, abs(U[1])
     if not block.nstates:
         return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])

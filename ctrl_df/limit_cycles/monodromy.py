@@ -2,9 +2,9 @@
 
 Between events the perturbation of a state is carried by the flow of the mode, differentiated here by central
 differences (exact to rounding where the flow is linear). At an event it is carried by the saltation matrix
-``S = R + (f+ - R f-) n^T / (n f-)`` with f the rates before and after, R the derivative of the reset (impact, or the loss
-of a velocity to sticking) and n the gradient of the event's margin (Leine & Nijmeijer 2004, ch. 7). S loses rank where
-a body sticks, and is singular where the margin is grazed.
+``S = R + (f+ - R f-) n^T / (n f-)`` with f the rates before and after, R the derivative of the reset (impact,
+or the loss of a velocity to sticking) and n the gradient of the event's margin (Leine & Nijmeijer 2004, ch.
+7). S loses rank where a body sticks, and is singular where the margin is grazed.
 """
 
 from __future__ import annotations

@@ -196,8 +196,8 @@ def _check_timebase(linear, F, method):
         mine = f"dt={linear.H.dt}"
         raise ValueError(
             f"H and the block need one timebase; got {mine} for H and dt={dt} for the block. "
-            "Give H in the block's timebase (ct.sample_system makes a continuous H discrete), or simulate the "
-            "sampled loop with closed_loop(dt=)."
+            "Give H in the block's timebase (ct.sample_system makes a continuous H discrete), or simulate "
+            "the sampled loop with closed_loop(dt=)."
         )
 
 

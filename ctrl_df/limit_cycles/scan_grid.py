@@ -1,4 +1,4 @@
-"""The grid on which 1 + N H is searched: the family's, made finer where that costs little or H varies fast."""
+"""The grid on which 1 + N H is searched: the family's, finer where that costs little or H varies fast."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A loop simulated from kicks of many sizes, told swing by swing: how limit cycles are searched without a guess."""
+"""A loop simulated from kicks of many sizes, swing by swing: the search for cycles without a guess."""
 
 from __future__ import annotations
 
@@ -49,7 +49,9 @@ class Swings:
         block = None if self.parts is None else self.parts.block
         by_input = isinstance(block, Element) or (block is not None and not block.nstates)
         self.row = engine.noutputs - 1 if by_input else 0
-        self.held = by_input and bool(self.parts.dt)  # a held input steps: no passage to locate
+        self.held = by_input and bool(
+            getattr(self.parts, "dt", 0)
+        )  # a held input steps: no passage to locate
         ints = engine.program.ints
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
         self.kicks = list(self._kicks())

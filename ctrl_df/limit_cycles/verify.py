@@ -18,7 +18,8 @@ from .orbit import Orbit
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "not tested"
 
-# Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle, shifted.
+# Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle,
+# shifted.
 CONFIRMED_WITHIN = 0.05
 SHIFTED_WITHIN = (1.25, 2.0)  # frequency, amplitude
 
@@ -145,7 +146,8 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     resp : DescribingFunctionResponse
         From `ctrl_df.describing_function_response`.
     loop : ct.InterconnectedSystem, optional
-        The loop to simulate; default ``closed_loop(resp.H, resp.block)``. Give the sampled loop to see what sampling does.
+        The loop to simulate; default ``closed_loop(resp.H, resp.block)``. Give the sampled loop to see what
+        sampling does.
     search : bool
         Also search, from simulations of many sizes, for orbits that the prediction missed.
     search_time : float
@@ -154,8 +156,8 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     Returns
     -------
     Check
-        ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or more improper
-        than a PID) rows say ``not tested`` and ``.note`` why.
+        ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or
+        more improper than a PID) rows say ``not tested`` and ``.note`` why.
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
@@ -232,7 +234,7 @@ def _advanced(H, block):
 
 
 def _pairs(cycles, orbits) -> dict[int, Orbit]:
-    """Pair predictions with orbits, nearest first, each once; of equally near ones those that agree on stability."""
+    """Pair predictions with orbits, nearest first, each once; agreeing on stability brings them nearer."""
     near = []
     for cycle in cycles:
         for orbit in orbits:
@@ -256,7 +258,7 @@ def _pairs(cycles, orbits) -> dict[int, Orbit]:
 def simulated(
     finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01
 ) -> tuple[float, float] | None:
-    """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves the orbit."""
+    """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves."""
     if orbit.stable is False:
         return None
     if orbit.stable is None:

@@ -190,15 +190,10 @@ def view_of(values, include=()) -> tuple[float, float, float, float]:
     z = z[np.isfinite(z)]
     include = np.asarray(list(include), dtype=complex)
     if include.size:
-        size = 0.75 * np.abs(include).max()
-        low = complex(min(np.real(include)) - size, min(np.imag(include)) - size)
-        high = complex(max(np.real(include)) + size, max(np.imag(include)) + size)
-        near = z[(abs(z.real - include[0].real) <= 3 * size) & (abs(z.imag - include[0].imag) <= 3 * size)]
-        if near.size:
-            spare = complex(0.25, 0.25) * size
-            some = np.concatenate([near, include])
-            low = complex(max(low.real, some.real.min()), max(low.imag, some.imag.min())) - spare
-            high = complex(min(high.real, some.real.max()), min(high.imag, some.imag.max())) + spare
+        (left, right), (bottom, top) = (
+            _around(part(z), part(include), include) for part in (np.real, np.imag)
+        )
+        low, high = complex(left, bottom), complex(right, top)
     elif z.size:
         reach = np.quantile(np.abs(z), 0.8)
         z = z[np.abs(z) <= reach * 1.001]
@@ -211,6 +206,16 @@ def view_of(values, include=()) -> tuple[float, float, float, float]:
     height, width = max(height, 0.25 * width), max(width, 0.25 * height)
     mid_x, mid_y = 0.5 * (left + right), 0.5 * (bottom + top)
     return mid_x - 0.58 * width, mid_x + 0.58 * width, mid_y - 0.58 * height, mid_y + 0.58 * height
+
+
+def _around(values, include, places):
+    """Bounds about `include` that leave out what holds no values; the sizes of `places` set the margins."""
+    size = 0.75 * np.abs(places).max()
+    some = np.concatenate([values[np.abs(values - include[0]) <= 3 * size], include])
+    spare = 0.25 * size
+    low = max(include.min() - size, some.min() - spare)
+    high = min(include.max() + size, some.max() + spare)
+    return low, high
 
 
 def set_view(ax, view):
