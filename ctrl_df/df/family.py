@@ -184,7 +184,10 @@ def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
 def read_arrays(path) -> dict[str, np.ndarray]:
     """Read an npz file of a family, refusing pickles and strangers."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open(path, "rb") as handle:
+            file = np.load(handle, allow_pickle=False)
+            if isinstance(file, np.ndarray):
+                raise ValueError("it holds one bare array")
             data = {key: file[key] for key in file.files}
     except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
         if isinstance(error, FileNotFoundError):
