@@ -15,7 +15,7 @@ from .simulator import feasible
 from .trial import SHORTEST, Data, Trial, prepare
 
 CONFIRMED = 6
-"""Candidates that are refitted at the full rate."""
+"""Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
 
 _LEVELS = (SHORTEST, 4, 1)
 # Best error over windows four times as long that still counts as the same.
@@ -89,14 +89,15 @@ class Study:
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
         shortest, middle, longest = self.levels
-        fits = [middle.moved(t.train) for t in (self.base, *found[:CONFIRMED])]
+        found = found[:2] + [t for t in found[2:CONFIRMED] if t.evidence > 0.2 * found[0].evidence]
+        fits = [middle.moved(t.train) for t in (self.base, *found)]
         stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
         self.data = self.levels[at]
         fine = self.data.fine
         best = [
             fine.judged(replace(t, train=fine.moved(f, 3, 1e-3), confirmed=True))
-            for t, f in zip((self.base, *found[:CONFIRMED]), stages[at], strict=True)
+            for t, f in zip((self.base, *found), stages[at], strict=True)
         ]
         self.base = best[0]
         chosen, self.noise = ranked(self.base, best[1:])

@@ -127,6 +127,7 @@ class Data:
     thin: int
     scales: Scales
     whole: tuple[View, View] | None = None
+    step: int = 0  # samples a step of the input before this was made fine
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -141,7 +142,7 @@ class Data:
     @property
     def fine(self) -> Data:
         """The same at the records' full rate."""
-        return replace(self, thin=1)
+        return replace(self, thin=1, step=self.thin)
 
     def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
@@ -162,10 +163,12 @@ class Data:
     def judged(self, tried: Trial) -> Trial:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
         # Those of short windows are found without fail; the others begin at the same places.
-        short = self.level(SHORTEST).held
-        near = self.fit(tried.block, (), view=short, iterations=6, tolerance=1e-2)
-        starts = same_begins(near, self.held.windows)
-        held = self.fit(tried.block, (), view=self.held, starts=starts, iterations=4, tolerance=1e-2)
+        rough, short = replace(self, thin=self.step or self.thin), self.level(SHORTEST).held
+        near = rough.fit(tried.block, (), view=short, iterations=4, tolerance=2e-2)
+        near = rough.fit(
+            tried.block, (), view=self.held, starts=same_begins(near, self.held.windows), iterations=3
+        )
+        held = self.fit(tried.block, (), view=self.held, starts=near.starts, iterations=1)
         return replace(tried, held=held)
 
 
