@@ -10,12 +10,42 @@ import numpy as np
 from numba import njit
 
 from .flow import combine, external, input_rates, rates, signals
-from .layout import H_NG, H_NS, H_NX, H_OUT, H_SCRATCH, H_TRACK, KIND, NG, NIN, NOUT, NX, PAR, SAMPLED, G
+from .layout import (
+    A_BODIES,
+    AUX,
+    G_JOINT_HIGH,
+    G_JOINT_LOW,
+    G_WALL_HIGH,
+    G_WALL_LOW,
+    H_BUMP,
+    H_NG,
+    H_NS,
+    H_NX,
+    H_OUT,
+    H_SCRATCH,
+    H_TRACK,
+    KIND,
+    MECHANISM,
+    MODE,
+    NG,
+    NIN,
+    NOUT,
+    NX,
+    P_BUMP0,
+    P_HIGH,
+    P_LOW,
+    PAR,
+    PWA,
+    SAMPLED,
+    G,
+    X,
+)
 from .modes import event, sample, settle, track
 from .stepper import inside, prepare5, prepare8, roughness, step5, step8
 
 NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
 NODES = NODES + 0.5
+GRAIN = 4.0 * np.finfo(float).eps
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY = range(8)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN, sliding, step
 below the resolution of time."""
@@ -30,7 +60,7 @@ def workspace(prog):
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
     vectors = [np.zeros(n) for _ in range(4)] + [np.zeros(ng + 1) for _ in range(5)]
-    return (work, np.zeros((16, n)), np.zeros((8, n)), *vectors, owner)
+    return (work, np.zeros((16, n)), np.zeros((8, n)), *vectors, owner, np.zeros(3))
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -117,6 +147,52 @@ def accumulate(prog, drive, segment, t, length, theta, x, mode, work, order, pol
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
+def bump_share(prog, x, x1):
+    """Share of the way from x to x1 that a step may take near a narrow feature of friction over speed.
+
+    A Stribeck bump lies within about six of its speeds vs (exp(-36) is below rounding). There a step may change the
+    speed by vs, or by half: no stage of it can then miss the bump, and the error estimate sees it.
+    """
+    share = 1.0
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] != MECHANISM:
+            continue
+        for b in range(prog.ints[prog.nodes[n, AUX] + A_BODIES]):
+            narrow = prog.par[prog.nodes[n, PAR] + P_BUMP0 + b]
+            at = prog.nodes[n, X] + 2 * b + 1
+            v0, v1 = x[at], x1[at]
+            passes = v0 * v1 < 0.0 or min(abs(v0), abs(v1)) < 6.0 * narrow
+            if narrow < math.inf and passes and v1 != v0:
+                share = min(share, max(0.5 * abs(v0), narrow) / abs(v1 - v0))
+    return share
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def tolerances(prog, x, mode, scale, atol, gtol):
+    """Write how far below zero each margin may be before it counts as crossed.
+
+    A margin compares numbers that are rounded: positions far from zero, a corner of a saturation. What their last
+    digits make of it is no crossing.
+    """
+    for i in range(gtol.shape[0]):
+        gtol[i] = 1e-12 * scale[i] + 1e-2 * atol
+    for n in range(prog.nodes.shape[0]):
+        kind, first, go, po = prog.nodes[n, KIND], prog.nodes[n, X], prog.nodes[n, G], prog.nodes[n, PAR]
+        if kind == MECHANISM:
+            if prog.ints[prog.nodes[n, AUX] + A_BODIES] == 2:
+                rounding = GRAIN * (abs(x[first]) + abs(x[first + 2]))
+                gtol[go + G_JOINT_LOW] += rounding
+                gtol[go + G_JOINT_HIGH] += rounding
+            gtol[go + G_WALL_LOW] += GRAIN * abs(prog.par[po + P_LOW])
+            gtol[go + G_WALL_HIGH] += GRAIN * abs(prog.par[po + P_HIGH])
+        elif kind == PWA:
+            row = po + 4 * mode[prog.nodes[n, MODE]]
+            for side in range(2):
+                if abs(prog.par[row + side]) < math.inf:
+                    gtol[go + side] += GRAIN * abs(prog.par[row + side])
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
 def _worst(g, gtol, scale, blocked):
     """Smallest margin, relative to its scale, and its index."""
     value, index = 1.0, -1
@@ -143,7 +219,7 @@ def run(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are added; no
     columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner = space
+    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner, memo = space
     n, ng = x.shape[0], scale.shape[0]
     if fresh == 1:
         for j in range(n):
@@ -154,8 +230,10 @@ def run(
     segment = int(clock[6])
     steps = 0
     events_here = 0
-    zero_events = 0
-    last_event_t = t
+    # a run that goes on after a full event log goes on counting events without progress
+    zero_events = int(memo[0]) if memo[2] == 1.0 else 0
+    last_event_t = memo[1] if memo[2] == 1.0 else t
+    bumpy = prog.ints[H_BUMP] == 1
     nt = drive.time.shape[0]
     held = nt > 0 and drive.linear == 0
     has_tracked = prog.ints[H_TRACK] == 1
@@ -199,6 +277,10 @@ def run(
         if h <= 0.0:
             h = _first_step(x, k[0], rtol, atol, limit - t, hmax)
         length = min(h, hmax)
+        if bumpy:
+            for j in range(n):
+                x1[j] = x[j] + length * k[0, j]
+            length *= bump_share(prog, x, x1)
         truncated = t + length >= limit - 1e-12 * max(abs(limit), length)
         if truncated:
             length = limit - t
@@ -206,8 +288,8 @@ def run(
             for i in range(ng):
                 if g0[i] < math.inf:
                     scale[i] = max(scale[i], abs(g0[i]))
-                gtol[i] = 1e-12 * scale[i] + 1e-2 * atol
                 lowest[i] = g0[i]
+            tolerances(prog, x, mode, scale, atol, gtol)
             # margins already crossed at the start (simultaneous events)
             value, at = _worst(g0, gtol, scale, blocked)
             if at >= 0 and value < 0.0:
@@ -245,6 +327,11 @@ def run(
                 if t + h == t:
                     reason = TINY
                 continue
+            if bumpy:
+                share = bump_share(prog, x, x1)
+                if share < 0.7:
+                    h = 0.9 * share * length
+                    continue
             grow = 5.0 if error == 0.0 else min(5.0, 0.9 * error ** (-1.0 / order))
             h_next = length * max(grow, 0.3)
             if truncated:
@@ -361,6 +448,7 @@ def run(
     clock[5] = events_here
     clock[6] = segment
     clock[7] = 1.0 if blocked >= 0 else 0.0
+    memo[0], memo[1], memo[2] = zero_events, last_event_t, 1.0 if reason == FULL else 0.0
     return reason
 
 

@@ -271,6 +271,7 @@ def _core_node(core: Core, x0: int) -> Node:
     par = [core.masses[0], core.masses[1] if two else 1.0, core.gap, core.restitution, core.stiffness, core.damping]
     par += [low, high, core.stop.restitution if core.stop else 0.0]
     par += [bristle.stiffness, bristle.damping, bristle.level] if bristle else [0.0, 0.0, 0.0]
+    par += [_narrowest(chain) for chain in (core.friction + ((),))[:2]]
     laws = []
     for term in core.forces:
         laws.append((address(type(term.effect).law, "force"), len(par), term.state, term.body))  # type: ignore[arg-type]
@@ -297,6 +298,12 @@ def _core_node(core: Core, x0: int) -> Node:
     )
 
 
+def _narrowest(chain) -> float:
+    """Return the smallest speed a chain of friction laws names among its parameters [m/s]; inf if none does."""
+    speeds = [p.value for effect in chain for p in effect.parameters.values() if p.unit == "m/s"]
+    return min((v for v in speeds if v > 0), default=np.inf)
+
+
 # --- packing ----------------------------------------------------------------------------------------------
 
 
@@ -308,7 +315,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
     order = _feed_order(nodes, flat.us, s_at, u_at, flat.names)
     ns, nr = int(s_at[-1]), flat.ur.shape[1]
     widest = max((n.nin for n in nodes), default=1)
-    header = [nx, ns, nr, flat.ys.shape[0], 0, 0, widest, 0, 0, ns + nr, ns + nr + widest]
+    header = [nx, ns, nr, flat.ys.shape[0], 0, 0, widest, 0, 0, ns + nr, ns + nr + widest, 0]
     ints, par, modes = list(header), [], []
     table = np.zeros((len(nodes), 13), np.int64)
     ng = 0
@@ -346,6 +353,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
     ints[L.H_OUT] = rows(flat.ys, flat.yr)
     ints[L.H_NM], ints[L.H_NG] = len(modes), ng
     ints[L.H_TRACK] = int(any(n.kind in (L.PLAY, L.RATE) for n in nodes))
+    ints[L.H_BUMP] = int(any(n.kind == L.MECHANISM and min(n.par[L.P_BUMP0 : L.P_BUMP1 + 1]) < np.inf for n in nodes))
     program = Program(table, np.array(ints, np.int64), np.array(par, float))
     return program, np.array(modes, np.int64), [flat.names[i] for i in order]
 
