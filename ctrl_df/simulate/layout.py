@@ -67,8 +67,10 @@ EVENT_KINDS = (
 
 # header of the integer table: sizes of state, signals, inputs, outputs, modes, margins; widest node input; whether
 # margins need input rates; position of the output rows; offsets of node inputs and of scratch in the work vector;
-# whether a friction law has a narrow feature over speed
+# whether a friction law has a narrow feature over speed; whether the flow of every mode is affine; number of delays, and
+# where their history begins in the work vector
 H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_BUMP = range(12)
+H_AFFINE, H_DELAYS, H_HISTORY = 12, 13, 14
 
 # a law's record in the integer table
 R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SIZE = range(5)
@@ -96,4 +98,3 @@ class Drive(NamedTuple):
     harmonics: np.ndarray  # (nr, nh) complex, k = 0, 1, ...
     omega: float
     address: int  # of a function called back, or 0
-

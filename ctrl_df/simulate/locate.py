@@ -1,0 +1,213 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""Where an event lies inside a step: margins, their tolerances, the first one to cross zero."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from .flow import input_rates, rates, signals
+from .layout import (
+    A_BODIES,
+    AUX,
+    G_JOINT_HIGH,
+    G_JOINT_LOW,
+    G_WALL_HIGH,
+    G_WALL_LOW,
+    H_TRACK,
+    KIND,
+    MECHANISM,
+    MODE,
+    P_BUMP0,
+    P_HIGH,
+    P_LOW,
+    PAR,
+    PWA,
+    G,
+    X,
+)
+from .stepper import inside
+
+GRAIN = 4.0 * np.finfo(float).eps
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def margins(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
+    """Rates and all margins at one point, those of input rates and of the section included."""
+    rates(prog, drive, segment, t, x, mode, work, dx, g, True)
+    if prog.ints[H_TRACK] == 1:
+        input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g)
+    last = g.shape[0] - 1
+    g[last] = math.inf
+    if watch >= 0:
+        w = work[0]
+        signals(prog, t, x, mode, w)
+        g[last] = watch_sign * (w[watch] - watch_level)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def worst(g, gtol, scale, blocked):
+    """Smallest margin, relative to its scale, and its index."""
+    value, index = 1.0, -1
+    for i in range(g.shape[0]):
+        if i != blocked:
+            v = (g[i] + gtol[i]) / scale[i]
+            if v < value:
+                value, index = v, i
+    return value, index
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def tolerances(prog, x, mode, scale, atol, gtol):
+    """Write how far below zero each margin may be before it counts as crossed.
+
+    A margin compares numbers that are rounded: positions far from zero, a corner of a saturation. What their last
+    digits make of it is no crossing.
+    """
+    for i in range(gtol.shape[0]):
+        gtol[i] = 1e-12 * scale[i] + 1e-2 * atol
+    for n in range(prog.nodes.shape[0]):
+        kind, first, go, po = prog.nodes[n, KIND], prog.nodes[n, X], prog.nodes[n, G], prog.nodes[n, PAR]
+        if kind == MECHANISM:
+            if prog.ints[prog.nodes[n, AUX] + A_BODIES] == 2:
+                rounding = GRAIN * (abs(x[first]) + abs(x[first + 2]))
+                gtol[go + G_JOINT_LOW] += rounding
+                gtol[go + G_JOINT_HIGH] += rounding
+            gtol[go + G_WALL_LOW] += GRAIN * abs(prog.par[po + P_LOW])
+            gtol[go + G_WALL_HIGH] += GRAIN * abs(prog.par[po + P_HIGH])
+        elif kind == PWA:
+            row = po + 4 * mode[prog.nodes[n, MODE]]
+            for side in range(2):
+                if abs(prog.par[row + side]) < math.inf:
+                    gtol[go + side] += GRAIN * abs(prog.par[row + side])
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def bump_share(prog, x, x1):
+    """Share of the way from x to x1 that a step may take near a narrow feature of friction over speed.
+
+    A Stribeck bump lies within about six of its speeds vs (exp(-36) is below rounding). There a step may change the
+    speed by vs, or by half: no stage of it can then miss the bump, and the error estimate sees it.
+    """
+    share = 1.0
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] != MECHANISM:
+            continue
+        for b in range(prog.ints[prog.nodes[n, AUX] + A_BODIES]):
+            narrow = prog.par[prog.nodes[n, PAR] + P_BUMP0 + b]
+            at = prog.nodes[n, X] + 2 * b + 1
+            v0, v1 = x[at], x1[at]
+            passes = v0 * v1 < 0.0 or min(abs(v0), abs(v1)) < 6.0 * narrow
+            if narrow < math.inf and passes and v1 != v0:
+                share = min(share, max(0.5 * abs(v0), narrow) / abs(v1 - v0))
+    return share
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def locate_event(
+    prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, scale, blocked, watch,
+    watch_level, watch_sign,
+):  # fmt: skip
+    """Fraction of the step at which the first margin crosses zero, and its index (1.0, -1: none).
+
+    The inner stages of a step are crude; what they suspect is confirmed on the interpolant. `g` holds the margins at the end
+    of the step, before and after.
+    """
+    reach = 1e-4 * length
+    left, right = 0.0, -1.0
+    value_right, at = worst(g, gtol, scale, blocked)
+    value_left = 1.0
+    end_value, end_at = value_right, at
+    # a margin may go below zero and come back before it goes again: look from the left
+    pieces = 4 if 0 < terms <= 4 else 12
+    for p in range(1, pieces + 1):
+        theta = p / pieces
+        if p == pieces:
+            value, at = end_value, end_at
+        else:
+            inside(terms, theta, x, poly, xi)
+            margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch,
+                    watch_level, watch_sign)  # fmt: skip
+            value, at = worst(g, gtol, scale, blocked)
+        if value < 0.0:
+            right, value_right = theta, value
+            break
+        left, value_left = theta, value
+    if right < 0.0:
+        # g must again be the margins at the end of the step
+        inside(terms, 1.0, x, poly, xi)
+        margins(
+            prog, drive, segment, t + length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign
+        )
+        return 1.0, -1
+    if left == 0.0:
+        inside(terms, 0.0, x, poly, xi)
+        margins(prog, drive, segment, t, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)
+        value_left, _ = worst(g, gtol, scale, blocked)
+    if value_left < 0.0:
+        return 0.0, at
+    if left == 0.0:
+        # a flight or slip that began at this very point: its margin rises from zero before it falls
+        for _halving in range(50):
+            theta = 0.5 * right
+            inside(terms, theta, x, poly, xi)
+            margins(
+                prog,
+                drive,
+                segment,
+                t + theta * length,
+                xi,
+                mode,
+                work,
+                dx,
+                g,
+                reach,
+                watch,
+                watch_level,
+                watch_sign,
+            )
+            value, index = worst(g, gtol, scale, blocked)
+            if value >= 0.0:
+                left, value_left = theta, value
+                break
+            right, value_right, at = theta, value, index
+    weight_left, weight_right, side = value_left, value_right, 0
+    for iteration in range(100):
+        width = right - left
+        if width * length <= 2e-16 * max(abs(t), length) or width < 1e-15 or value_right > -1e-15:
+            break
+        # Illinois: a secant that cannot hang on one side, with a bisection now and then
+        theta = left + width * weight_left / (weight_left - weight_right)
+        if iteration % 5 == 4 or not left < theta < right:
+            theta = 0.5 * (left + right)
+        inside(terms, theta, x, poly, xi)
+        margins(
+            prog,
+            drive,
+            segment,
+            t + theta * length,
+            xi,
+            mode,
+            work,
+            dx,
+            g,
+            reach,
+            watch,
+            watch_level,
+            watch_sign,
+        )
+        value, index = worst(g, gtol, scale, blocked)
+        if value < 0.0:
+            right, value_right, weight_right, at = theta, value, value, index
+            if side < 0:
+                weight_left *= 0.5
+            side = -1
+        else:
+            left, weight_left = theta, value
+            if side > 0:
+                weight_right *= 0.5
+            side = 1
+    return right, at
