@@ -74,7 +74,7 @@ def memory(prog) -> Memory:
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def recall(prog, store, mode, work, x, dx0, dx, g):
     """Slot of the present mode among those learnt; learns it if it is new. `x`, `dx0`, `dx`, `g` are scratch."""
     known = int(store.order[0])
@@ -86,6 +86,13 @@ def recall(prog, store, mode, work, x, dx0, dx, g):
                 break
         if same:
             return slot
+    return _learn(prog, store, mode, work, x, dx0, dx, g)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _learn(prog, store, mode, work, x, dx0, dx, g):
+    """Learn the present mode in place of the one learnt first; returns its slot."""
+    known = int(store.order[0])
     slot = int(store.order[1])
     store.order[1] = (slot + 1) % SLOTS
     store.order[0] = min(known + 1, SLOTS)
@@ -125,7 +132,7 @@ def recall(prog, store, mode, work, x, dx0, dx, g):
     return slot
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def extend(prog, mode, work, g, out):
     """Copy margins to `out`, that of a body at rest as two: its hold ends upward or downward.
 
@@ -159,7 +166,7 @@ def extend(prog, mode, work, g, out):
             out[ng + b] = down + force
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def forced(prog, drive, segment, t, length, rtol, store):
     """Write the external inputs over a step as powers: r(t + theta length) = sum of forcing[k] theta^k, k from 1.
 
@@ -197,7 +204,7 @@ def forced(prog, drive, segment, t, length, rtol, store):
     return min(least, TERMS)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def series(store, slot, length, least, k0, size, rtol, atol, poly):
     """Power series of the flow over `length` seconds from a state with rates k0, into poly.
 
@@ -243,7 +250,7 @@ def shrink(store, share, terms, poly):
             store.forcing[k + 1, i] *= factor
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def crossing(prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm, g):
     """Fraction of the step at which the first margin crosses zero, and its index (1.0, -1: none).
 

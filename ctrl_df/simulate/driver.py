@@ -46,7 +46,7 @@ def workspace(prog, delays: bool = False):
     return (work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), memory(prog))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def copy(source, target):
     """Copy a vector in place."""
     for i in range(source.shape[0]):
@@ -88,7 +88,7 @@ def run(
     known = False  # k[0] holds the rates at (t, x)
     jumped = False  # something outside the states jumped just now: modes may be out of line
     generation = 1.0  # of the record that a delay opens next
-    patience = 0
+    patience = slot = 0
     blocked = ng - 1 if clock[7] > 0.5 else -1
     reason = DONE
     for i in range(ng):
@@ -135,6 +135,8 @@ def run(
         if jumped and (has_tracked or not locate):
             settle(prog, drive, segment, t, x, mode, work, dx)
             jumped = False
+        if affine:
+            slot = recall(prog, store, mode, work, x1, xi, dx, g)
         if jumped or not known:
             if locate:
                 reach = max(1e-4 * h, 1e-9)
@@ -186,10 +188,9 @@ def run(
             if truncated:
                 length = room
             prepared = False
-            terms = slot = rank = 0
+            terms = rank = 0
             if affine:
                 least = forced(prog, drive, segment, t, length, rtol, store)
-                slot = recall(prog, store, mode, work, x1, xi, dx, g)
                 terms, share = series(store, slot, length, least, k[0], size, rtol, atol, poly)
                 if not share > 0.0:
                     reason = NAN

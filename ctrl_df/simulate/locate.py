@@ -34,7 +34,7 @@ from .stepper import inside
 GRAIN = 4.0 * np.finfo(float).eps
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def margins(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
     """Rates and all margins at one point, those of input rates and of the section included."""
     rates(prog, drive, segment, t, x, mode, work, dx, g, True)
@@ -48,7 +48,7 @@ def margins(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_l
         g[last] = watch_sign * (w[watch] - watch_level)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def worst(g, gtol, scale, blocked):
     """Smallest margin, relative to its scale, and its index."""
     value, index = 1.0, -1
@@ -60,7 +60,7 @@ def worst(g, gtol, scale, blocked):
     return value, index
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def tolerances(prog, x, mode, scale, atol, gtol):
     """Write how far below zero each margin may be before it counts as crossed.
 

@@ -51,7 +51,7 @@ def tick(prog, drive, segment, t, x, mode, work):
                 sample(prog, n, x, w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def record(prog, drive, segment, t, x, mode, work, y):
     """System outputs at one point."""
     w = work[0]

@@ -48,7 +48,7 @@ def stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, a, c, fi
                 lowest[m] = min(lowest[m], g[m])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rtol, atol, want_g):
     """One step from x to x1 with k[0] known; fills the other rates, g (at the end); returns the scaled error.
 
@@ -136,7 +136,7 @@ def prepare(order, h, k, poly):
     return terms
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def inside(terms, theta, x, poly, out):
     """State at the fraction `theta` of a finished step: a power series of so many terms, or DOP853's form (0)."""
     n = x.shape[0]
