@@ -24,8 +24,8 @@ class Status(Enum):
         "state its corners, or loosen rtol"
     )
     HISTORY_FULL = (
-        "a pure delay holds more steps than its history has room for; loosen rtol, shorten the delay, "
-        "or put a lag of the same time in its place"
+        "a pure delay holds more steps than its history has room for; lengthen max_step or the sample time, "
+        "shorten the delay, or put a lag of the same time in its place"
     )
     USER_ERROR = "a user-written law or system raised or returned NaN; see the exception it carries"
     NOT_CONVERGED = "no periodic orbit was reached within the iterations allowed; start nearer or raise max_iterations"

@@ -58,7 +58,6 @@ class Memory(NamedTuple):
     base: np.ndarray  # scratch: rates and margins (ng + 3) at zero
     ahead: np.ndarray  # scratch: margins at a unit state, extended
     forcing: np.ndarray  # (TERMS + 1, nr): powers of the external inputs over a step
-    phase: np.ndarray  # (nr, HARMONICS, 2)
     curves: np.ndarray  # (TERMS + 1): a margin over a step
 
 
@@ -70,7 +69,7 @@ def memory(prog) -> Memory:
     return Memory(
         probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros((used, n, n)), np.zeros((used, n, nr)),
         np.zeros((used, n)), np.zeros((used, ng + 2, n + nr + 1)), np.zeros(ng + 3), np.zeros(ng + 3),
-        np.zeros((TERMS + 1, nr)), np.zeros((nr, HARMONICS, 2)), np.zeros(TERMS + 1),
+        np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
     )  # fmt: skip
 
 
@@ -208,7 +207,8 @@ def forced(prog, drive, segment, t, length, rtol, store):
 def series(store, slot, length, least, k0, size, rtol, atol, poly):
     """Power series of the flow over `length` seconds from a state with rates k0, into poly.
 
-    `least` is the least number of terms. Returns (terms, share): the series holds to tolerance over that share of the length (1: all of it).
+    `least` is the least number of terms. Returns (terms, share): the series holds to tolerance over that share of the
+    length (1: all of it).
     """
     n, nr = size.shape[0], store.b.shape[2]
     a = store.a[slot]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from .flow import external, node_input, signals
+from .flow import node_input, refresh
 from .layout import (
     A_BODIES,
     A_BRISTLE,
@@ -36,7 +36,7 @@ from .layout import (
     WALL,
     X,
 )
-from .mechanics import closed, dry_level, mechanism_rates, smooth_forces
+from .mechanics import accelerate, closed, dry_level, smooth_forces
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -197,11 +197,10 @@ def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     x[xo + 3] = common + m0 / (m0 + m1) * rebound
     x[xo + 2] = x[xo] + (gap if side > 0 else 0.0)
     mode[mo + JOINT] = 0
-    external(prog, drive, t, segment, w)
-    signals(prog, t, x, mode, w)
+    refresh(prog, drive, segment, t, x, mode, w)
     force = node_input(prog, node, 0, w)
     resolve(prog, node, t, x, mode, force, f, trial)
-    mechanism_rates(prog, node, t, x, mode, force, f, dx, g, False)
+    accelerate(prog, node, t, x, mode, force, f, dx, g)
     press = side * (dx[xo + 3] - dx[xo + 1])
     speed = abs(rebound)
     # positions are known relative to their size only: a flight below that resolution is none
@@ -209,7 +208,7 @@ def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     if press > 0.0 and speed * speed < 2.0 * press * lowest:
         x[xo + 1] = x[xo + 3] = common
         mode[mo + JOINT] = side
-        signals(prog, t, x, mode, w)
+        refresh(prog, drive, segment, t, x, mode, w)
         resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
         return E_CONTACT if mode[mo + JOINT] != 0 else E_IMPACT
     return E_IMPACT
@@ -235,18 +234,17 @@ def stop(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     elif joined:
         # the load flies on, or is hit at once when it stands between motor and stop
         mode[mo + JOINT] = 0 if rebound != v else mode[mo + JOINT]
-    external(prog, drive, t, segment, w)
-    signals(prog, t, x, mode, w)
+    refresh(prog, drive, segment, t, x, mode, w)
     force = node_input(prog, node, 0, w)
     resolve(prog, node, t, x, mode, force, f, trial)
-    mechanism_rates(prog, node, t, x, mode, force, f, dx, g, False)
+    accelerate(prog, node, t, x, mode, force, f, dx, g)
     press, speed = side * dx[at + 1], abs(rebound)
     if speed == 0.0 or (press > 0.0 and speed * speed < 2.0 * press * height * (high - low + abs(x[at]))):
         x[at + 1] = 0.0
         if rigid:
             x[xo + 1] = 0.0
         mode[mo + WALL] = side
-        signals(prog, t, x, mode, w)
+        refresh(prog, drive, segment, t, x, mode, w)
         resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
         return E_STOP_CONTACT
     return E_STOP

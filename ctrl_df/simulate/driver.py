@@ -13,9 +13,9 @@ from . import history
 from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
 from .flow import rates
 from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
-from .locate import bump_share, locate_event, margins, tolerances, worst
+from .locate import bump_share, complete, locate_event, margins, tolerances, worst
 from .modes import event, settle, track
-from .outputs import accumulate, next_sample, record, remember, start_delays, tick
+from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
 from .stepper import inside, prepare, prepare8, roughness, step
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
@@ -79,8 +79,9 @@ def run(
     if affine and nh > 1 and drive.omega > 0.0:
         # the series of the forcing has to converge as well
         hmax = min(hmax, 2.5 / ((nh - 1) * drive.omega))
-    if affine and spectrum.shape[1] > 0 and omega > 0.0:
-        hmax = min(hmax, 6.0 / (spectrum.shape[1] * omega))
+    if spectrum.shape[1] > 0 and omega > 0.0:
+        # ten nodes integrate a wave over so many radians of it
+        hmax = min(hmax, (6.0 if affine else 10.0) / (spectrum.shape[1] * omega))
     steps = events_here = 0
     # a run that goes on after a full event log goes on counting events without progress
     zero_events = int(memo[0]) if memo[2] == 1.0 else 0
@@ -138,13 +139,12 @@ def run(
         if affine:
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
         if jumped or not known:
-            if locate:
+            rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
+            if locate and (has_tracked or watch >= 0):
                 reach = max(1e-4 * h, 1e-9)
-                margins(
-                    prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign
-                )
+                complete(prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign)
             else:
-                rates(prog, drive, segment, t, x, mode, work, k[0], g0, False)
+                g0[ng - 1] = math.inf
             known = True
         theta, at = 1.0, -1
         if locate:
@@ -299,10 +299,10 @@ def run(
             reached = t + theta * length if theta < 1.0 else (limit if truncated else t + length)
             # --- outputs inside the step
             while index < tout.shape[0] and tout[index] < reached:
-                inside(terms, (tout[index] - t) / length, x, poly, xi)
-                for j in range(n):
-                    xout[index, j] = xi[j]
-                record(prog, drive, segment, tout[index], xi, mode, work, yout[index])
+                record_inside(
+                    prog, drive, segment, t, (tout[index] - t) / length, length, x, mode, work, terms, poly, xout[index],
+                    yout[index],
+                )  # fmt: skip
                 index += 1
             if spectrum.shape[1] > 0:
                 accumulate(
@@ -338,7 +338,7 @@ def run(
                 continue
         if theta < 1.0 and theta * length > 0.0:
             # a step that ran far beyond its event says little of what follows
-            h = min(h, 3.0 * theta * length)
+            h = max(min(h, 3.0 * theta * length), 1e-14 * abs(t))
         # --- an event at (t, x)
         known = False
         if at == ng - 1:
@@ -349,15 +349,21 @@ def run(
             continue
         if has_tracked:
             track(prog, drive, segment, t, x, mode, work)
-            rates(prog, drive, segment, t, x, mode, work, dx, g, False)
+            margins(prog, drive, segment, t, x, mode, work, dx, g, 1e-9, -1, 0.0, 1)
         copy(x, before)
         node = owner[at]
+        modes = _signature(mode)
         kind = event(prog, drive, segment, t, x, mode, work, dx, g, node, at - prog.nodes[node, G], height)
         generation = 1.0
-        for i in range(prog.nodes[node, G], prog.nodes[node, G] + prog.nodes[node, NG]):
-            scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
-        if not settle(prog, drive, segment, t, x, mode, work, dx):
+        settled = settle(prog, drive, segment, t, x, mode, work, dx)
+        if not settled:
             zero_events += 100
+        if settled and _signature(mode) == modes and _same(x, before):
+            # nothing came of it: rounding alone crossed this margin, which thereby counts as larger
+            scale[at] *= 100.0
+        else:
+            for i in range(prog.nodes[node, G], prog.nodes[node, G] + prog.nodes[node, NG]):
+                scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
         if t - last_event_t > 1e-9 * max(abs(t), 1e-3):
             zero_events = 0
             last_event_t = t
@@ -379,6 +385,24 @@ def run(
     clock[7] = 1.0 if blocked >= 0 else 0.0
     memo[0], memo[1], memo[2] = zero_events, last_event_t, 1.0 if reason == FULL else 0.0
     return reason
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _signature(mode):
+    """One number that tells mode vectors apart."""
+    value = 0
+    for i in range(mode.shape[0]):
+        value = 31 * value + mode[i]
+    return value
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _same(a, b):
+    """Whether two vectors are equal."""
+    for i in range(a.shape[0]):
+        if a[i] != b[i]:
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -150,6 +150,13 @@ def signals(prog, t, x, mode, w):
             w[so] = delayed(prog, n, t, w)
 
 
+@njit(cache=True, error_model="numpy", _nrt=False)
+def refresh(prog, drive, segment, t, x, mode, w):
+    """Fill external inputs and signals; one copy of the code for all who are not in a hurry."""
+    external(prog, drive, t, segment, w)
+    signals(prog, t, x, mode, w)
+
+
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def rates(prog, drive, segment, t, x, mode, work, dx, g, want_g):
     """Rates of all states at (t, x) in the given mode; with `want_g` the event margins too."""
@@ -234,8 +241,7 @@ def input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g):
             for side in (-1.0, 1.0):
                 for i in range(x.shape[0]):
                     trial[i] = x[i] + side * reach * dx[i]
-                external(prog, drive, t + side * reach, segment, w)
-                signals(prog, t + side * reach, trial, mode, w)
+                refresh(prog, drive, segment, t + side * reach, trial, mode, w)
                 value = node_input(prog, n, 0, w)
                 if side < 0:
                     before = value

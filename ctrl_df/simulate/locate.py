@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .flow import input_rates, rates, signals
+from .flow import input_rates, rates
 from .layout import (
     A_BODIES,
     AUX,
@@ -26,26 +26,31 @@ from .layout import (
     P_LOW,
     PAR,
     PWA,
+    STUCK,
     G,
     X,
 )
+from .mechanics import dry_level
 from .stepper import inside
 
 GRAIN = 4.0 * np.finfo(float).eps
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@njit(cache=True, error_model="numpy", _nrt=False)
 def margins(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
     """Rates and all margins at one point, those of input rates and of the section included."""
     rates(prog, drive, segment, t, x, mode, work, dx, g, True)
+    complete(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def complete(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
+    """Add to the margins that go with rates those of input rates and of the section."""
+    last = g.shape[0] - 1
+    # the signals stand in the work vector since the rates were taken
+    g[last] = watch_sign * (work[0][watch] - watch_level) if watch >= 0 else math.inf
     if prog.ints[H_TRACK] == 1:
         input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g)
-    last = g.shape[0] - 1
-    g[last] = math.inf
-    if watch >= 0:
-        w = work[0]
-        signals(prog, t, x, mode, w)
-        g[last] = watch_sign * (w[watch] - watch_level)
 
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
@@ -76,6 +81,10 @@ def tolerances(prog, x, mode, scale, atol, gtol):
                 rounding = GRAIN * (abs(x[first]) + abs(x[first + 2]))
                 gtol[go + G_JOINT_LOW] += rounding
                 gtol[go + G_JOINT_HIGH] += rounding
+            for b in range(prog.ints[prog.nodes[n, AUX] + A_BODIES]):
+                if mode[prog.nodes[n, MODE] + b] == STUCK:
+                    level = dry_level(prog, n, b, 0.0, 1.0, 0.0) + dry_level(prog, n, b, 0.0, -1.0, 0.0)
+                    gtol[go + b] += GRAIN * level
             gtol[go + G_WALL_LOW] += GRAIN * abs(prog.par[po + P_LOW])
             gtol[go + G_WALL_HIGH] += GRAIN * abs(prog.par[po + P_HIGH])
         elif kind == PWA:

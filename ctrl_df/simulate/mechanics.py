@@ -237,3 +237,9 @@ def _joined_margins(prog, node, x, mode, f, f0, a, g):
         # neither does the motor draw back, nor the load run ahead
         g[go + G_JOINT_LOW] = side * f[1] + dry_level(prog, node, 1, 0.0, -float(side), 0.0)
         g[go + G_JOINT_HIGH] = dry_level(prog, node, 0, 0.0, float(side), 0.0) - side * f[0]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def accelerate(prog, node, t, x, mode, force, f, dx, g):
+    """Write the accelerations of a mechanism to dx; one copy of the code for all who are not in a hurry."""
+    mechanism_rates(prog, node, t, x, mode, force, f, dx, g, False)

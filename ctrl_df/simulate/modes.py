@@ -7,7 +7,7 @@ from __future__ import annotations
 from numba import njit
 
 from .contact import impact, resolve, stop
-from .flow import external, node_input, product, signals
+from .flow import external, node_input, product, refresh, signals
 from .layout import (
     A_BODIES,
     A_JOINT,
@@ -109,8 +109,7 @@ def track(prog, drive, segment, t, x, mode, work):
     """Write the outputs of engaged plays and tracking rate limiters into their states (end of a step)."""
     w, _, _ = work
     nodes = prog.nodes
-    external(prog, drive, t, segment, w)
-    signals(prog, t, x, mode, w)
+    refresh(prog, drive, segment, t, x, mode, w)
     for n in range(nodes.shape[0]):
         if nodes[n, KIND] == PLAY or nodes[n, KIND] == RATE:
             x[nodes[n, X]] = w[nodes[n, OUT]]
@@ -166,15 +165,13 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
             mode[mo] = 0
             return E_DISENGAGE
         # the sign of the input's rate tells the direction of the limit
-        external(prog, drive, t, segment, w)
-        signals(prog, t, x, mode, w)
+        refresh(prog, drive, segment, t, x, mode, w)
         value = node_input(prog, node, 0, w)
         x[xo] = value
         reach = 1e-6
         for i in range(x.shape[0]):
             trial[i] = x[i] + reach * dx[i]
-        external(prog, drive, t + reach, segment, w)
-        signals(prog, t + reach, trial, mode, w)
+        refresh(prog, drive, segment, t + reach, trial, mode, w)
         mode[mo] = 1 if node_input(prog, node, 0, w) > value else -1
         return E_ENGAGE
 
@@ -187,8 +184,7 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
             x[xo + 2 * slot + 1] = 0.0
             if joined:
                 x[xo + 1] = x[xo + 3] = 0.0
-        external(prog, drive, t, segment, w)
-        signals(prog, t, x, mode, w)
+        refresh(prog, drive, segment, t, x, mode, w)
         resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
         if was_stuck:
             return E_BREAKAWAY
@@ -201,8 +197,7 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
             mode[mo + JOINT] = 1 if slot == G_JOINT_HIGH else -1
             return E_CONTACT
         if joined:
-            external(prog, drive, t, segment, w)
-            signals(prog, t, x, mode, w)
+            refresh(prog, drive, segment, t, x, mode, w)
             resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
             if mode[mo + JOINT] != 0:
                 mode[mo + JOINT] = 0

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from . import history
-from .flow import combine, external, node_input, signals
+from .flow import combine, external, node_input, refresh, signals
 from .layout import DELAY, H_DELAYS, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
 from .modes import sample
 from .stepper import inside
@@ -46,8 +46,7 @@ def tick(prog, drive, segment, t, x, mode, work):
         if prog.nodes[n, KIND] == SAMPLED:
             dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
             if abs(t / dt - round(t / dt)) < 1e-6:
-                external(prog, drive, t, segment, w)
-                signals(prog, t, x, mode, w)
+                refresh(prog, drive, segment, t, x, mode, w)
                 sample(prog, n, x, w)
 
 
@@ -62,6 +61,13 @@ def record(prog, drive, segment, t, x, mode, work, y):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
+def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, poly, xout, yout):
+    """States and outputs at a fraction of a step."""
+    inside(terms, theta, x, poly, xout)
+    record(prog, drive, segment, t + theta * length, xout, mode, work, yout)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
 def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, poly, xi, spectrum, omega):
     """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss-Legendre quadrature."""
     w = work[0]
@@ -69,8 +75,7 @@ def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, pol
         at = theta * NODES[i]
         time = t + at * length
         inside(terms, at, x, poly, xi)
-        external(prog, drive, time, segment, w)
-        signals(prog, time, xi, mode, w)
+        refresh(prog, drive, segment, time, xi, mode, w)
         share = theta * length * WEIGHTS[i]
         turn = complex(math.cos(omega * time), -math.sin(omega * time))
         for row in range(spectrum.shape[0]):
@@ -90,8 +95,7 @@ def start_delays(prog, drive, segment, t, x, mode, work):
             history.begin(prog, n, t, 0.0, w)
     # a delay behind a delay learns its input one pass later
     for _pass in range(prog.ints[H_DELAYS]):
-        external(prog, drive, t, segment, w)
-        signals(prog, t, x, mode, w)
+        refresh(prog, drive, segment, t, x, mode, w)
         for n in range(prog.nodes.shape[0]):
             if prog.nodes[n, KIND] == DELAY:
                 history.begin(prog, n, t, node_input(prog, n, 0, w), w)
@@ -107,8 +111,7 @@ def remember(prog, drive, segment, t, length, theta, generation, x, mode, work, 
     for q in range(history.POINTS):
         at = theta * history.NODES[q]
         inside(terms, at, x, poly, xi)
-        external(prog, drive, t + at * length, segment, w)
-        signals(prog, t + at * length, xi, mode, w)
+        refresh(prog, drive, segment, t + at * length, xi, mode, w)
         for n in range(prog.nodes.shape[0]):
             if prog.nodes[n, KIND] == DELAY:
                 # the values are written while the record is still closed, so that no signal reads it
