@@ -13,7 +13,7 @@ from . import history
 from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
 from .flow import rates
 from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
-from .locate import bump_share, complete, locate_event, margins, tolerances, worst
+from .locate import bump_share, complete, locate_event, margins, may_touch, tolerances, worst
 from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
 from .stepper import inside, prepare, prepare8, roughness, step
@@ -164,10 +164,6 @@ def run(
                     blocked = at
                     continue
                 theta = 0.0
-                zero_events += 1
-                if zero_events > 2000:
-                    reason = CHATTER
-                    break
             else:
                 at = -1
         length = 0.0
@@ -279,6 +275,7 @@ def run(
                             g[i] + gtol[i] < 0.0 or (rank == 8 and lowest[i] + gtol[i] < 0.0)
                         ):
                             suspect = True
+                    suspect = suspect or may_touch(prog, x, x1, mode, length)
             inner = index < tout.shape[0] and tout[index] < t + length
             if not prepared and (suspect or spectrum.shape[1] > 0 or inner or delays):
                 if rank == 8:
@@ -364,6 +361,7 @@ def run(
         else:
             for i in range(prog.nodes[node, G], prog.nodes[node, G] + prog.nodes[node, NG]):
                 scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
+        zero_events += 1
         if t - last_event_t > 1e-9 * max(abs(t), 1e-3):
             zero_events = 0
             last_event_t = t
@@ -374,7 +372,9 @@ def run(
             log_n[events_here] = node
             log_k[events_here] = kind
         events_here += 1
-        if stop_at_event:
+        if zero_events > 2000:
+            reason = CHATTER
+        elif stop_at_event:
             reason = EVENT
         elif log_t.shape[0] > 1 and events_here >= log_t.shape[0]:
             reason = FULL

@@ -12,16 +12,21 @@ from numba import njit
 from .flow import input_rates, rates
 from .layout import (
     A_BODIES,
+    A_JOINT,
+    A_STOP,
     AUX,
     G_JOINT_HIGH,
     G_JOINT_LOW,
     G_WALL_HIGH,
     G_WALL_LOW,
     H_TRACK,
+    J_IMPACT,
+    JOINT,
     KIND,
     MECHANISM,
     MODE,
     P_BUMP0,
+    P_GAP,
     P_HIGH,
     P_LOW,
     PAR,
@@ -116,6 +121,39 @@ def bump_share(prog, x, x1):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
+def may_touch(prog, x, x1, mode, length):
+    """Whether a gap or a stop may be touched inside a step at whose ends it is open.
+
+    Where a distance falls at the start and rises at the end it lies above both its tangents, if it bends one way only.
+    """
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] != MECHANISM:
+            continue
+        first, po, ao = prog.nodes[n, X], prog.nodes[n, PAR], prog.nodes[n, AUX]
+        bodies = prog.ints[ao + A_BODIES]
+        if bodies == 2 and prog.ints[ao + A_JOINT] == J_IMPACT and mode[prog.nodes[n, MODE] + JOINT] == 0:
+            d0, d1 = x[first + 2] - x[first], x1[first + 2] - x1[first]
+            v0, v1 = length * (x[first + 3] - x[first + 1]), length * (x1[first + 3] - x1[first + 1])
+            gap = prog.par[po + P_GAP]
+            if _tangents_meet_below(d0, v0, d1, v1) or _tangents_meet_below(gap - d0, -v0, gap - d1, -v1):
+                return True
+        if prog.ints[ao + A_STOP] == 1:
+            at = first + 2 * (bodies - 1)
+            low, high = prog.par[po + P_LOW], prog.par[po + P_HIGH]
+            v0, v1 = length * x[at + 1], length * x1[at + 1]
+            if _tangents_meet_below(x[at] - low, v0, x1[at] - low, v1):
+                return True
+            if _tangents_meet_below(high - x[at], -v0, high - x1[at], -v1):
+                return True
+    return False
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _tangents_meet_below(g0, s0, g1, s1):
+    return s0 < 0.0 < s1 and g0 + s0 * (g1 - s1 - g0) / (s0 - s1) < 0.0
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
 def locate_event(
     prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, scale, blocked, watch,
     watch_level, watch_sign,
@@ -132,18 +170,47 @@ def locate_event(
     end_value, end_at = value_right, at
     # a margin may go below zero and come back before it goes again: look from the left
     pieces = 4 if 0 < terms <= 4 else 12
+    before = math.inf  # value one piece before the left end
     for p in range(1, pieces + 1):
         theta = p / pieces
         if p == pieces:
             value, at = end_value, end_at
         else:
             inside(terms, theta, x, poly, xi)
-            margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch,
-                    watch_level, watch_sign)  # fmt: skip
+            margins(
+                prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign
+            )  # fmt: skip
             value, at = worst(g, gtol, scale, blocked)
+        if 0.0 <= value and 0.0 <= value_left < before and value_left < value and p > 1:
+            # lowest at the left end: a touch may hide on either side of it
+            step, middle, low = 1.0 / pieces, left, value_left
+            one, three = before, value
+            for _narrowing in range(4):
+                bend = one - 2.0 * low + three
+                if not 0.0 < bend < math.inf:
+                    break
+                vertex = middle + 0.5 * step * (one - three) / bend
+                inside(terms, vertex, x, poly, xi)
+                margins(
+                    prog, drive, segment, t + vertex * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign
+                )  # fmt: skip
+                touch, index = worst(g, gtol, scale, blocked)
+                if touch < 0.0:
+                    right, value_right, at = vertex, touch, index
+                    left, value_left = (left, value_left) if vertex > left else (left - 1.0 / pieces, before)
+                    break
+                if touch >= low:
+                    break
+                # closer, by the parabola itself
+                step *= 0.25
+                one = three = touch + bend / 32.0
+                middle, low = vertex, touch
+            if right > 0.0:
+                break
         if value < 0.0:
             right, value_right = theta, value
             break
+        before = value_left if p > 1 else math.inf
         left, value_left = theta, value
     if right < 0.0:
         # g must again be the margins at the end of the step

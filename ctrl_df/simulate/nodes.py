@@ -50,6 +50,7 @@ class Node:
 
 
 def lti_node(system, x0) -> Node:
+    """Node of a continuous linear system."""
     if system.dt not in (None, 0) and system.dt is not True and float(system.dt) > 0:
         raise ValueError(
             f"event_response runs in continuous time; got a discrete system with dt={system.dt}. "
@@ -62,6 +63,7 @@ def lti_node(system, x0) -> Node:
 
 
 def sampled_node(sampled, x0) -> Node:
+    """Node of a sampled controller: its matrices, then its period."""
     a, b, c, d, dt = sampled
     par = np.concatenate([np.ravel(a), np.ravel(b), np.ravel(c), np.ravel(d), [dt]])
     nd, ni, no = np.shape(a)[0], np.shape(b)[1], np.shape(c)[0]
@@ -69,6 +71,7 @@ def sampled_node(sampled, x0) -> Node:
 
 
 def primitive_node(primitive, x0) -> Node:
+    """Node of a signal element."""
     if isinstance(primitive, PiecewiseAffine):
         p = primitive
         par = [v for row in zip(p.low, p.high, p.slope, p.intercept, strict=True) for v in row]
@@ -98,6 +101,7 @@ def primitive_node(primitive, x0) -> Node:
 
 
 def user_node(system, x0):
+    """Node of a user-written system, called back in Python; returns it with what must be kept alive."""
     if system.dt not in (None, 0):
         raise ValueError(
             f"event_response runs in continuous time; got {system.name} with dt={system.dt}. "
@@ -139,6 +143,7 @@ def _has_feedthrough(output, nx, nu, params) -> bool:
 
 
 def core_node(core: Core, x0: int) -> Node:
+    """Node of a mechanism."""
     two = core.bodies == 2
     low, high = core.stop.span if core.stop else (0.0, 0.0)
     bristle = core.bristle
