@@ -15,7 +15,9 @@ def random_backlash(rng):
     gap, restitution = 10.0 ** rng.uniform(-4, -1), rng.choice([0.0, 1.0, rng.uniform(0, 1)])
     block = cdf.backlash_masses(motor, load, gap, restitution)
     if rng.random() < 0.5:
-        block = block.with_effect(cdf.LoadFriction(rng.uniform(0, 3))).with_effect(cdf.Viscous(rng.uniform(0, 2)))
+        block = block.with_effect(cdf.LoadFriction(rng.uniform(0, 3))).with_effect(
+            cdf.Viscous(rng.uniform(0, 2))
+        )
     if rng.random() < 0.3:
         block = block.with_effect(cdf.QuadraticDrag(0.1))  # takes the other path: not affine
     omega = 10.0 ** rng.uniform(0.3, 1.7)
@@ -58,12 +60,14 @@ def test_nothing_passes_a_gap(seed):
             worst = max(worst, abs(load * w0 + motor * w1 - momentum) / (scale + 1e-300))
             energy = load * v0**2 + motor * v1**2
             assert load * w0**2 + motor * w1**2 <= energy * (1 + 1e-14)
-    delta = np.concatenate([s[:, first + 2] - s[:, first] for s in states] + [[state.x[first + 2] - state.x[first]]])
+    delta = np.concatenate(
+        [s[:, first + 2] - s[:, first] for s in states] + [[state.x[first + 2] - state.x[first]]]
+    )
     size += np.abs(np.concatenate([s[:, first] for s in states])).max()
-    # worst of 3000 seeds: momentum 4e-16, penetration 1.1e-12 of the gap and 4 roundings of the place
+    # worst of 1500 seeds: momentum 6e-16, penetration 1.4 roundings of the place
     assert worst < 2e-15
     beyond = max(-delta.min(), (delta - gap).max())
-    assert beyond <= 5e-12 * gap + 1e-15 * size
+    assert beyond <= 1e-12 * gap + 1e-15 * size
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -106,7 +110,10 @@ def test_a_full_event_log_hides_no_chatter():
     """A relay that pushes its own input back switches for ever; the bound on events without progress must hold."""
     import control as ct
 
-    relay, lag = cdf.relay(1.0), ct.ss([[0.0]], [[1.0]], [[1.0]], [[0.0]], inputs="u", outputs="y", name="plant")
+    relay, lag = (
+        cdf.relay(1.0),
+        ct.ss([[0.0]], [[1.0]], [[1.0]], [[0.0]], inputs="u", outputs="y", name="plant"),
+    )
     loop = ct.interconnect(
         [relay.copy(name="relay"), lag], connections=[["relay.u", "-plant.y"], ["plant.u", "relay.y"]],
         inplist=["relay.u"], outlist=["plant.y"], inputs=["r"], outputs=["y"],
