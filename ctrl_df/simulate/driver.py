@@ -142,7 +142,9 @@ def run(
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
             if locate and (has_tracked or watch >= 0):
                 reach = max(1e-4 * h, 1e-9)
-                complete(prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign)
+                complete(
+                    prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign
+                )
             else:
                 g0[ng - 1] = math.inf
             known = True
