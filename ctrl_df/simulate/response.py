@@ -59,7 +59,9 @@ def event_response(
     inputs : float, (nt,) or (ninputs, nt) array, list, or callable
         A constant, samples at `timepts`, or a function of time (called with t, returning a number or one for each input).
     initial_state : float or (nstates,) array
-        State at the first time, in the order of ``sys.state_labels``; a scalar fills all.
+        State at the first time, in the order of ``sys.state_labels``; a scalar fills all. A pure delay (input_delay,
+        sensor_delay) runs exactly; before the first time its input is taken to have always been what it is then (its own
+        entry here is for ordinary solvers and has no effect). To see a step arrive late, begin the times before the step.
     params : dict
         Parameters of blocks that differ from their own values.
     input_hold : {'linear', 'zoh'}
