@@ -107,7 +107,9 @@ def event_response(
         n = int(np.argmin(np.isfinite(run.outputs[:n]).all(axis=1)))
         run.status = Status.DIVERGED
     if not run.status.ok:
-        warnings.warn(f"event_response ended at t = {run.state.time:.6g} s: {run.status}", RuntimeWarning, stacklevel=2)
+        warnings.warn(
+            f"event_response ended at t = {run.state.time:.6g} s: {run.status}", RuntimeWarning, stacklevel=2
+        )
     response = EventResponse(
         times[:n],
         run.outputs[:n].T,
@@ -162,7 +164,9 @@ def _with_params(system, params):
     if not params:
         return system
     if isinstance(system, ct.InterconnectedSystem):
-        raise ValueError("params of an interconnection: change the block itself with with_parameters, then interconnect.")
+        raise ValueError(
+            "params of an interconnection: change the block itself with with_parameters, then interconnect."
+        )
     if hasattr(system, "with_parameters"):
         return system.with_parameters(params)
     return ct.NonlinearIOSystem(
@@ -174,7 +178,9 @@ def _with_params(system, params):
 def _times(timepts):
     times = np.atleast_1d(np.asarray(timepts, dtype=float))
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0):
-        raise ValueError(f"timepts must be at least two finite times in ascending order [s]; got {timepts!r}.")
+        raise ValueError(
+            f"timepts must be at least two finite times in ascending order [s]; got {timepts!r}."
+        )
     return np.ascontiguousarray(times)
 
 
