@@ -9,6 +9,7 @@ import numpy as np
 
 from .attach import applicable, attach
 from .equivalence import indistinguishable, whitened_power, whitener
+from .proposals import proposals
 from .residual_tests import NoiseModel
 from .screen import Screen, Start, force_regression, motion_of, starts_for
 from .simulator import feasible
@@ -41,6 +42,7 @@ class Study:
     def __init__(self, block, records, held, free):
         self.free = free
         data = prepare(block, records, held)
+        self.nominal = {k: p.value for k, p in block.parameters.items()}
         self.levels = [data.level(f) for f in _LEVELS]
         self.data = self.levels[1]
         self.base = self._baseline(block)
@@ -67,7 +69,8 @@ class Study:
         screen = Screen(data.moved(self.base.train, 3), data)
         run = map if executor is None else executor.map
         kinds = [c for c in classes if applicable(c, screen.block)]
-        jobs = [(cls, screen, shortest, self.free) for cls in kinds]
+        nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
+        jobs = [(cls, screen, shortest, self.free, nominal) for cls in kinds]
         span = float(np.ptp(screen.motion.x))
         found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
         base = Trial("", screen.base)
@@ -147,14 +150,23 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
 
 def _try(job) -> Trial | None:
     """Fit one effect class from its best start values (a job of its own, for executors)."""
-    cls, screen, shortest, free = job
+    cls, screen, shortest, free, nominal = job
     found = []
     starts = starts_for(cls, screen)
     for i, start in enumerate(starts):
         if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
             break
         found += _fitted(start, screen, shortest, free)
+    if cls.id in _CURVED or screen.block.core.bodies == 2:
+        # The baseline may have bent far from the truth to make up for what is missing: begin where the user does.
+        for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
+            found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     return min(found, key=lambda t: t.train.rmse) if found else None
+
+
+def _spread(effects, count):
+    """Return some of the effects, evenly from the first to the last."""
+    return [effects[round((i + 0.5) * len(effects) / count - 0.5)] for i in range(min(count, len(effects)))]
 
 
 def _fitted(start: Start, screen: Screen, shortest: Data, free):

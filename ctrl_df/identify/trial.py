@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,9 @@ SAMPLES = 2500
 
 SHORTEST = 16
 """How many times as many the shortest windows are as the longest."""
+
+FAR = 12.0
+"""Factor by which the model's own parameters may be off: beyond it a fit explains with them what they are not."""
 
 PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
@@ -126,6 +129,7 @@ class Data:
     held: View
     thin: int
     scales: Scales
+    limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
 
@@ -149,7 +153,7 @@ class Data:
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance,
+            tolerance=tolerance, limits=self.limits,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
@@ -192,7 +196,9 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
     while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
         thin //= 2
-    return Data(learn, judge, thin, _scales(block, records))
+    known = {k: p.value for k, p in block.parameters.items() if p.value > 0}
+    limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
+    return Data(learn, judge, thin, _scales(block, records), limits)
 
 
 def _rough(record, thin: int) -> bool:
