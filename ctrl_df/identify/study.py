@@ -10,8 +10,9 @@ import numpy as np
 from .attach import applicable, attach
 from .equivalence import indistinguishable, whitened_power, whitener
 from .proposals import proposals
+from .regression import Start, force_regression, motion_of
 from .residual_tests import NoiseModel
-from .screen import Screen, Start, force_regression, motion_of, starts_for
+from .screen import Screen, starts_for
 from .simulator import feasible
 from .trial import SHORTEST, Data, Trial, prepare
 
@@ -51,7 +52,8 @@ class Study:
         """Fit the baseline from its own values and from a regression of the force on motion; keep the better."""
         shortest, data = self.levels[:2]
         begins, table = [block], block.parameters
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        names = {"mass", "coulomb.level", "viscous.coefficient"}
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, names)
         guess = dict(zip(("mass", "coulomb.level", "viscous.coefficient"), w, strict=False))
         guess = {k: float(v) for k, v in guess.items() if k in table and k in self.free and v > 0}
         if guess:
@@ -92,7 +94,7 @@ class Study:
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
         shortest, middle, longest = self.levels
-        found = found[:2] + [t for t in found[2:CONFIRMED] if t.evidence > 0.2 * found[0].evidence]
+        found = _promising(found)
         fits = [middle.moved(t.train) for t in (self.base, *found)]
         stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
@@ -114,6 +116,14 @@ class Study:
 def _periodic_enough(tried: Trial, span) -> bool:
     """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+
+
+def _promising(found) -> list[Trial]:
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by plain error."""
+    close = sorted(found, key=lambda t: t.train.rmse)[:3]
+    close = [t for t in close if t.train.rmse < 1.5 * close[0].train.rmse]
+    likely = found[:2] + [t for t in found[2:CONFIRMED] if t.evidence > 0.2 * found[0].evidence]
+    return likely + [t for t in close if not any(t is o for o in likely)]
 
 
 def _longest_coherent(errors) -> int:

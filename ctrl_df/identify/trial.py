@@ -145,8 +145,9 @@ class Data:
 
     @property
     def fine(self) -> Data:
-        """The same at the records' full rate."""
-        return replace(self, thin=1, step=self.thin)
+        """The same at the records' full rate, or 12,000 steps of a longer one."""
+        longest = max(len(r) for view in (self.train, self.held) for r in view.records)
+        return replace(self, thin=min(max(1, round(longest / 12_000)), self.thin), step=self.thin)
 
     def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
@@ -198,6 +199,8 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
         thin //= 2
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0}
     limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
+    # A lag much shorter than a sample is none, and a stiff equation.
+    limits["input_lag.time_constant"] = (0.05 * min(r.dt for r in records), max(r.duration for r in records))
     return Data(learn, judge, thin, _scales(block, records), limits)
 
 
