@@ -67,18 +67,27 @@ class Study:
 
     def candidates(self, classes, executor=None) -> list[Trial]:
         """Return every effect that can be added, fitted, the one with most evidence first."""
-        shortest, data = (level.sampled for level in self.levels[:2])
-        screen = Screen(data.moved(self.base.train, 3), data)
+        longest = self.levels[-1]
+        base, found = self._look(classes, executor, self.data.sampled)
+        plain = not found or found[0].train.rmse > 0.97 * base.rmse
+        if plain and longest.moved(base).rmse > _GROWTH * base.rmse:
+            # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
+            base, found = self._look(classes, executor, longest)
+        if found:
+            self._rebase(found)
+        return found
+
+    def _look(self, classes, executor, data: Data):
+        """Fit every effect over one set of windows; return the baseline there, and the effects, best first."""
+        base = data.moved(self.base.train, 3)
+        screen = Screen(base, data)
         run = map if executor is None else executor.map
         kinds = [c for c in classes if applicable(c, screen.block)]
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        jobs = [(cls, screen, shortest, self.free, nominal) for cls in kinds]
+        jobs = [(cls, screen, self.levels[0].sampled, self.free, nominal) for cls in kinds]
         span = float(np.ptp(screen.motion.x))
         found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
-        base = Trial("", screen.base)
-        found = ranked(base, found)[0]
-        self._rebase(found)
-        return found
+        return base, ranked(Trial("", base), found)[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""

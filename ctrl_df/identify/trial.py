@@ -201,6 +201,9 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
     limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
     # A lag much shorter than a sample is none, and a stiff equation.
     limits["input_lag.time_constant"] = (0.05 * min(r.dt for r in records), max(r.duration for r in records))
+    # A joint with next to nothing behind it is no joint, but a dashpot that stands in for other friction.
+    for name in ("compliance", "backlash"):
+        limits.setdefault(f"{name}.load_fraction", (0.05, 0.95))
     return Data(learn, judge, thin, _scales(block, records), limits)
 
 
