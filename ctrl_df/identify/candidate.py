@@ -220,6 +220,7 @@ def fit_windows(
     problem = Problem(model, records, names, 100_000, limits)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
+    problem.round(theta)
     return _outcome(problem, theta, np.zeros((0, 0)), [])
 
 

@@ -132,7 +132,9 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     chosen = study.confirm(found)
     base = study.base
     best = chosen[0] if chosen else base
-    missed = lacks(best, study.data, study.noise)
+    # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not rounded.
+    rounds = best.key == "sensor_quantization"
+    missed = lacks(base if rounds else best, study.data, study.noise)
     base_errors = _errors(base, study)
     keys = {c.key for c in chosen}
     weights = np.exp(
@@ -149,6 +151,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         first is not None and first.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * base_errors[1]
     )
     noise, structure, share = _left(best, base, missed, study)
+    if rounds:
+        share = 1.0 if missed and missed[0].evidence > SIGNIFICANT else 0.0
     if share > _LEFT:
         verdict = UNKNOWN
     elif first is None or not significant:

@@ -22,6 +22,8 @@ CONFIRMED = 6
 _LEVELS = (SHORTEST, 4, 1)
 # Best error over windows four times as long that still counts as the same.
 _GROWTH = 1.35
+# Evidence [nats] by which candidates may differ because their fits stopped early.
+_CLOSE = 60.0
 
 # Effects whose error has many valleys over long windows: short ones first.
 _CURVED = frozenset({"stribeck", "stiction", "bristle", "backlash", "compliance", "position_ripple"})
@@ -114,7 +116,13 @@ class Study:
             for t, f in zip((self.base, *found), stages[at], strict=True)
         ]
         self.base = best[0]
-        chosen, self.noise = ranked(self.base, best[1:])
+        chosen, _ = ranked(self.base, best[1:])
+        # Near equals are told apart by fits that have come to an end.
+        close = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
+        if len(close) > 1:
+            close = [fine.judged(replace(t, train=fine.moved(t.train, 8, 1e-6))) for t in close]
+            chosen = [*close, *chosen[len(close) :]]
+        chosen, self.noise = ranked(self.base, chosen)
         return chosen
 
     def alike(self, a: Trial, b: Trial) -> bool:
@@ -204,5 +212,6 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
     if start.effect.id in _CURVED:
         fitted = data.moved(shortest.fit(block, names, iterations=6, tolerance=1e-2), 4, 1e-2)
     else:
-        fitted = data.fit(block, names, iterations=1 if rough else 6, tolerance=1e-2)
+        begin = None if start.values else screen.starts(block)
+        fitted = data.fit(block, names, starts=begin, iterations=6, tolerance=1e-2)
     yield Trial(start.effect.id, fitted, extra=len(own))
