@@ -24,10 +24,9 @@ def record(path: Path) -> Measurement:
 
 def free_run_rmse(model, run: Measurement) -> float:
     """Return the position error [m] of a free run over the whole record, from rest at the first sample."""
-    from ctrl_df.identify.trial import as_run, simulate
+    from ctrl_df.identify.simulator import free_run
 
-    whole = as_run(run)
-    y = simulate(model, whole, np.array([[run.y[0], 0.0, 0.5]]))
+    y = free_run(model, run, position=float(run.y[0]))
     return float(np.sqrt(np.mean((run.y - y) ** 2)))
 
 

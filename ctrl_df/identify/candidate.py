@@ -1,11 +1,4 @@
-"""Simulation-error least squares by multiple shooting: the fast inner fit behind `refit` and the diagnosis.
-
-Each window of each record starts from a state of its own. Those states enter linearly near the solution; they
-are eliminated window by window from the normal equations (variable projection), so that the work grows with
-the number of parameters only. Steps are Levenberg-Marquardt, bounds are kept by projection, outliers are
-bent to Huber's loss once the fit is near. Derivatives are differences of a size that moves the output by
-about the noise: far above the roughness that events leave in the cost.
-"""
+"""Fit a model to records: stages from short windows and a thinned input to whole ones at full rate."""
 
 from __future__ import annotations
 
@@ -17,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from .measurement import Measurement
-from .residual_tests import noise_model
-from .simulator import Simulator, Windows, facts, feasible, make_windows, usual_window
+from .shooting import Problem, Tangent
+from .simulator import Simulator
+from .uncertainty import covariance_of
+from .variables import default_free
+from .windows import Windows, facts, make_windows, usual_window
 
 MODES = ("auto", "free", "windows")
 
@@ -35,8 +31,6 @@ class Candidate:
         The free parameters.
     covariance : (p, p) array
         Of `values`, for residuals of the colour seen.
-    jacobian : list of (n, p) array
-        Per record the derivative of the output by the parameters, initial states eliminated.
     residual, simulated : list of (n,) array
         Per record, measured minus simulated.
     cost : float
@@ -57,13 +51,14 @@ class Candidate:
         Initial states, as corrections (see `Simulator.run`).
     windows : list of Windows
         Where the model was started anew.
+    tangent : Tangent or None
+        The fitted model as a linear map of its parameters and initial states.
     """
 
     model: Any
     names: tuple[str, ...]
     values: np.ndarray
     covariance: np.ndarray
-    jacobian: list
     residual: list
     simulated: list
     cost: float
@@ -76,7 +71,7 @@ class Candidate:
     scale: np.ndarray
     starts: list
     windows: list
-    simulators: list = field(repr=False, default_factory=list)
+    tangent: Tangent | None = field(repr=False, default=None)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -89,11 +84,6 @@ class Candidate:
         return dict(
             zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True)
         )
-
-
-def default_free(block) -> tuple[str, ...]:
-    """Return the parameters that a refit moves unless told otherwise."""
-    return tuple(k for k, p in block.parameters.items() if p.free and k != "sensor_quantization.step")
 
 
 def window_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
@@ -175,20 +165,63 @@ def fit_candidate(
         if name not in table:
             raise ValueError(f"a free parameter must be one of {', '.join(table)}; got {name!r}.")
     lengths = window_lengths(model, records, mode, window)
-    problem = _Problem(model, records, names, budget)
+    problem = Problem(model, records, names, budget)
     theta = problem.start()
     if coarse is None:
         coarse = start is None
     if coarse and names and not first.closed:
         for short in _short_windows(first, records, lengths):
-            problem.stage(short, thin)
+            problem.stage(_cut(records, short), thin)
             theta = problem.solve(theta, iterations=6, tolerance=0.02, robust=False)
-    problem.stage(lengths, thin if polish else max(thin, 1), starts)
+    problem.stage(_cut(records, lengths), thin if polish else max(thin, 1), starts)
     theta = problem.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and thin > 1:
-        problem.stage(lengths, 1, problem.nuisance)
+        problem.stage(problem.windows, 1, problem.nuisance)
         theta = problem.solve(theta, iterations=polish, tolerance=tolerance, robust=robust)
-    return problem.result(theta, central)
+    return _candidate(problem, theta, central)
+
+
+def fit_windows(
+    model,
+    records: Sequence[Measurement],
+    windows: Sequence[Windows],
+    names: Sequence[str],
+    *,
+    thin: int = 4,
+    starts: Sequence[np.ndarray] | None = None,
+    iterations: int = 12,
+    tolerance: float = 1e-3,
+    robust: bool = False,
+) -> Candidate:
+    """Fit the named parameters over given windows in one stage, without the price of standard errors.
+
+    Parameters
+    ----------
+    model : block
+    records, windows : sequences
+        Records and the parts of each that count.
+    names : sequence of str
+        Parameters to move; an empty one fits the initial states alone.
+    thin : int
+        Samples a step of the input.
+    starts : sequence of arrays or None
+        Initial states to begin with.
+    iterations, tolerance, robust
+        As for `fit_candidate`.
+
+    Returns
+    -------
+    Candidate
+        With an empty covariance.
+    """
+    problem = Problem(model, records, names, 100_000)
+    problem.stage(list(windows), thin, starts)
+    theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
+    return _outcome(problem, theta, np.zeros((0, 0)), [])
+
+
+def _cut(records, lengths) -> list[Windows]:
+    return [make_windows(r, n) for r, n in zip(records, lengths, strict=True)]
 
 
 def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
@@ -214,392 +247,48 @@ def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
     return stages
 
 
-# --- parameters as the solver sees them ---------------------------------------------------------------
+# --- the answer -----------------------------------------------------------------------------------
 
 
-class _Variable:
-    """One parameter: physical value p, scaled value q; strictly positive ones on a logarithmic scale."""
-
-    def __init__(self, name, parameter, natural):
-        self.name = name
-        self.lower, self.upper = parameter.lower, parameter.upper
-        # Bounded on both sides (a share, a restitution): linear. Strictly positive: logarithmic.
-        self.log = parameter.strict and parameter.lower == 0 and math.isinf(parameter.upper)
-        self.scale = abs(parameter.value) if parameter.value != 0 else natural
-        self.natural = natural
-        if parameter.strict and not self.log:
-            self.lower = parameter.lower + 1e-3
-
-    def q(self, p):
-        return math.log(p / self.scale) if self.log else p / self.scale
-
-    def p(self, q):
-        return self.scale * math.exp(min(max(q, -40.0), 40.0)) if self.log else q * self.scale
-
-    def clip(self, q):
-        if self.log:
-            return q
-        return min(max(q, self.lower / self.scale), self.upper / self.scale)
-
-    def slope(self, q):
-        """Return dp/dq."""
-        return self.p(q) if self.log else self.scale
-
-    def step(self, q):
-        """Largest move of one iteration."""
-        return 1.0 if self.log else 1.0 * max(abs(q), 1.0)
+def _candidate(problem: Problem, theta, central) -> Candidate:
+    """Return the outcome with covariance, from derivatives about the solution."""
+    if not problem.names:
+        return _outcome(problem, theta, np.zeros((0, 0)), [])
+    base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
+    problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
+    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
+    return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
-def natural_scale(unit: str, known) -> float:
-    """Return the size a parameter of this unit has when it matters on a record with these facts."""
-    length, speed, force = known.spread, known.speed, known.force
-    return {
-        "N": 0.1 * force, "m": 0.1 * length, "m/s": 0.1 * speed, "s": 5 * known.dt,
-        "N/m": 0.1 * force / length,
-        "N s/m": 0.1 * force / speed, "N s^2/m^2": 0.1 * force / speed**2, "N/m^3": 0.1 * force / length**3,
-        "kg": force * length / speed**2, "rad": 1.0,
-    }.get(unit, 1.0)  # fmt: skip
-
-
-class _Problem:
-    """Records, windows and free parameters of one fit."""
-
-    def __init__(self, model, records, names, budget):
-        self.model, self.records, self.names, self.budget = model, records, names, budget
-        self.known = [facts(r) for r in records]
-        block = Simulator(model, records[0]).block
-        table = block.parameters if names else {}
-        self.block = block
-        self.variables = [_Variable(k, table[k], natural_scale(table[k].unit, self.known[0])) for k in names]
-        for variable in self.variables:
-            if (
-                variable.name == "hard_stop.limit"
-                and "sensor_offset" not in block._keys
-                and "drift" not in block._keys
-            ):
-                # No body has been where a stop would not let it.
-                reach = max(
-                    float(np.max(np.abs(r.y))) - 4 * k.noise for r, k in zip(records, self.known, strict=True)
-                )
-                variable.lower = max(variable.lower, reach)
-        self.steps = np.full(len(names), 1e-3)
-        self.nfev = 0
-        self.converged = False
-        self.simulators: list[Simulator] = []
-        self.windows: list[Windows] = []
-        self.nuisance: list[np.ndarray] = []
-        self.priors: list[np.ndarray] = []
-        self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
-
-    def start(self):
-        return np.array([v.clip(v.q(self.block.parameters[v.name].value)) for v in self.variables])
-
-    def values(self, theta):
-        given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
-        return feasible(self.block, given) if given else None
-
-    def stage(self, lengths, thin, starts=None):
-        """Set the windows; initial states begin at `starts` or at what the data say."""
-        self.simulators = [Simulator(self.model, r, thin=thin) for r in self.records]
-        self.windows = [make_windows(r, length) for r, length in zip(self.records, lengths, strict=True)]
-        self.priors = [s.priors(w) for s, w in zip(self.simulators, self.windows, strict=True)]
-        fresh = starts is None or any(a.shape != p.shape for a, p in zip(starts, self.priors, strict=True))
-        self.nuisance = [np.zeros_like(p) for p in self.priors] if fresh else [np.array(a) for a in starts]  # type: ignore[union-attr]
-        self.fresh = fresh
-
-    def simulate(self, theta, nuisance):
-        self.nfev += 1
-        values = self.values(theta)
-        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.windows, nuisance, strict=True)]
-
-    def residual(self, theta, nuisance):
-        return [r.y - y for r, y in zip(self.records, self.simulate(theta, nuisance), strict=True)]
-
-    def cost(self, residual, nuisance, weights):
-        total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
-        return 0.5 * (total + self._prior_weight() * sum(
-            float(np.sum((a - m) ** 2 / p**2))
-            for a, m, p in zip(nuisance, self.means(), self.priors, strict=True)
-        ))  # fmt: skip
-
-    def _prior_weight(self):
-        # A prior counts as much as one sample off by the noise.
-        return self.noise**2
-
-    def means(self):
-        means = [np.zeros_like(p) for p in self.priors]
-        for mean, simulator in zip(means, self.simulators, strict=True):
-            if "slack" in simulator.nuisances:
-                mean[:, simulator.nuisances.index("slack")] = 0.5
-        return means
-
-    # --- solving --------------------------------------------------------------------------------------
-
-    def scan_slack(self, theta):
-        """Find where in its gap each window begins, by trying five places (the cost has several minima)."""
-        for k, simulator in enumerate(self.simulators):
-            if "slack" not in simulator.nuisances:
-                continue
-            column = simulator.nuisances.index("slack")
-            values, best, chosen = self.values(theta), None, None
-            for place in (0.02, 0.25, 0.5, 0.75, 0.98):
-                trial = self.nuisance[k].copy()
-                trial[:, column] = place
-                e = self.records[k].y - simulator.run(self.windows[k], values, trial)
-                errors = np.array([np.sum((e[w] - e[w].mean()) ** 2) for w in self.windows[k].slices])
-                if best is None:
-                    best, chosen = errors, np.full(len(errors), place)
-                else:
-                    chosen = np.where(errors < best, place, chosen)  # type: ignore[arg-type]
-                    best = np.minimum(best, errors)
-            self.nuisance[k][:, column] = chosen
-            self.nfev += 5
-
-    def jacobian(self, theta, nuisance, base, central=False):
-        """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""
-        columns: list[list[np.ndarray]] = [[] for _ in self.records]
-        for i, variable in enumerate(self.variables):
-            h = self.steps[i]
-            up = theta.copy()
-            up[i] = variable.clip(theta[i] + h)
-            if up[i] == theta[i]:
-                h = -h
-                up[i] = theta[i] + h
-            moved = self.simulate(up, nuisance)
-            width = up[i] - theta[i]
-            other = base
-            if central:
-                down = theta.copy()
-                down[i] = variable.clip(theta[i] - h)
-                if down[i] != theta[i]:
-                    other = self.simulate(down, nuisance)
-                    width = up[i] - down[i]
-            change = math.sqrt(
-                float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)]))
-            )
-            for k, (a, b) in enumerate(zip(moved, other, strict=True)):
-                columns[k].append((a - b) / width)
-            # Next time the output shall move by a third of the noise.
-            wanted = abs(h) * 0.3 * self.noise / change if change > 0 else 10 * abs(h)
-            self.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
-        by_start = []
-        for k, simulator in enumerate(self.simulators):
-            rows = []
-            values = self.values(theta)
-            for j, name in enumerate(simulator.nuisances):
-                if name == "x" and not simulator.tied:
-                    rows.append(np.ones(len(self.records[k])))
-                    continue
-                size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
-                    self.priors[k][:, j],
-                    {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
-                )
-                moved_start = nuisance[k].copy()
-                sign = np.where(moved_start[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
-                moved_start[:, j] += sign * size
-                moved = simulator.run(self.windows[k], values, moved_start)
-                width = np.concatenate(
-                    [
-                        np.full(w.stop - w.start, c)
-                        for w, c in zip(self.windows[k].slices, sign * size, strict=True)
-                    ]
-                )
-                rows.append((moved - base[k]) / width)
-            self.nfev += len(rows) / len(self.simulators)
-            by_start.append(np.array(rows).T.reshape(len(self.records[k]), len(rows)))
-        return [
-            np.array(c).T.reshape(len(r), len(self.names)) for c, r in zip(columns, self.records, strict=True)
-        ], by_start
-
-    def normal(self, jp, js, residual, weights, nuisance, damping=0.0):
-        """Eliminate the initial states; return (H, g, back) with ``back(step)`` their own step."""
-        p = len(self.names)
-        h, g, pieces = np.zeros((p, p)), np.zeros(p), []
-        prior, means = self._prior_weight(), self.means()
-        for k, windows in enumerate(self.windows):
-            for w, where in enumerate(windows.slices):
-                a, s, r, c = jp[k][where], js[k][where], residual[k][where], weights[k][where]
-                ac = a * c[:, None]
-                h += ac.T @ a
-                g += ac.T @ r
-                if s.shape[1]:
-                    sc = s * c[:, None]
-                    precision = prior / self.priors[k][w] ** 2
-                    ss = sc.T @ s + np.diag(precision)
-                    ss += damping * np.diag(np.diag(ss))
-                    sa, sr = sc.T @ a, sc.T @ r - precision * (nuisance[k][w] - means[k][w])
-                    solved = np.linalg.solve(ss, np.column_stack((sa, sr)))
-                    h -= sa.T @ solved[:, :p]
-                    g -= sa.T @ solved[:, p]
-                    pieces.append((k, w, solved))
-
-        def back(step):
-            moved = [a.copy() for a in nuisance]
-            for k, w, solved in pieces:
-                limit = 3 * self.priors[k][w]
-                there = moved[k][w] + solved[:, p] - solved[:, :p] @ step
-                # The data say where a window begins: the start is no parameter to hide the model's faults in.
-                moved[k][w] = np.clip(there, means[k][w] - limit, means[k][w] + limit)
-            for k, simulator in enumerate(self.simulators):
-                if "slack" in simulator.nuisances:
-                    j = simulator.nuisances.index("slack")
-                    moved[k][:, j] = np.clip(moved[k][:, j], 0.0, 1.0)
-            return moved
-
-        return h, g, back
-
-    def weights(self, residual, robust):
-        if not robust:
-            return [np.ones(len(r)) for r in residual]
-        everything = np.concatenate(residual)
-        sigma = max(1.4826 * float(np.median(np.abs(everything))), self.noise)
-        return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), 1e-300)) for r in residual]
-
-    def solve(self, theta, iterations, tolerance, robust):
-        """Levenberg-Marquardt from `theta`; the initial states go along."""
-        if self.fresh:
-            self.scan_slack(theta)
-            self.fresh = False
-        damping, self.converged = 1e-3, False
-        nuisance = self.nuisance
-        residual = self.residual(theta, nuisance)
-        for iteration in range(iterations):
-            if self.nfev >= self.budget:
-                break
-            weights = self.weights(residual, robust and iteration > 0)
-            cost = self.cost(residual, nuisance, weights)
-            base = [r.y - e for r, e in zip(self.records, residual, strict=True)]
-            jp, js = self.jacobian(theta, nuisance, base)
-            gain, accepted = 0.0, False
-            for _attempt in range(6):
-                h, g, back = self.normal(jp, js, residual, weights, nuisance, damping)
-                step = self._step(h, g, theta, damping)
-                trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
-                trial_nuisance = back(trial_theta - theta)
-                trial = self.residual(trial_theta, trial_nuisance)
-                trial_cost = self.cost(trial, trial_nuisance, weights)
-                if trial_cost < cost:
-                    gain, accepted = 1 - trial_cost / cost, True
-                    theta, nuisance, residual = trial_theta, trial_nuisance, trial
-                    damping = max(damping / 10, 1e-7)
-                    break
-                damping *= 10
-                if self.nfev >= self.budget or damping > 1e4:
-                    break
-            if not accepted or gain < tolerance:
-                self.converged = True
-                break
-        self.nuisance, self.last = nuisance, residual
-        return theta
-
-    def _step(self, h, g, theta, damping):
-        """Solve the damped equations; parameters held by a bound stay there."""
-        p = len(g)
-        if p == 0:
-            return np.zeros(0)
-        size = np.diag(h).copy()
-        size = np.maximum(size, 1e-12 * max(float(size.max()), 1e-300))
-        held = np.zeros(p, bool)
-        step = np.zeros(p)
-        for _ in range(p):
-            free: Any = ~held
-            step[:] = 0.0
-            if not free.any():
-                break
-            matrix = h[np.ix_(free, free)] + np.diag(damping * size[free])
-            root = np.sqrt(size[free])
-            step[free] = np.linalg.lstsq(matrix / np.outer(root, root), g[free] / root, rcond=1e-12)[0] / root
-            blocked = [
-                i
-                for i in np.flatnonzero(free)
-                if self.variables[i].clip(theta[i] + np.sign(step[i]) * 1e-9) == theta[i] and step[i] != 0
-            ]
-            if not blocked:
-                break
-            held[blocked] = True
-        limits = np.array([v.step(q) for v, q in zip(self.variables, theta, strict=True)])
-        largest = float(np.max(np.abs(step) / limits)) if p else 0.0
-        return step / max(largest, 1.0)
-
-    # --- the answer -----------------------------------------------------------------------------------
-
-    def result(self, theta, central) -> Candidate:
-        nuisance, residual = self.nuisance, self.last
-        base = [r.y - e for r, e in zip(self.records, residual, strict=True)]
-        values = self.values(theta) or {}
-        p = len(self.names)
-        jp, js = (
-            self.jacobian(theta, nuisance, base, central)
-            if p
-            else ([np.zeros((len(r), 0)) for r in residual], None)
-        )
-        covariance, null, projected = np.zeros((0, 0)), [], jp
-        slopes = np.array([v.slope(q) for v, q in zip(self.variables, theta, strict=True)])
-        if p:
-            projected, covariance, null = self._uncertainty(jp, js, residual, nuisance)
-            covariance = covariance * np.outer(slopes, slopes)
-            projected = [j / slopes for j in projected]
-        vector = np.array([values[k] for k in self.names])
-        at_bound = tuple(
+def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
+    values = problem.values(theta) or {}
+    residual = problem.last
+    total = sum(float(e @ e) for e in residual)
+    spread = sum(float(np.sum((y - y.mean()) ** 2)) for y in problem.measured)
+    return Candidate(
+        model=problem.simulators[0].with_values(values),
+        names=problem.names,
+        values=np.array([values[k] for k in problem.names]),
+        covariance=covariance,
+        residual=residual,
+        simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
+        cost=0.5 * total,
+        rmse=math.sqrt(total / sum(len(e) for e in residual)),
+        nrmse=math.sqrt(total / spread),
+        nfev=round(problem.nfev),
+        converged=problem.converged,
+        at_bound=tuple(
             bool(
                 v.clip(q + 1e-6) == q
                 or v.clip(q - 1e-6) == q
                 or abs(values[v.name] - v.p(q)) > 1e-9 * v.scale
             )
-            for v, q in zip(self.variables, theta, strict=True)
-        )
-        total = sum(float(e @ e) for e in residual)
-        spread = sum(float(np.sum((r.y - r.y.mean()) ** 2)) for r in self.records)
-        count = sum(len(e) for e in residual)
-        return Candidate(
-            self.simulators[0].with_values(values), self.names, vector, covariance, projected, residual,
-            base,
-            0.5 * total, math.sqrt(total / count), math.sqrt(total / spread), round(self.nfev),
-            self.converged,
-            at_bound, null, np.array([max(v.scale, v.natural) for v in self.variables]), nuisance,
-            self.windows,
-            self.simulators,
-        )  # fmt: skip
-
-    def _uncertainty(self, jp, js, residual, nuisance):
-        """Covariance of the scaled parameters by the sandwich rule, the noise's colour from the residual.
-
-        cov = H^-1 (sum over records J' Omega J) H^-1, with Omega the covariance of a stationary residual
-        whose spectrum an autoregressive model gives; lost degrees of freedom are given back.
-        """
-        ones = [np.ones(len(r)) for r in residual]
-        projected = [j.copy() for j in jp]
-        prior = self._prior_weight()
-        for k, windows in enumerate(self.windows):
-            for w, where in enumerate(windows.slices):
-                s = js[k][where]
-                if s.shape[1]:
-                    ss = s.T @ s + np.diag(prior / self.priors[k][w] ** 2)
-                    projected[k][where] -= s @ np.linalg.solve(ss, s.T @ jp[k][where])
-        h, _, _ = self.normal(jp, js, residual, ones, nuisance)
-        size = np.sqrt(np.maximum(np.diag(h), 1e-300))
-        dead = size <= 1e-9 * max(float(size.max()), 1e-300)
-        size[dead] = 1.0
-        scaled = h / np.outer(size, size)
-        eigen, vectors = np.linalg.eigh(scaled)
-        top = max(float(eigen[-1]), 1e-300)
-        null = [
-            (math.sqrt(max(e, 0.0) / top), v / size / max(float(np.max(np.abs(v / size))), 1e-300))
-            for e, v in zip(eigen, vectors.T, strict=True)
-            if e < 1e-7 * top
-        ]
-        inverse = (vectors / np.maximum(eigen, 1e-12 * top)) @ vectors.T / np.outer(size, size)
-        middle = np.zeros_like(h)
-        for k, e in enumerate(residual):
-            n = len(e)
-            lost = len(self.names) / len(residual) + js[k].shape[1] * len(self.windows[k])
-            length = 1 << (n - 1).bit_length()
-            transform = np.fft.rfft(projected[k], length, axis=0)
-            omega = np.linspace(0, math.pi, transform.shape[0])
-            density = noise_model(e).spectrum(omega) + 1e-6 * self.noise**2
-            double = np.full(len(omega), 2.0)
-            double[0] = double[-1] = 1.0
-            middle += n / max(n - lost, 0.1 * n) * np.real(
-                (transform.conj() * (density * double / length)[:, None]).T @ transform
-            )  # fmt: skip
-        return projected, inverse @ middle @ inverse, null
+            for v, q in zip(problem.variables, theta, strict=True)
+        ),
+        null=null,
+        scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
+        starts=problem.nuisance,
+        windows=problem.windows,
+        tangent=problem.tangent() if problem.slopes is not None and problem.names else None,
+    )

@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from .candidate import _Problem, window_lengths
+from .candidate import window_lengths
 from .derivatives import automatic_cutoff, derivative
 from .measurement import Measurement
 from .residual_tests import InputTest, Whiteness, fit_percent, input_residual_test, nrmse, rmse, whiteness
-from .simulator import Simulator, Windows, facts
+from .shooting import Problem
+from .simulator import Simulator
 from .where import Regions, error_regions
+from .windows import Windows, facts, make_windows
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,8 +269,8 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     lengths = window_lengths(
         model, records, "windows" if mode == "auto" and window is not None else mode, window
     )
-    problem = _Problem(model, records, (), 10_000)
-    problem.stage(lengths, 1)
+    problem = Problem(model, records, (), 10_000)
+    problem.stage([make_windows(r, n) for r, n in zip(records, lengths, strict=True)], 1)
     problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
     return comparison_of(model, records, problem.windows, problem.nuisance)
 

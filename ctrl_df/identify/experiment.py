@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .trial import as_run, simulate
+from .simulator import free_run
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +82,8 @@ def next_experiment(diagnosis, *, force=None, stroke=None, duration=None, dt=Non
     for kind, shape in _shapes(t, record).items():
         for size in (1.0, 0.8, 0.6, 0.45, 0.35, 0.25, 0.15):
             u = force * size * shape
-            run = as_run(record._with(t=t, u=u, y=scale, velocity=None, channels={}), max(1, len(t) // 2500))
-            start = np.array([[centre, 0.0, 0.5]])
-            ys = [simulate(m, run, start) for m in models]
+            played = record._with(t=t, u=u, y=scale, velocity=None, channels={})
+            ys = [free_run(m, played, position=centre, thin=max(1, len(t) // 2500)) for m in models]
             far = max(float(np.max(np.abs(y - centre))) for y in ys)
             if not np.isfinite(far) or far > reach * 1.0001:
                 continue

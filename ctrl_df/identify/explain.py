@@ -6,16 +6,21 @@ from typing import Any
 
 import numpy as np
 
+from .windows import facts
 
-def find_regions(tried, runs):
-    """Return the regions of error of a fitted candidate on its longest run, by its force where it can be had."""
+
+def find_regions(tried, view):
+    """Return the regions of error of a fitted candidate on its longest record."""
     from .where import error_regions
 
-    i = max(range(len(runs)), key=lambda k: len(runs[k].t))
-    run, residual = runs[i], np.asarray(tried.fitted.residuals[i])
+    i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
+    record, inside, residual = view.records[i], view.windows[i].samples, np.asarray(tried.train.residual[i])
     if not np.all(np.isfinite(residual)):
         return None
-    return error_regions(run.t, residual, position=run.y, velocity=run.v, force=run.u)
+    return error_regions(
+        record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],
+        force=record.u[inside],
+    )  # fmt: skip
 
 
 def named(effect) -> str:

@@ -7,19 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .diagnose import (
-    NONE,
-    SIGNIFICANT,
-    UNKNOWN,
-    Diagnosis,
-    _classes,
-    _Study,
-    _Tried,
-    as_records,
-    block_of,
-    free_names,
-)
-from .trial import fit
+from .diagnose import SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
+from .diagnosis import NONE, UNKNOWN, Diagnosis
+from .study import Study as Fits
+from .trial import Trial
 
 _LESS = 0.98  # the held-out error a step must reach, relative to the one before
 
@@ -173,9 +164,9 @@ def improve(
     diagnosis = None
     while True:
         names = tuple(k for k in free_names(block) if k not in kept)
-        study = _Study(block, records, held, names)
-        found = study.candidates(_classes(candidates), executor) if len(steps) < max_effects else []
-        diagnosis = study.verdict(found, time.perf_counter(), None)
+        fits = Fits(block, records, held, names)
+        found = fits.candidates(effect_classes(candidates), executor) if len(steps) < max_effects else []
+        diagnosis = verdict_of(fits, found, time.perf_counter())
         block = diagnosis.model
         values = {k: p.value for k, p in block.parameters.items()}
         steps.append(
@@ -199,7 +190,7 @@ def improve(
         ):
             break
         effect, evidence, same = best.id, best.evidence, best.equivalents
-        block, dropped = _without_idle(best.model, start, study, best, names)
+        block, dropped = _without_idle(best.model, start, fits, names)
     spread = math.sqrt(
         sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records))
     )
@@ -216,21 +207,19 @@ def improve(
     )
 
 
-def _without_idle(block, start, study, best, names):
+def _without_idle(block, start, fits, names):
     """Drop effects added earlier that the last one made idle: without them the error stays as it is."""
     dropped: list[str] = []
-    own = set(start._keys)
+    data, own = fits.data, set(start._keys)
     for key in [k for k in block._keys[:-1] if k not in own]:
         less = block.without_effect(key)
         free = [k for k in free_names(less) if k in set(names) or k.startswith(less._keys[-1] + ".")]
-        fitted = fit(less, study.coarse, free, study.scales, iterations=8)
+        fits.base = data.judged(Trial("", data.fit(less, free, iterations=8)))
         full_free = [k for k in free_names(block) if k in set(names) or k.startswith(block._keys[-1] + ".")]
-        full = fit(block, study.coarse, full_free, study.scales, iterations=4)
-        trials = [_Tried(key, f, 0) for f in (fitted, full)]
-        for t in trials:
-            study._hold(t, study.coarse_held)
-        study._judge([trials[1]], trials[0])
-        if trials[1].evidence < SIGNIFICANT:
-            block = fitted.block
+        whole = data.judged(
+            Trial(key, data.fit(block, full_free, iterations=4), extra=len(full_free) - len(free))
+        )
+        if fits.ranked([whole])[0].evidence < SIGNIFICANT:
+            block = fits.base.block
             dropped.append(key)
     return block, tuple(dropped)

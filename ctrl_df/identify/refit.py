@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from .candidate import Candidate, default_free, fit_candidate
+from .candidate import Candidate, fit_candidate
 from .compare import Comparison, as_records, comparison_of
 from .simulator import Simulator
+from .variables import default_free
 
 __all__ = ["Candidate", "Fit", "FittedParameter", "default_free", "fit_candidate", "refit"]
 

@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import control as ct
 import numpy as np
@@ -21,127 +20,11 @@ from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ..simulate.engine import Engine, State, sampled_drive
 from ..simulate.loop import closed_loop
-from . import derivatives
 from .measurement import Measurement
+from .windows import Windows, facts
 
 REFERENCE = ("reference", "r")
 _TIED = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
-
-
-# --- what a record says by itself -------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Facts:
-    """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band."""
-
-    dt: float
-    spread: float
-    speed: float
-    force: float
-    noise: float
-    swing: float  # time of one to and fro [s]
-    half: int  # samples either side of a local polynomial
-    velocity: np.ndarray
-
-
-_FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
-
-
-def facts(record: Measurement) -> Facts:
-    """Return the scales of a record (kept for as long as the record lives)."""
-    known = _FACTS.get(record)
-    if known is None:
-        _, grid, values = derivatives.uniform(record.t, record.y)
-        dt = float(grid[1] - grid[0])
-        cutoff = derivatives.automatic_cutoff(values, dt)
-        velocity = derivatives.derivative(record.t, record.y, 1, cutoff)
-        speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
-        swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
-        half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
-        known = Facts(
-            dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
-            max(record.noise_floor(), 1e-9 * float(np.std(record.y))), swing, half, velocity,
-        )  # fmt: skip
-        _FACTS[record] = known
-    return known
-
-
-def _turns(y) -> int:
-    """Count the turning points between strokes longer than half the rms, so that noise adds none."""
-    y = y[:: max(len(y) // 2000, 1)]
-    least, top, low, up, count = 0.5 * float(np.std(y)), y[0], y[0], 0, 0
-    for value in y.tolist():
-        top, low = max(top, value), min(low, value)
-        if up >= 0 and value < top - least:
-            up, low, count = -1, value, count + 1
-        elif up <= 0 and value > low + least:
-            up, top, count = 1, value, count + 1
-    return count
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Parts of a record, and the state in which the data say each begins.
-
-    `edges` (nw + 1) sample numbers; `x`, `v`, `a` (nw) reported position, velocity, acceleration at the first
-    sample of each; `x_error`, `v_error` (nw) how far they may be off.
-    """
-
-    edges: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    x_error: np.ndarray
-    v_error: np.ndarray
-
-    def __len__(self) -> int:
-        """Return the number of windows."""
-        return len(self.x)
-
-    @property
-    def slices(self) -> list[slice]:
-        """The windows as slices of the record."""
-        return [slice(a, b) for a, b in zip(self.edges[:-1], self.edges[1:], strict=True)]
-
-
-def usual_window(record: Measurement) -> float:
-    """Return a length of window [s] that shows two to-and-fro motions, 40 samples at least."""
-    known = facts(record)
-    return max(2 * known.swing, 40 * known.dt)
-
-
-def make_windows(record: Measurement, length: float | None = None) -> Windows:
-    """Cut a record into windows of about `length` [s] (None: one window) and estimate where each begins."""
-    n = len(record)
-    count = 1 if length is None else max(round(record.duration / length), 1)
-    count = max(min(count, n // 20), 1)
-    edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
-    edges[0], edges[-1] = 0, n
-    edges = np.unique(edges)
-    known = facts(record)
-    rows = np.array([_local(record, int(i), known) for i in edges[:-1]])
-    return Windows(edges, *rows.T)
-
-
-def _local(record, i, known) -> tuple[float, float, float, float, float]:
-    """Return (x, v, a, error of x, error of v) at sample i, by a parabola through its neighbours."""
-    low, high = max(i - known.half, 0), min(i + known.half + 1, len(record))
-    if high - low < 2 * known.half:  # at an end: as many samples, to one side
-        low, high = (
-            (0, min(2 * known.half, len(record)))
-            if i < known.half
-            else (max(len(record) - 2 * known.half, 0), high)
-        )
-    s, y = record.t[low:high] - record.t[i], record.y[low:high]
-    reach = max(float(np.max(np.abs(s))), 1e-300)
-    basis = np.vander(s / reach, 3, increasing=True)
-    solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
-    rest = y - basis @ solution
-    sigma = max(float(np.sqrt(np.sum(rest**2) / max(len(y) - 3, 1))), known.noise)
-    errors = sigma * np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis)))
-    x, v, a = solution[0], solution[1] / reach, 2 * solution[2] / reach**2
-    return float(x), float(v), float(a), float(errors[0]), float(errors[1] / reach)
 
 
 # --- the model on the record --------------------------------------------------------------------------
@@ -275,7 +158,7 @@ class Simulator:
         *,
         rounded: bool = False,
     ) -> np.ndarray:
-        """Simulate and return the output at the record's samples, shape (n,).
+        """Simulate and return the output at the samples within the windows, shape (n,).
 
         Parameters
         ----------
@@ -297,13 +180,14 @@ class Simulator:
         """
         self.runs += 1
         part = self._prepare(values)
-        record, n = self.record, len(self.record)
-        out = np.empty(n)
+        record = self.record
+        inside = windows.samples
+        out = np.empty(len(inside))
         drive = sampled_drive(
             part.drive_time, part.drive_value, record.input_hold if self.thin == 1 else "linear"
         )
         for w, where in enumerate(windows.slices):
-            times = record.t[where] - part.delay
+            times = record.t[inside[where]] - part.delay
             state = self._start(part, windows, w, None if start is None else start[w], times[0])
             segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
             state.segment = segment
@@ -322,7 +206,7 @@ class Simulator:
                 out[where.start + run.recorded : where.stop] = np.nan
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
-                out += primitive.offset + primitive.rate * (record.t - later)
+                out += primitive.offset + primitive.rate * (record.t[inside] - later)
             elif rounded:
                 out = primitive.value(out)
         limit = 10 * self.facts.spread
@@ -420,7 +304,7 @@ class Simulator:
         if core is None:
             return engine.start(x0, time)
         given = dict(zip(self.nuisances, start, strict=True)) if start is not None else {}
-        i = int(windows.edges[w])
+        i = int(windows.begins[w])
         x = float(windows.x[w]) + given.get("x", 0.0)
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
@@ -462,6 +346,30 @@ class Simulator:
         for state, samples in part.lags:
             states[state] = samples[i]
         return engine.start(x0, time)
+
+
+def free_run(
+    model, record: Measurement, *, position=0.0, velocity=0.0, slack=0.5, thin: int = 1
+) -> np.ndarray:
+    """Return the output of a model over a whole record, shape (n,), from a state that is known.
+
+    Parameters
+    ----------
+    model : block
+        Driven by the record's input.
+    position, velocity : float
+        Reported by the model at the first sample [m], [m/s].
+    slack : float
+        Share of a gap taken up there, 0 to 1.
+    thin : int
+        Samples a step of the input; 1 is exact.
+    """
+    simulator = Simulator(model, record, thin=thin)
+    known = {"x": position, "v": velocity, "slack": slack}
+    one = np.zeros(1)
+    whole = Windows(np.array([0]), np.array([len(record)]), one, one, one, one, one)
+    start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
+    return simulator.run(whole, None, start, rounded=True)
 
 
 def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:

@@ -1,114 +1,26 @@
-"""Many quick simulations of one block against records: what screening and confirmation of candidates run on.
-
-A record is thinned once (the input by block means, which keeps its impulse; the output by picking samples, which
-keeps the steps of an encoder), and a candidate is fitted by Levenberg-Marquardt on the free-run simulation error.
-The start of every record (position, velocity, the slack in a gap) is fitted along with the parameters: an inertia
-without a spring goes on from wherever it started.
-"""
+"""The data of a diagnosis, made ready for many fits: windows to learn from, windows to be judged by."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from ..blocks.core import level
-from ..blocks.effects import Stiction, Stribeck
-from .derivatives import block_means
+from .candidate import Candidate, fit_windows
 from .measurement import Measurement
-from .simulator import Simulator, Windows, facts
+from .simulator import Simulator
+from .windows import Windows, cut, facts
 
-RTOL = 1e-6
+SAMPLES = 2500
+"""Steps of the input a record is thinned to while candidates are screened."""
 
+SHORTEST = 16
+"""How many times as many the shortest windows are as the longest."""
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One record, thinned; `use` marks the samples that count in a fit."""
-
-    record: Measurement
-    t: np.ndarray
-    u: np.ndarray
-    y: np.ndarray
-    v: np.ndarray  # smoothed velocity of the measurement
-    use: np.ndarray
-    windows: Windows  # parts with a start of their own
-
-    @property
-    def rest(self) -> bool:
-        """Whether the record begins with nothing applied."""
-        return bool(abs(self.u[0]) < 1e-9 * np.max(np.abs(self.u)))
-
-
-def as_run(record, thin: int = 1, use=None) -> Run:
-    """Thin a `Measurement`; `use` marks samples of the record that count (all by default)."""
-    use = np.ones(len(record), bool) if use is None else use
-    velocity = facts(record).velocity
-    if thin > 1 and record.regular:
-        held = record.input_hold == "zoh"
-        u = block_means(record.u, thin) if held else record.u[::thin]
-        channels = {k: c[::thin] for k, c in record.channels.items()}
-        speed = None if record.velocity is None else record.velocity[::thin]
-        record = record._with(t=record.t[::thin], u=u, y=record.y[::thin], velocity=speed, channels=channels)
-        use, velocity = use[::thin], velocity[::thin]
-    return Run(record, record.t, record.u, record.y, velocity, use, _cut([0, len(record)]))
-
-
-def _cut(edges) -> Windows:
-    zero = np.zeros(len(edges) - 1)
-    return Windows(np.asarray(edges), zero, zero, zero, zero, zero)
-
-
-def windowed(run: Run, count: int | None = None) -> Run:
-    """Cut a run into windows of about two to-and-fro motions, or into `count`, each with a start of its own."""
-    n, span = len(run.t), run.t[-1] - run.t[0]
-    count = count or int(min(max(round(span / max(2.5 * facts(run.record).swing, 60 * span / n)), 4), 40))
-    return replace(run, windows=_cut(np.linspace(0, n, count + 1).astype(int)))
-
-
-def thinning(records, samples: int) -> int:
-    """Return the factor that leaves about `samples` samples a record on average."""
-    return max(1, int(round(np.mean([len(r) for r in records]) / samples)))
-
-
-# --- simulating -----------------------------------------------------------------------------------
-
-
-def simulate(block, run: Run, starts, rtol: float = RTOL) -> np.ndarray:
-    """Return the simulated output at the run's samples.
-
-    `starts`, (windows, 3): reported position [m], velocity [m/s], share of a gap taken up, where each begins.
-    """
-    simulator = Simulator(block, run.record, rtol=rtol)
-    begin = np.zeros((len(starts), len(simulator.nuisances)))
-    for j, name in enumerate(simulator.nuisances):
-        if name in _STARTS:
-            begin[:, j] = starts[:, _STARTS.index(name)]
-    return simulator.run(run.windows, None, begin, rounded=True)
-
-
-_STARTS = ("x", "v", "slack")
-
-
-def with_values(block, values):
-    """`block.with_parameters` with static levels kept at or above the kinetic one."""
-    values = dict(values)
-    static = [
-        k for k, e in zip(block._keys, block.effects, strict=True) if isinstance(e, Stiction | Stribeck)
-    ]
-    if static:
-        # lift the static levels out of the way, read the kinetic one, then put them back above it
-        table = block.parameters
-        wanted = {k: values.get(f"{k}.level", table[f"{k}.level"].value) for k in static}
-        block = block.with_parameters({**values, **{f"{k}.level": 1e30 for k in static}})
-        base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
-        kinetic = level(base, 1.0, 1.0, 0.0)
-        return block.with_parameters({f"{k}.level": max(v, kinetic) for k, v in wanted.items()})
-    return block.with_parameters(values) if values else block
-
-
-# --- parameters in units of one -------------------------------------------------------------------
+PARTS = 9
+"""Parts of a record of which every third is held out where no record is."""
 
 
 @dataclass(frozen=True)
@@ -130,218 +42,168 @@ class Scales:
         return table.get(unit, 1.0)
 
 
-def scales_of(block, runs) -> Scales:
-    """Read the scales off the records."""
-    force = math.sqrt(np.mean([np.mean(r.u**2) for r in runs]))
-    position = math.sqrt(np.mean([np.var(r.y) for r in runs]))
-    speed = math.sqrt(np.mean([np.mean(r.v**2) for r in runs]))
+@dataclass(frozen=True)
+class View:
+    """Records and the windows of each that count."""
+
+    records: tuple[Measurement, ...]
+    windows: tuple[Windows, ...]
+
+    def shorter(self, factor: int) -> View:
+        """Return windows up to `factor` times as many, over the same samples; none is shorter than 50 samples."""
+        finer = []
+        for record, old in zip(self.records, self.windows, strict=True):
+            new = cut(record, min(factor * _count(record), max(len(record) // 50, 4)))
+            inside = np.zeros(len(record), bool)
+            inside[old.samples] = True
+            middle = (new.begins + new.ends - 1) // 2
+            finer.append(new.only(inside[middle]))
+        return View(self.records, tuple(finer))
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Measured outputs within the windows."""
+        return [r.y[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
+
+    @property
+    def velocities(self) -> list[np.ndarray]:
+        """Smoothed velocities within the windows."""
+        return [facts(r).velocity[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
+
+    @property
+    def spread(self) -> float:
+        """Root mean square of the centred outputs."""
+        ys = self.outputs
+        return math.sqrt(sum(float(np.sum((y - y.mean()) ** 2)) for y in ys) / sum(map(len, ys)))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A model fitted to the windows to learn from, and (once judged) run over those to be judged by."""
+
+    key: str
+    train: Candidate
+    held: Candidate | None = None
+    extra: int = 0  # parameters beyond the baseline's
+    evidence: float = 0.0
+    confirmed: bool = False
+
+    @property
+    def block(self):
+        """The fitted model."""
+        return self.train.model
+
+    @property
+    def residuals(self) -> list[np.ndarray]:
+        """Of all windows."""
+        return [*self.train.residual, *(self.held.residual if self.held is not None else ())]
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Simulated, of all windows."""
+        return [*self.train.simulated, *(self.held.simulated if self.held is not None else ())]
+
+    @property
+    def size(self) -> float:
+        """Sum of squared residuals."""
+        return float(sum(np.sum(r * r) for r in self.residuals))
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Everything the fits of one diagnosis share: windows of one length, and those of others."""
+
+    train: View
+    held: View
+    thin: int
+    scales: Scales
+    whole: tuple[View, View] | None = None
+
+    def level(self, factor: int) -> Data:
+        """Return the same data in windows `factor` times as many as the longest."""
+        train, held = self.whole or (self.train, self.held)
+        return replace(self, train=train.shorter(factor), held=held.shorter(factor), whole=(train, held))
+
+    @property
+    def fine(self) -> Data:
+        """The same at the records' full rate."""
+        return replace(self, thin=1)
+
+    def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
+        """Fit the named parameters over the windows to learn from (or those of `view`)."""
+        view = view or self.train
+        return fit_windows(
+            block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
+            tolerance=tolerance,
+        )  # fmt: skip
+
+    def moved(self, found: Candidate, iterations=8) -> Candidate:
+        """Fit a model found over other windows to these; windows that begin at one sample share initial states."""
+        starts = same_begins(found, self.train.windows)
+        return self.fit(found.model, found.names, starts=starts, iterations=iterations)
+
+    def judged(self, tried: Trial) -> Trial:
+        """Run a fitted model over the windows to be judged by, from initial states of their own."""
+        # Those of short windows are found without fail; the others begin at the same places.
+        short = self.level(SHORTEST).held
+        near = self.fit(tried.block, (), view=short, iterations=6, tolerance=1e-2)
+        starts = same_begins(near, self.held.windows)
+        held = self.fit(tried.block, (), view=self.held, starts=starts, iterations=4, tolerance=1e-2)
+        return replace(tried, held=held)
+
+
+def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] = ()) -> Data:
+    """Cut records into windows; without records held out, every third ninth of each is."""
+    records = tuple(records)
+    if held:
+        learn = View(records, tuple(cut(r, _count(r)) for r in records))
+        judge = View(tuple(held), tuple(cut(r, _count(r)) for r in held))
+    else:
+        whole = [cut(r, PARTS * max(round(_count(r) / PARTS), 1)) for r in records]
+        third = [(np.arange(len(w)) * PARTS // len(w)) % 3 == 2 for w in whole]
+        if any(not np.any(t) or np.all(t) for t in third):
+            raise ValueError(
+                "diagnose needs records of at least 180 samples where none is held out; "
+                f"got {min(map(len, records))}. Give holdout=, or a longer record."
+            )
+        learn = View(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
+        judge = View(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+    thin = max(1, round(float(np.mean([len(r) for r in records])) / SAMPLES))
+    thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    return Data(learn, judge, thin, _scales(block, records))
+
+
+def _count(record) -> int:
+    """Return the number of windows: two to-and-fro motions and a half each, 60 samples at least."""
+    known, n = facts(record), len(record)
+    return int(min(max(round(record.duration / max(2.5 * known.swing, 60 * record.duration / n)), 4), 40))
+
+
+def _scales(block, records) -> Scales:
+    force = math.sqrt(np.mean([np.mean(r.u**2) for r in records]))
+    position = math.sqrt(np.mean([np.var(r.y) for r in records]))
+    speed = math.sqrt(np.mean([np.mean(facts(r).velocity ** 2) for r in records]))
     mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
     return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
 
 
-@dataclass(frozen=True)
-class Coordinate:
-    """One parameter as a number of order one: its logarithm where it is positive, else its multiple of a scale."""
-
-    name: str
-    logarithmic: bool
-    scale: float
-    lower: float
-    upper: float
-
-    def value(self, z: float) -> float:
-        """Return the physical value."""
-        if self.logarithmic:
-            value = self.scale * math.exp(min(max(z, -50.0), 50.0))
-        else:
-            value = self.scale * z
-        return float(min(max(value, self.lower), self.upper))
-
-    def z(self, value: float) -> float:
-        """Return the coordinate of a physical value."""
-        return math.log(value / self.scale) if self.logarithmic else value / self.scale
+def same_begins(found: Candidate, windows) -> list[np.ndarray]:
+    """Return initial states for windows from a fit over others: theirs where both begin at one sample, else none."""
+    starts = []
+    for old, new, states in zip(found.windows, windows, found.starts, strict=True):
+        at = np.searchsorted(old.begins, new.begins)
+        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
+        rows = np.zeros((len(new), states.shape[1]))
+        rows[same] = states[at[same]]
+        starts.append(rows)
+    return starts
 
 
-def coordinates(block, names, scales: Scales) -> list[Coordinate]:
-    """Return coordinates of the named parameters about the block's own values."""
-    found = []
-    for name in names:
-        p = block.parameters[name]
-        usual = scales.of(p.unit)
-        positive = p.lower >= 0 and p.value > 1e-6 * usual and math.isinf(p.upper)
-        lower = p.lower if not p.strict else max(p.lower, 1e-9 * usual)
-        if p.upper < 1.0 and p.strict:
-            lower = 0.02
-        size = p.value if positive else max(abs(p.value), 0.02 * usual)
-        found.append(Coordinate(name, positive, size, lower, p.upper))
-    return found
-
-
-# --- fitting --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A block fitted to runs: simulated outputs, residuals, starts, and the Jacobian of the last step."""
-
-    block: Any
-    starts: tuple[np.ndarray, ...]
-    outputs: tuple[np.ndarray, ...]
-    residuals: tuple[np.ndarray, ...]
-    names: tuple[str, ...]
-    jacobian: np.ndarray | None = None
-    coordinates: tuple[Coordinate, ...] = ()
-    simulations: int = 0
-
-    @property
-    def rms(self) -> float:
-        """Root mean square residual over all runs."""
-        return math.sqrt(float(np.mean(np.concatenate(self.residuals) ** 2)))
-
-
-def first_starts(runs) -> tuple[np.ndarray, ...]:
-    """Return starts read off the records, one row a window."""
-    return tuple(np.array([_start_at(run, int(i)) for i in run.windows.edges[:-1]]) for run in runs)
-
-
-def _start_at(run, i):
-    n = max(min(len(run.t) // 200, 20), 4)
-    part = slice(i, min(i + n, len(run.t)))
-    if i == 0 and np.max(np.abs(run.u[part])) < 1e-9 * np.max(np.abs(run.u)):
-        return float(np.mean(run.y[part])), 0.0, 0.5
-    low = max(i - n, 0)
-    t, y, v = run.t[low : part.stop], run.y[low : part.stop], run.v[low : part.stop]
-    way = np.concatenate(([0.0], np.cumsum(np.diff(t) * 0.5 * (v[1:] + v[:-1]))))
-    way -= way[i - low]
-    return float(np.mean(y - way)), float(run.v[i]), 0.5
-
-
-def fit(
-    block, runs, free, scales: Scales, *, starts=None, iterations=12, rtol=RTOL, tolerance=1e-4, prior=None
-) -> Fitted:
-    """Fit the named parameters and the starts of all runs by damped least squares.
-
-    Parameters
-    ----------
-    block : Mechanism
-        With its start values.
-    runs : sequence of Run
-        Records; each counts by its samples marked `use`.
-    free : sequence of str
-        Parameters to move; an empty one fits the starts alone.
-    scales : Scales
-        For steps and parameters that begin at zero.
-    starts : sequence of arrays or None
-        Start of each run; None: read off the record.
-    iterations : int
-        Bound on the steps.
-    """
-    starts = first_starts(runs) if starts is None else starts
-    problem = _Problem(block, runs, coordinates(block, free, scales), starts, scales, rtol)
-    z, ys, e, jacobian = problem.solve(iterations, tolerance)
-    model, moved = problem.unpack(z)
-    residuals = tuple(r.y - y for y, r in zip(ys, runs, strict=True))
-    return Fitted(
-        model, tuple(moved), tuple(ys), residuals, tuple(free), jacobian, tuple(problem.coords), problem.simulations
-    )  # fmt: skip
-
-
-class _Problem:
-    """Unknowns of one fit: coordinates of the free parameters, then the starts of all windows."""
-
-    def __init__(self, block, runs, coords, starts, scales, rtol):
-        self.block, self.runs, self.coords, self.starts, self.rtol = block, runs, coords, starts, rtol
-        self.gap = block.core.gap > 0
-        self.kinds = 3 if self.gap else 2
-        self.sizes = np.array([0.02 * scales.position, 0.02 * scales.speed, 0.3])
-        self.counts = [len(s) for s in starts]
-        self.unit = scales.position
-        self.simulations = 0
-        names = [c.name for c in coords]
-        self.z0 = np.array([c.z(block.parameters[n].value) for c, n in zip(coords, names, strict=True)])
-        self.total = len(coords) + self.kinds * sum(self.counts)
-
-    def unpack(self, z):
-        values = {c.name: c.value(v) for c, v in zip(self.coords, z, strict=False)}
-        at, moved = len(self.coords), []
-        for s, n in zip(self.starts, self.counts, strict=True):
-            new = s.copy()
-            new[:, : self.kinds] += (
-                z[at : at + self.kinds * n].reshape(n, self.kinds) * self.sizes[: self.kinds]
-            )
-            new[:, 2] = np.clip(new[:, 2], 0.0, 1.0)
-            moved.append(new)
-            at += self.kinds * n
-        return with_values(self.block, values), moved
-
-    def outputs(self, z):
-        try:
-            model, moved = self.unpack(z)
-        except ValueError:
-            return None
-        self.simulations += 1
-        return [simulate(model, run, s, self.rtol) for run, s in zip(self.runs, moved, strict=True)]
-
-    def errors(self, ys):
-        return np.concatenate([(r.y - y)[r.use] for y, r in zip(ys, self.runs, strict=True)]) / self.unit
-
-    def jacobian(self, z, ys, e):
-        rows = np.zeros((self.total, len(e)))
-        p = len(self.coords)
-        for i, c in enumerate(self.coords):
-            step = 2e-3 if c.value(z[i] + 2e-3) != c.value(z[i]) else -2e-3
-            trial = z.copy()
-            trial[i] += step
-            moved = self.outputs(trial)
-            if moved is not None:
-                rows[i] = (self.errors(moved) - e) / step
-        # the starts of all windows at once: each moves its own window only
-        windows = np.concatenate([
-            np.repeat(np.arange(n) + sum(self.counts[:k]), np.diff(r.windows.edges))[r.use]
-            for k, (r, n) in enumerate(zip(self.runs, self.counts, strict=True))
-        ])  # fmt: skip
-        for kind in range(self.kinds):
-            trial = z.copy()
-            step = 2e-2 if kind < 2 else 0.1
-            trial[p + kind :: self.kinds] += step
-            moved = self.outputs(trial)
-            if moved is None:
-                continue
-            slope = (self.errors(moved) - e) / step
-            rows[p + kind + self.kinds * windows, np.arange(len(e))] = slope
-        rows[~np.isfinite(rows)] = 0.0
-        return rows
-
-    def solve(self, iterations, tolerance) -> tuple[Any, Any, Any, Any]:
-        """Levenberg-Marquardt; returns unknowns, outputs, errors and the last Jacobian."""
-        z = np.concatenate([self.z0, np.zeros(self.total - len(self.coords))])
-        ys = self.outputs(z)
-        e = self.errors(ys)
-        cost, damping, jacobian = float(e @ e), 1e-3, np.zeros((0, len(e)))
-        limit = np.where(np.arange(len(z)) < len(self.coords), 0.7, 30.0)
-        for _ in range(iterations):
-            jacobian = self.jacobian(z, ys, e)
-            # A start that the data do not feel (at rest, friction holds) is kept near its estimate.
-            ridge = np.where(np.arange(len(z)) < len(self.coords), 0.0, cost / len(e) / 100.0)
-            normal, gradient = jacobian @ jacobian.T + np.diag(ridge), jacobian @ e + ridge * z
-            diagonal = np.diag(normal) + 1e-12 * (np.max(np.diag(normal)) + 1e-300)
-            accepted = None
-            for _ in range(5):
-                move = -np.linalg.solve(normal + damping * np.diag(diagonal), gradient)
-                move = np.clip(move, -limit, limit)
-                trial = self.outputs(z + move)
-                if trial is not None:
-                    errors = self.errors(trial)
-                    new = float(errors @ errors)
-                    if new < cost:
-                        accepted = (z + move, trial, errors, new)
-                        break
-                damping = max(damping, 1e-6) * 10
-            if accepted is None:
-                break
-            gain = (cost - accepted[3]) / cost
-            z, ys, e, cost = accepted
-            damping = max(damping / 8, 1e-9)
-            if gain < tolerance:
-                break
-        return z, ys, e, jacobian
+def carried(simulator: Simulator, windows: Windows, before: Simulator, starts: np.ndarray) -> np.ndarray:
+    """Return initial states found for one model as those of another: what the first lacks begins at its usual value."""
+    given = dict(zip(before.nuisances, starts.T, strict=True))
+    columns = []
+    for name in simulator.nuisances:
+        usual = np.where(windows.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(windows))
+        columns.append(given.get(name, usual))
+    return np.array(columns).T.reshape(len(windows), len(columns))

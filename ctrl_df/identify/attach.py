@@ -1,0 +1,43 @@
+"""Adding an effect to a block: whether it can change anything, and what the block then is."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from ..blocks.core import level
+from .simulator import feasible
+
+# Effects of which a block may hold several; a second of any other is the first one again.
+_REPEATABLE = ("position_ripple",)
+
+
+def applicable(cls, block) -> bool:
+    """Whether adding an effect of this class to the block can change anything."""
+    ids = [e.id for e in block.effects]
+    if cls.id in ids and cls.id not in _REPEATABLE:
+        return False
+    two = block.core.bodies == 2
+    if cls.id == "load_friction":
+        return two  # on a rigid block it is Coulomb friction
+    if cls.id == "backlash":
+        return "compliance" not in ids or cls.id not in ids
+    return not (cls.role == "coupling" and two and "compliance" in ids)
+
+
+def attach(block, effect):
+    """Return the block with the effect added, or None where the two contradict each other."""
+    try:
+        grown = block.with_effect(effect)
+    except (ValueError, TypeError):
+        if not hasattr(effect, "level"):
+            return None
+        try:
+            base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
+            lifted = dataclasses.replace(effect, level=max(effect.level, level(base, 1.0, 1.0, 0.0)))
+            grown = block.with_effect(lifted)
+        except (ValueError, TypeError):
+            return None
+    if effect.id == "coulomb":
+        # a static level must stay above the new kinetic one
+        grown = grown.with_parameters(feasible(grown, {}))
+    return grown

@@ -1,0 +1,230 @@
+"""Start values for every effect of the library, read off the data where they can be.
+
+An effect class may bring its own: a function ``suggest(screen)`` that yields effects. For the rest the main
+parameter is tried from small to large.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..blocks import effects as library
+from ..blocks.core import level
+from .attach import attach
+
+if TYPE_CHECKING:
+    from .screen import Screen
+
+# Effects that vanish as their main parameter goes to zero, in proportion to it.
+PROPORTIONAL = frozenset({
+    "viscous", "coulomb", "quadratic_drag", "asymmetric_coulomb", "asymmetric_viscous", "load_friction",
+    "constant_force", "linear_spring", "cubic_spring", "input_dead_zone", "input_delay", "input_lag", "sensor_delay",
+    "sensor_offset", "drift",
+})  # fmt: skip
+
+
+def proposals(cls, screen: Screen):
+    """Return effects of one class to begin with."""
+    own = getattr(cls, "suggest", None)
+    if own is not None:
+        return own(screen)
+    maker = _MAKERS.get(cls.id)
+    if maker is not None:
+        return maker(screen)
+    return _generic(cls, screen)
+
+
+def _generic(cls, screen: Screen):
+    """Yield the effect at sizes of the main parameter from small to large, others at default or typical size."""
+    values, main = {}, None
+    for f in dataclasses.fields(cls):
+        spec = f.metadata.get("parameter")
+        if spec is None:
+            continue
+        if main is None:
+            main = (f.name, spec)
+        elif f.default is dataclasses.MISSING:
+            values[f.name] = screen.scales.of(spec["unit"])
+    if main is None:
+        yield cls()
+        return
+    name, spec = main
+    usual = screen.scales.of(spec["unit"])
+    sizes = (0.02, 0.1, 0.4) if cls.id in PROPORTIONAL else (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+    signs = (1.0, -1.0) if spec["lower"] < 0 and cls.id not in PROPORTIONAL else (1.0,)
+    for size, sign in itertools.product(sizes, signs):
+        try:
+            yield cls(**{name: sign * size * usual, **values})
+        except ValueError:
+            continue
+
+
+def _kinetic(block):
+    base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
+    return level(base, 1.0, 1.0, 0.0)
+
+
+def _stiction(screen):
+    kinetic, force = _kinetic(screen.block), screen.scales.force
+    levels = (
+        {kinetic * f for f in (1.03, 1.08, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0)}
+        if kinetic > 0.01 * force
+        else set()
+    )
+    return [
+        library.Stiction(x) for x in sorted(levels | {0.1 * force, 0.3 * force, 0.6 * force}) if x > kinetic
+    ]
+
+
+def _stribeck(screen):
+    kinetic, s = _kinetic(screen.block), screen.scales
+    low = max(kinetic, 0.02 * s.force)
+    grid = itertools.product((1.1, 1.35, 1.8, 2.4), (0.05, 0.12, 0.3, 0.8))
+    return [library.Stribeck(low * a, s.speed * b) for a, b in grid]
+
+
+def _bristle(screen):
+    kinetic, s = _kinetic(screen.block), screen.scales
+    found = []
+    for bend in (0.001, 0.003, 0.01, 0.03, 0.1, 0.3):
+        k = max(kinetic, 0.05 * s.force) / (bend * s.position)
+        found.append(library.Bristle(k, 0.5 * math.sqrt(k * s.mass)))
+    return found
+
+
+def _hard_stop(screen):
+    reach = float(np.max(np.abs(screen.motion.x)))
+    return [library.HardStop(reach * f, e) for f in (0.999, 0.99, 0.96, 0.9) for e in (0.05, 0.5)]
+
+
+def _saturation(screen):
+    top = float(np.quantile(np.abs(screen.motion.u), 0.999))
+    return [library.InputSaturation(top * f) for f in (0.97, 0.93, 0.87, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)]
+
+
+def _gain(screen):
+    return [library.InputGain(g) for g in (0.7, 0.9, 0.97, 1.03, 1.1, 1.3)]
+
+
+def _backlash(screen):
+    s = screen.scales
+    gaps = (0.003, 0.01, 0.03, 0.08, 0.2, 0.5)
+    if screen.block.core.bodies == 2:
+        return [library.Backlash(s.position * g, 0.2) for g in gaps]
+    return [library.Backlash(s.position * g, 0.2, f) for g in gaps for f in (0.3, 0.6)]
+
+
+def _compliance(screen):
+    s = screen.scales
+    shares = (0.3, 0.6) if screen.block.core.bodies == 1 else (0.5,)
+    found = []
+    for bend, share in itertools.product((0.003, 0.01, 0.03, 0.08, 0.2, 0.5), shares):
+        k = share * s.force / (bend * s.position)
+        damping = 0.12 * math.sqrt(k * share * (1 - share) * s.mass)
+        found.append(library.Compliance(k, damping, share))
+    return found
+
+
+def _quantization(screen):
+    """Find the grid to which values keep: where the mean of exp(2 pi j y / step) has modulus near one."""
+    y = np.concatenate(screen.data.train.outputs)
+    span = float(np.ptp(y))
+    noise = math.sqrt(float(screen.residual @ screen.residual) / len(screen.residual))
+    if span == 0 or noise == 0:
+        return []
+    # An error of the size seen belongs to a step of sqrt(12) times it; look half a decade to both sides.
+    guess = math.sqrt(12) * noise
+    low, high = 0.3 * guess, min(3.0 * guess, 2 * span)
+    count = int(min(max((1 / low - 1 / high) * span * 6, 10), 4000))
+    inverse = np.linspace(1 / high, 1 / low, count)
+    some = y[:: max(1, len(y) // 4000)]
+    contrast = np.array([abs(np.mean(np.exp(2j * math.pi * some * q))) for q in inverse])
+    best = [int(np.argmax(contrast))]
+    strong = np.flatnonzero(contrast > 0.8 * contrast[best[0]])
+    best.append(int(strong[0]))  # the coarsest of the grids that fit as well
+    steps = []
+    for i in best:
+        fine = np.linspace(inverse[max(i - 1, 0)], inverse[min(i + 1, count - 1)], 81)
+        value = [abs(np.mean(np.exp(2j * math.pi * some * q))) for q in fine]
+        steps.append(1 / fine[int(np.argmax(value))])
+    return [library.SensorQuantization(s) for s in dict.fromkeys(steps)]
+
+
+def _ripple(screen):
+    """Try wavelengths over the stroke: sine and cosine are two small changes, fitted together."""
+    s = screen.scales
+    span = float(np.ptp(screen.motion.x))
+    turns = list(np.geomspace(0.6, 12.0, 30)) + list(force_ripple_turns(screen, span))
+    amplitude = 0.01 * s.force
+    total = float(screen.residual @ screen.residual)
+    scored = []
+    for turn in turns:
+        pair = []
+        for phase in (0.0, math.pi / 2):
+            block = attach(screen.block, library.PositionRipple(amplitude, span / turn, phase))
+            change = screen.change(block)
+            if change is None:
+                break
+            pair.append(screen.project(change))
+        if len(pair) < 2:
+            continue
+        matrix = np.array(pair).T
+        weights, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
+        left = screen.residual - matrix @ weights
+        scored.append((float(left @ left) / total, turn, weights))
+    scored.sort(key=lambda x: x[0])
+    found = []
+    for _, turn, weights in scored[:5]:
+        size = amplitude * float(np.hypot(*weights))
+        phase = math.atan2(weights[1], weights[0])
+        for factor in (1.0, 0.5):
+            found.append(library.PositionRipple(min(size * factor, 2 * s.force), span / turn, phase))
+    return found
+
+
+def force_ripple_turns(screen: Screen, span: float, count: int = 5) -> list[float]:
+    """Return the strongest periods of the force residual over position, as turns over the stroke `span`.
+
+    The force that motion demands minus the force given, cleaned of mass, friction and offset by least squares
+    where the mass moves; its spectrum is taken over position, not time.
+    """
+    tops: dict[float, float] = {}
+    grid = np.linspace(0.5, 60.0, 600)
+    m = screen.motion
+    moving = np.abs(m.v) > 0.2 * screen.scales.speed
+    if np.count_nonzero(moving) < 100:
+        return []
+    x, v, u = m.x[moving], m.v[moving], m.u[moving]
+    columns = np.column_stack([m.a[moving], np.sign(v), v, np.ones(len(v)), x, v * np.abs(v)])
+    columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)
+    w, *_ = np.linalg.lstsq(columns, u, rcond=None)
+    left = u - columns @ w
+    phase = np.exp(2j * math.pi * np.outer(grid / span, x))
+    power = np.abs(phase @ left) ** 2 / len(x)
+    for _ in range(count):
+        i = int(np.argmax(power))
+        if power[i] == 0:
+            break
+        tops[float(grid[i])] = power[i]
+        power[max(i - 6, 0) : i + 7] = 0.0
+    return list(tops)
+
+
+_MAKERS: dict[str, Callable] = {
+    "stiction": _stiction,
+    "stribeck": _stribeck,
+    "bristle": _bristle,
+    "hard_stop": _hard_stop,
+    "input_saturation": _saturation,
+    "input_gain": _gain,
+    "backlash": _backlash,
+    "compliance": _compliance,
+    "sensor_quantization": _quantization,
+    "position_ripple": _ripple,
+}

@@ -1,0 +1,374 @@
+"""Simulation-error least squares by multiple shooting.
+
+Each window of each record starts from a state of its own. Those states enter linearly near the solution; they
+are eliminated window by window from the normal equations (variable projection), so that the work grows with
+the number of parameters only. Steps are Levenberg-Marquardt, bounds are kept by projection, outliers are
+bent to Huber's loss once the fit is near. Derivatives are differences of a size that moves the output by
+about the noise: far above the roughness that events leave in the cost.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .simulator import Simulator, feasible
+from .variables import variables_of
+from .windows import Windows, facts
+
+Signals = list[np.ndarray]
+
+
+class Tangent:
+    """A fitted model as a linear map: what its parameters and initial states can change in the output.
+
+    Parameters
+    ----------
+    parameters, states : list of (n, p) and (n, ns) arrays
+        Per record, derivatives of the output at the samples within the windows.
+    windows : list of Windows
+    ridge : list of (nw, ns) arrays
+        Precision of what is known of the initial states beforehand, in units of one sample.
+    """
+
+    def __init__(self, parameters, states, windows, ridge):
+        self.states, self.windows, self.ridge = states, windows, ridge
+        self.parameters = [self._without_starts(k, j) for k, j in enumerate(parameters)]
+        stacked = np.concatenate(self.parameters)
+        norms = np.linalg.norm(stacked, axis=0)
+        stacked = stacked[:, norms > 0] / norms[norms > 0]
+        u, s, _ = np.linalg.svd(stacked, full_matrices=False)
+        self._basis = u[:, s > 1e-6 * s[0]] if len(s) else u
+
+    def _without_starts(self, k, columns):
+        """Remove from the columns (n, m) of one record what its initial states can explain."""
+        out = np.array(columns, dtype=float)
+        for w, where in enumerate(self.windows[k].slices):
+            s = self.states[k][where]
+            if s.shape[1]:
+                out[where] -= s @ np.linalg.solve(s.T @ s + np.diag(self.ridge[k][w]), s.T @ out[where])
+        return out
+
+    def project(self, signals: Signals) -> np.ndarray:
+        """Return the signals, one array for all records, without what refitting could explain."""
+        joined = np.concatenate(
+            [self._without_starts(k, np.reshape(e, (-1, 1)))[:, 0] for k, e in enumerate(signals)]
+        )
+        return joined - self._basis @ (self._basis.T @ joined)
+
+
+class Problem:
+    """Records, windows and free parameters of one fit.
+
+    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the initial
+    states, `slopes` the derivatives of the last step.
+    """
+
+    def __init__(self, model, records, names, budget):
+        self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
+        self.known = [facts(r) for r in records]
+        self.block = Simulator(model, records[0]).block
+        self.variables = variables_of(self.block, names, self.records, self.known[0])
+        self.steps = np.full(len(names), 1e-3)
+        self.nfev = 0
+        self.converged = False
+        self.simulators: list[Simulator] = []
+        self.windows: list[Windows] = []
+        self.measured: Signals = []
+        self.nuisance: list[np.ndarray] = []
+        self.priors: list[np.ndarray] = []
+        self.last: Signals = []
+        self.slopes: tuple[list, list] | None = None
+        self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
+
+    def start(self) -> np.ndarray:
+        """Return the scaled parameters of the model as it is."""
+        return np.array([v.clip(v.q(self.block.parameters[v.name].value)) for v in self.variables])
+
+    def values(self, theta):
+        """Return the parameters by name, static levels kept above the kinetic one."""
+        given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
+        return feasible(self.block, given) if given else None
+
+    def stage(self, windows: list[Windows], thin, starts=None):
+        """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
+        self.simulators = [Simulator(self.model, r, thin=thin) for r in self.records]
+        self.windows = windows
+        self.measured = [r.y[w.samples] for r, w in zip(self.records, windows, strict=True)]
+        self.priors = [s.priors(w) for s, w in zip(self.simulators, windows, strict=True)]
+        self.fresh = starts is None or any(
+            a.shape != p.shape for a, p in zip(starts, self.priors, strict=True)
+        )
+        if self.fresh:
+            self.nuisance = [np.zeros_like(p) for p in self.priors]
+        else:
+            self.nuisance = [np.array(a) for a in starts]  # type: ignore[union-attr]
+
+    def simulate(self, theta, nuisance) -> Signals:
+        """Return the outputs within the windows."""
+        self.nfev += 1
+        values = self.values(theta)
+        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.windows, nuisance, strict=True)]
+
+    def residual(self, theta, nuisance) -> Signals:
+        """Return measured minus simulated."""
+        return [m - y for m, y in zip(self.measured, self.simulate(theta, nuisance), strict=True)]
+
+    def cost(self, residual, nuisance, weights) -> float:
+        """Return half the weighted sum of squares, initial states weighed by what is known of them."""
+        total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
+        known = sum(
+            float(np.sum((a - m) ** 2 / p**2))
+            for a, m, p in zip(nuisance, self.means(), self.priors, strict=True)
+        )
+        # What is known beforehand counts as much as one sample off by the noise.
+        return 0.5 * (total + self.noise**2 * known)
+
+    def means(self):
+        """Return the expected corrections of the initial states: none, but half the slack of a gap."""
+        means = [np.zeros_like(p) for p in self.priors]
+        for mean, simulator in zip(means, self.simulators, strict=True):
+            if "slack" in simulator.nuisances:
+                mean[:, simulator.nuisances.index("slack")] = 0.5
+        return means
+
+    def tangent(self) -> Tangent:
+        """Return the linear map about the last step of `solve`."""
+        assert self.slopes is not None
+        ridge = [self.noise**2 / p**2 for p in self.priors]
+        return Tangent(*self.slopes, self.windows, ridge)
+
+    # --- solving --------------------------------------------------------------------------------------
+
+    def solve(self, theta, iterations, tolerance, robust):
+        """Levenberg-Marquardt from `theta`; the initial states go along."""
+        if self.fresh:
+            self._scan_slack(theta)
+            self.fresh = False
+        theta = self._descend(theta, iterations, tolerance, robust)
+        if self._rescue_starts(theta):
+            theta = self._descend(theta, max(iterations // 2, 3), tolerance, robust)
+        return theta
+
+    def _descend(self, theta, iterations, tolerance, robust):
+        damping, self.converged = 1e-3, False
+        nuisance = self.nuisance
+        residual = self.residual(theta, nuisance)
+        for iteration in range(iterations):
+            if self.nfev >= self.budget:
+                break
+            weights = self._weights(residual, robust and iteration > 0)
+            cost = self.cost(residual, nuisance, weights)
+            base = [m - e for m, e in zip(self.measured, residual, strict=True)]
+            self.slopes = jp, js = self.jacobian(theta, nuisance, base)
+            gain, accepted = 0.0, False
+            for _attempt in range(6):
+                h, g, back = self.normal(jp, js, residual, weights, nuisance, damping)
+                step = self._step(h, g, theta, damping)
+                trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
+                trial_nuisance = back(trial_theta - theta)
+                trial = self.residual(trial_theta, trial_nuisance)
+                trial_cost = self.cost(trial, trial_nuisance, weights)
+                if trial_cost < cost:
+                    gain, accepted = 1 - trial_cost / cost, True
+                    theta, nuisance, residual = trial_theta, trial_nuisance, trial
+                    damping = max(damping / 10, 1e-7)
+                    break
+                damping *= 10
+                if self.nfev >= self.budget or damping > 1e4:
+                    break
+            if not accepted or gain < tolerance:
+                self.converged = True
+                break
+        self.nuisance, self.last = nuisance, residual
+        return theta
+
+    def _rescue_starts(self, theta) -> bool:
+        """Try other speeds where single windows err far more than the rest; whether any was better.
+
+        Stick and slip make the error of a window a rough function of the speed it begins with: a start that is
+        estimated badly may lie in another valley. What the window before ends with is tried first.
+        """
+        found, values = False, self.values(theta)
+        for k, simulator in enumerate(self.simulators):
+            if "v" not in simulator.nuisances:
+                continue
+            column, windows, starts = simulator.nuisances.index("v"), self.windows[k], self.nuisance[k]
+            rms = np.array([math.sqrt(float(np.mean(self.last[k][w] ** 2))) for w in windows.slices])
+            bad = (rms > 1.5 * np.median(rms)) & (rms > 2 * self.noise)
+            if not bad.any():
+                continue
+            some = windows.only(bad)
+            measured, least = self.records[k].y[some.samples], 0.7 * rms[bad] ** 2
+            self.priors[k][bad, column] *= 3
+            reach, chosen = self.priors[k][bad, column], starts[bad].copy()
+            before = self._speeds_before(k)[bad] - some.v
+            tries = [before, *(f * reach for f in (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1))]
+            for speed in tries:
+                trial = starts[bad].copy()
+                trial[:, column] = speed
+                e = measured - simulator.run(some, values, trial)
+                for w, where in enumerate(some.slices):
+                    shift = 0.0 if simulator.tied else float(np.mean(e[where]))
+                    power = float(np.mean((e[where] - shift) ** 2))
+                    if power < least[w]:
+                        least[w], chosen[w], found = power, trial[w], True
+                        chosen[w, 0] += shift
+            starts[bad] = chosen
+            self.nfev += len(tries) * len(some) / len(windows)
+        return found
+
+    def _speeds_before(self, k) -> np.ndarray:
+        """Return the simulated speed (nw,) with which the window before each ends; the estimate for the first."""
+        windows, y = self.windows[k], self.measured[k] - self.last[k]
+        t, speeds = self.records[k].t[windows.samples], np.array(windows.v)
+        for w in range(1, len(windows)):
+            end = windows.slices[w - 1].stop
+            if windows.begins[w] == windows.ends[w - 1] and end >= 4:
+                speeds[w] = (y[end - 1] - y[end - 4]) / (t[end - 1] - t[end - 4])
+        return speeds
+
+    def _scan_slack(self, theta):
+        """Find where in its gap each window begins, by trying five places (the cost has several minima)."""
+        for k, simulator in enumerate(self.simulators):
+            if "slack" not in simulator.nuisances:
+                continue
+            column = simulator.nuisances.index("slack")
+            values, best, chosen = self.values(theta), None, None
+            for place in (0.02, 0.25, 0.5, 0.75, 0.98):
+                trial = self.nuisance[k].copy()
+                trial[:, column] = place
+                e = self.measured[k] - simulator.run(self.windows[k], values, trial)
+                errors = np.array([np.sum((e[w] - e[w].mean()) ** 2) for w in self.windows[k].slices])
+                if best is None:
+                    best, chosen = errors, np.full(len(errors), place)
+                else:
+                    chosen = np.where(errors < best, place, chosen)  # type: ignore[arg-type]
+                    best = np.minimum(best, errors)
+            self.nuisance[k][:, column] = chosen
+            self.nfev += 5
+
+    def jacobian(self, theta, nuisance, base, central=False):
+        """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""
+        columns: list[Signals] = [[] for _ in self.records]
+        for i, variable in enumerate(self.variables):
+            for k, column in enumerate(self._column(i, variable, theta, nuisance, base, central)):
+                columns[k].append(column)
+        by_parameter = [
+            np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)
+        ]
+        return by_parameter, [self._by_start(k, theta, nuisance, base) for k in range(len(self.records))]
+
+    def _column(self, i, variable, theta, nuisance, base, central) -> Signals:
+        h = self.steps[i]
+        up = theta.copy()
+        up[i] = variable.clip(theta[i] + h)
+        if up[i] == theta[i]:
+            h = -h
+            up[i] = theta[i] + h
+        moved, other, width = self.simulate(up, nuisance), base, up[i] - theta[i]
+        if central:
+            down = theta.copy()
+            down[i] = variable.clip(theta[i] - h)
+            if down[i] != theta[i]:
+                other, width = self.simulate(down, nuisance), up[i] - down[i]
+        change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
+        # Next time the output shall move by a third of the noise.
+        wanted = abs(h) * 0.3 * self.noise / change if change > 0 else 10 * abs(h)
+        self.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
+        return [(a - b) / width for a, b in zip(moved, other, strict=True)]
+
+    def _by_start(self, k, theta, nuisance, base) -> np.ndarray:
+        """Return the derivatives (n, ns) of one record's output by its initial states, all windows at once."""
+        simulator, windows, rows = self.simulators[k], self.windows[k], []
+        values = self.values(theta)
+        for j, name in enumerate(simulator.nuisances):
+            if name == "x" and not simulator.tied:
+                rows.append(np.ones(len(self.measured[k])))
+                continue
+            size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
+                self.priors[k][:, j],
+                {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
+            )
+            moved = nuisance[k].copy()
+            sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
+            moved[:, j] += sign * size
+            width = np.repeat(sign * size, windows.ends - windows.begins)
+            rows.append((simulator.run(windows, values, moved) - base[k]) / width)
+        self.nfev += len(rows) / len(self.simulators)
+        return np.array(rows).T.reshape(len(self.measured[k]), len(rows))
+
+    def normal(self, jp, js, residual, weights, nuisance, damping=0.0):
+        """Eliminate the initial states; return (H, g, back) with ``back(step)`` their own step."""
+        p = len(self.names)
+        h, g, pieces = np.zeros((p, p)), np.zeros(p), []
+        prior, means = self.noise**2, self.means()
+        for k, windows in enumerate(self.windows):
+            for w, where in enumerate(windows.slices):
+                a, s, r, c = jp[k][where], js[k][where], residual[k][where], weights[k][where]
+                ac = a * c[:, None]
+                h += ac.T @ a
+                g += ac.T @ r
+                if s.shape[1]:
+                    sc = s * c[:, None]
+                    precision = prior / self.priors[k][w] ** 2
+                    ss = sc.T @ s + np.diag(precision)
+                    ss += damping * np.diag(np.diag(ss))
+                    sa, sr = sc.T @ a, sc.T @ r - precision * (nuisance[k][w] - means[k][w])
+                    solved = np.linalg.solve(ss, np.column_stack((sa, sr)))
+                    h -= sa.T @ solved[:, :p]
+                    g -= sa.T @ solved[:, p]
+                    pieces.append((k, w, solved))
+
+        def back(step):
+            moved = [a.copy() for a in nuisance]
+            for k, w, solved in pieces:
+                limit = 3 * self.priors[k][w]
+                there = moved[k][w] + solved[:, p] - solved[:, :p] @ step
+                # The data say where a window begins: the start is no parameter to hide the model's faults in.
+                moved[k][w] = np.clip(there, means[k][w] - limit, means[k][w] + limit)
+            for k, simulator in enumerate(self.simulators):
+                if "slack" in simulator.nuisances:
+                    j = simulator.nuisances.index("slack")
+                    moved[k][:, j] = np.clip(moved[k][:, j], 0.0, 1.0)
+            return moved
+
+        return h, g, back
+
+    def _weights(self, residual, robust):
+        if not robust:
+            return [np.ones(len(r)) for r in residual]
+        everything = np.concatenate(residual)
+        sigma = max(1.4826 * float(np.median(np.abs(everything))), self.noise)
+        return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), 1e-300)) for r in residual]
+
+    def _step(self, h, g, theta, damping):
+        """Solve the damped equations; parameters held by a bound stay there."""
+        p = len(g)
+        if p == 0:
+            return np.zeros(0)
+        size = np.diag(h).copy()
+        size = np.maximum(size, 1e-12 * max(float(size.max()), 1e-300))
+        held = np.zeros(p, bool)
+        step = np.zeros(p)
+        for _ in range(p):
+            free: Any = ~held
+            step[:] = 0.0
+            if not free.any():
+                break
+            matrix = h[np.ix_(free, free)] + np.diag(damping * size[free])
+            root = np.sqrt(size[free])
+            step[free] = np.linalg.lstsq(matrix / np.outer(root, root), g[free] / root, rcond=1e-12)[0] / root
+            blocked = [
+                i
+                for i in np.flatnonzero(free)
+                if self.variables[i].clip(theta[i] + np.sign(step[i]) * 1e-9) == theta[i] and step[i] != 0
+            ]
+            if not blocked:
+                break
+            held[blocked] = True
+        limits = np.array([v.step(q) for v, q in zip(self.variables, theta, strict=True)])
+        largest = float(np.max(np.abs(step) / limits)) if p else 0.0
+        return step / max(largest, 1.0)

@@ -1,0 +1,179 @@
+"""One diagnosis at work: the baseline, every candidate fitted, the best confirmed at the full rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from .attach import applicable, attach
+from .equivalence import indistinguishable, whitened_power, whitener
+from .screen import Screen, Start, force_regression, motion_of, starts_for
+from .simulator import feasible
+from .trial import SHORTEST, Data, Trial, prepare
+
+CONFIRMED = 6
+"""Candidates that are refitted at the full rate."""
+
+_LEVELS = (SHORTEST, 4, 1)
+# Best error over windows four times as long that still counts as the same.
+_GROWTH = 1.35
+
+# Effects whose error has many valleys over long windows: short ones first.
+_CURVED = frozenset({"stribeck", "stiction", "bristle", "backlash", "compliance", "position_ripple"})
+
+
+class Study:
+    """The fits of one diagnosis.
+
+    Parameters
+    ----------
+    block : Mechanism
+        The model as it stands.
+    records, held : sequences of Measurement
+        To learn from; to be judged by (may be empty).
+    free : tuple of str
+        Parameters of the model that may be refitted.
+    """
+
+    def __init__(self, block, records, held, free):
+        self.free = free
+        data = prepare(block, records, held)
+        self.levels = [data.level(f) for f in _LEVELS]
+        self.data = self.levels[1]
+        self.base = self._baseline(block)
+
+    def _baseline(self, block) -> Trial:
+        """Fit the baseline from its own values and from a regression of the force on motion; keep the better."""
+        shortest, data = self.levels[:2]
+        begins, table = [block], block.parameters
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        guess = dict(zip(("mass", "coulomb.level", "viscous.coefficient"), w, strict=False))
+        guess = {k: float(v) for k, v in guess.items() if k in table and k in self.free and v > 0}
+        if guess:
+            begins.append(block.with_parameters(feasible(block, guess)))
+        found = []
+        for begin in begins:
+            found.append(data.moved(shortest.fit(begin, self.free, iterations=8), 12))
+        return Trial("", min(found, key=lambda f: f.rmse))
+
+    # --- every effect, coarsely -----------------------------------------------------------------------
+
+    def candidates(self, classes, executor=None) -> list[Trial]:
+        """Return every effect that can be added, fitted, the one with most evidence first."""
+        screen = Screen(self.base.train, self.data)
+        run = map if executor is None else executor.map
+        kinds = [c for c in classes if applicable(c, screen.block)]
+        jobs = [(cls, screen, self.levels[0], self.free) for cls in kinds]
+        span = float(np.ptp(screen.motion.x))
+        found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
+        self._rebase(self.ranked(found))
+        return self.ranked(found)
+
+    def ranked(self, trials) -> list[Trial]:
+        """Return the trials with their evidence over the baseline, best first.
+
+        Residuals are whitened by the noise model of the best one's.
+        """
+        best = min([self.base, *trials], key=lambda t: t.size)
+        self.noise = noise = whitener(best.residuals)
+        base_power, count = whitened_power(self.base.residuals, noise)
+        judged = []
+        for t in trials:
+            power, _ = whitened_power(t.residuals, noise)
+            gain = 0.5 * count * math.log(base_power / power) - 0.5 * t.extra * math.log(count)
+            judged.append(replace(t, evidence=gain))
+        return sorted(judged, key=lambda t: -t.evidence)
+
+    def _rebase(self, found):
+        """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
+        for tried in found[:2]:
+            values = {k: tried.block.parameters[k].value for k in self.free}
+            block = self.base.block
+            again = self.data.fit(block.with_parameters(feasible(block, values)), self.free, iterations=8)
+            if again.rmse < self.base.train.rmse:
+                self.base = Trial("", again)
+
+    # --- the best, carefully --------------------------------------------------------------------------
+
+    def confirm(self, found) -> list[Trial]:
+        """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
+        best = found[:CONFIRMED]
+        stages = [[self._moved(t, level) for t in (self.base, *best)] for level in self.levels]
+        at = _longest_coherent([[_error(t) for t in stage] for stage in stages])
+        self.data, (self.base, *best) = self.levels[at], stages[at]
+        fine = self.data.fine
+        self.base = self._polished(self.base, fine)
+        return self.ranked([self._polished(t, fine) for t in best])
+
+    def _moved(self, tried: Trial, level: Data) -> Trial:
+        """Refit in windows of another length, and judge."""
+        train = tried.train if level is self.data else level.moved(tried.train)
+        return level.judged(replace(tried, train=train))
+
+    def _polished(self, tried: Trial, fine: Data) -> Trial:
+        better = fine.moved(tried.train, 3)
+        return fine.judged(replace(tried, train=better, confirmed=True))
+
+    def alike(self, a: Trial, b: Trial) -> bool:
+        """Whether two candidates make the same of these data, within noise."""
+        return indistinguishable(a.outputs, b.outputs, self.noise)
+
+
+def _periodic_enough(tried: Trial, span) -> bool:
+    """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
+    return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+
+
+def _longest_coherent(errors) -> int:
+    """Return the level to judge at: the longest windows over which the best model's error does not grow.
+
+    `errors`: rms errors per level, short windows first, the baseline's and then the candidates'. Where the best
+    grows with the length (motion that is sensitive to its start, force noise in a real machine, an effect
+    outside the library) short windows are clearer, provided that they show what is missing at all.
+    """
+    base, best = [e[0] for e in errors], [min(e) for e in errors]
+    at = 0
+    while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:
+        at += 1
+    if at + 1 < len(errors) and best[at] > 0.8 * base[at]:
+        return len(errors) - 1
+    return at
+
+
+def _error(tried: Trial) -> float:
+    """Return the rms residual of all windows."""
+    return math.sqrt(tried.size / sum(map(len, tried.residuals)))
+
+
+def _try(job) -> Trial | None:
+    """Fit one effect class from its best start values (a job of its own, for executors)."""
+    cls, screen, shortest, free = job
+    found = []
+    starts = starts_for(cls, screen)
+    for i, start in enumerate(starts):
+        if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
+            break
+        found += _fitted(start, screen, shortest, free)
+    return min(found, key=lambda t: t.train.rmse) if found else None
+
+
+def _fitted(start: Start, screen: Screen, shortest: Data, free):
+    base = screen.block.with_parameters(feasible(screen.block, dict(start.values)))
+    block = attach(base, start.effect)
+    if block is None:
+        return
+    key, data = list(block._keys)[-1], screen.data
+    own = [
+        f"{key}.{n}"
+        for n, p in start.effect.parameters.items()
+        if p.free and f"{key}.{n}" in block.parameters
+    ]
+    rough = "sensor_quantization" in key
+    names = (*free, *(() if rough else own))
+    if start.effect.id in _CURVED:
+        fitted = data.moved(shortest.fit(block, names, iterations=8, tolerance=3e-3))
+    else:
+        fitted = data.fit(block, names, iterations=1 if rough else 10)
+    yield Trial(start.effect.id, fitted, extra=len(own))

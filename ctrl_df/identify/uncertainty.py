@@ -1,0 +1,56 @@
+"""How well fitted parameters are known, for residuals of any colour, and which directions are not determined."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .residual_tests import noise_model
+from .shooting import Problem, Tangent
+
+
+def covariance_of(problem: Problem, tangent: Tangent, jp, js):
+    """Return the covariance of the scaled parameters and the directions the data do not determine.
+
+    The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J) H^-1,
+    Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost degrees of
+    freedom are given back.
+
+    Returns
+    -------
+    covariance : (p, p) array
+    null : list of (float, (p,) array)
+        Relative singular value and direction in scaled parameters.
+
+    References
+    ----------
+    Ljung (1999), sec. 9.4.
+    """
+    residual = problem.last
+    ones = [np.ones(len(r)) for r in residual]
+    h, _, _ = problem.normal(jp, js, residual, ones, problem.nuisance)
+    size = np.sqrt(np.maximum(np.diag(h), 1e-300))
+    size[size <= 1e-9 * max(float(size.max()), 1e-300)] = 1.0
+    eigen, vectors = np.linalg.eigh(h / np.outer(size, size))
+    top = max(float(eigen[-1]), 1e-300)
+    null = [
+        (math.sqrt(max(e, 0.0) / top), v / size / max(float(np.max(np.abs(v / size))), 1e-300))
+        for e, v in zip(eigen, vectors.T, strict=True)
+        if e < 1e-7 * top
+    ]
+    inverse = (vectors / np.maximum(eigen, 1e-12 * top)) @ vectors.T / np.outer(size, size)
+    middle = np.zeros_like(h)
+    for k, e in enumerate(residual):
+        n = len(e)
+        lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.windows[k])
+        length = 1 << (n - 1).bit_length()
+        transform = np.fft.rfft(tangent.parameters[k], length, axis=0)
+        omega = np.linspace(0, math.pi, transform.shape[0])
+        density = noise_model(e).spectrum(omega) + 1e-6 * problem.noise**2
+        double = np.full(len(omega), 2.0)
+        double[0] = double[-1] = 1.0
+        middle += n / max(n - lost, 0.1 * n) * np.real(
+            (transform.conj() * (density * double / length)[:, None]).T @ transform
+        )  # fmt: skip
+    return inverse @ middle @ inverse, null
