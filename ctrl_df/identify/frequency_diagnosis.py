@@ -13,17 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from .diagnose import (
-    AMBIGUOUS,
-    EFFECT,
-    NONE,
-    UNKNOWN,
-    CandidateEffect,
-    Diagnosis,
-    _classes,
-    block_of,
-    free_names,
-)
+from .attach import applicable
+from .diagnose import block_of, effect_classes, free_names
+from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
 from .frequency_compare import as_tables, plane_regions
 from .frequency_fit import (
     QUICK,
@@ -38,15 +30,16 @@ from .frequency_fit import (
 )
 from .frequency_refit import uncertainty
 from .frequency_starts import best_starts
-from .screen import applicable
 from .trial import Scales
 
 SIGNIFICANT = 12.0
 """Evidence [nats] an effect needs; fewer shapes are tried than over time, and points err independently."""
 
 _SCREEN = 30  # points while screening
-_SLOW = frozenset({"position_ripple", "sensor_quantization"})  # orbits that take a hundred times as long
-_CONFIRM = 5
+_ROUGH = 10  # of effects whose orbits take many times as long
+_SLOW = frozenset({"position_ripple", "sensor_quantization"})
+_SLOWER = _SLOW | {"backlash", "compliance", "bristle", "input_lag"}
+_CONFIRM = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +90,7 @@ def diagnose_frequency(
     held = as_tables(holdout, "holdout") if holdout is not None else ()
     block = block_of(model)
     study = FrequencyStudy(block, records, held, free_names(block, free))
-    study.screen(_classes(candidates), executor)
+    study.screen(effect_classes(candidates), executor)
     return study.verdict(began, limits)
 
 
@@ -145,23 +138,25 @@ class FrequencyStudy:
         fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
-    def _tried(self, name, fitted, extra) -> _Tried:
-        table = simulate_table(fitted.block, self.points)
+    def _tried(self, name, fitted, extra, work=None) -> _Tried:
+        table = simulate_table(fitted.block, self.points, work)
         return _Tried(name, fitted, extra, relative_error(table, self.points), table)
 
     def screen(self, classes, executor):
         """Try every effect, roughly on some points, the best then on all of them."""
         inside = self.points.take(self.train)
-        few, fewer = inside.thinned(_SCREEN), inside.thinned(10)
+        few, fewer = inside.thinned(_SCREEN), inside.thinned(_ROUGH)
         kinds = [c for c in classes if applicable(c, self.base.fitted.block)]
         jobs = [
-            (c, self.base.fitted.block, fewer if c.id in _SLOW else few, self.free, self.scales) for c in kinds
+            (c, self.base.fitted.block, fewer if c.id in _SLOWER else few, self.free, self.scales) for c in kinds
         ]
         run = map if executor is None else executor.map
-        rough = [self._tried(*r) for r in run(_try, jobs) if r is not None]
+        rough = [self._tried(*r, QUICK) for r in run(_try, jobs) if r is not None]
         self._judge(rough)
         rough.sort(key=lambda t: -t.evidence)
-        best = [self._confirmed(t, inside) for t in rough[:_CONFIRM]]
+        # what explains next to nothing of a few points will not explain all of them
+        promising = [t for t in rough[:_CONFIRM] if t.evidence > -20.0]
+        best = [self._confirmed(t, inside) for t in promising]
         self._rebase(best, inside)
         self._judge([*best, *rough])
         best.sort(key=lambda t: -t.evidence)
@@ -169,9 +164,9 @@ class FrequencyStudy:
         self.found = [*best, *(t for t in rough if t.id not in done)]
 
     def _confirmed(self, tried, inside):
-        iterations = 4 if tried.id in _SLOW else 15
+        iterations = 3 if tried.id in _SLOW else 12
         names = (*self.free, *tried.extra)
-        fitted = fit_table(tried.fitted.block, inside, names, self.scales, iterations=iterations)
+        fitted = fit_table(tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=80)
         again = self._tried(tried.id, fitted, tried.extra)
         again.confirmed = True
         return again
@@ -315,9 +310,9 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     cls, block, points, free, scales = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     best = None
-    for grown in best_starts(cls, block, points, scales, keep=1 if cls.id in _SLOW else 2):
+    for grown in best_starts(cls, block, points, scales, keep=1 if cls.id in _SLOWER else 2):
         own = tuple(k for k in grown.parameters if k not in block.parameters and grown.parameters[k].free)
-        iterations = 3 if cls.id in _SLOW else 6
+        iterations = 3 if cls.id in _SLOW else 5
         fitted = fit_table(grown, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK)
         if best is None or float(fitted.weighted @ fitted.weighted) < float(best[1].weighted @ best[1].weighted):
             best = cls.id, fitted, own

@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 
 from .frequency_measurement import FrequencyMeasurement
-from .trial import Coordinate, Scales, coordinates, with_values
+from .simulator import feasible
+from .trial import Scales
+from .variables import Variable
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,9 @@ class Points:
         rms of the stated relative standard errors; NaN where none are stated.
     record : (n,) array of int
         Which table a point belongs to.
+    scale : (n,) array
+        What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point is less
+        (a mass about to stick, an antiresonance: there the scatter does not shrink with N).
     """
 
     A: np.ndarray
@@ -40,6 +45,7 @@ class Points:
     weight: np.ndarray
     noise: float
     record: np.ndarray
+    scale: np.ndarray
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -47,7 +53,7 @@ class Points:
 
     def take(self, where) -> Points:
         """Return some of the points."""
-        parts = {k: getattr(self, k)[where] for k in ("A", "omega", "N", "weight", "record")}
+        parts = {k: getattr(self, k)[where] for k in ("A", "omega", "N", "weight", "record", "scale")}
         return replace(self, **parts)
 
     def thinned(self, count: int) -> Points:
@@ -81,12 +87,15 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
         weight = weight / math.sqrt(float(np.mean(weight**2)))
     else:
         noise, weight = math.nan, np.ones(len(a))
-    return Points(a, w, n, weight, noise, np.concatenate(numbers))
+    scale = np.abs(n)
+    for value in np.unique(w):
+        scale[w == value] = np.maximum(scale[w == value], 0.1 * np.median(np.abs(n[w == value])))
+    return Points(a, w, n, weight, noise, np.concatenate(numbers), scale)
 
 
 # Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for ever.
-QUICK = {"max_steps": 6_000, "averages": 8}
-CAREFUL = {"max_steps": 60_000, "averages": 32}
+QUICK = {"max_steps": 4_000, "averages": 8}
+CAREFUL = {"max_steps": 30_000, "averages": 16}
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
@@ -99,10 +108,10 @@ def simulate_table(model, points: Points, work=None) -> np.ndarray:
 
 
 def relative_error(simulated, points: Points) -> np.ndarray:
-    """Return ``(measured - simulated) / |measured|``, complex; a NaN of the model counts as N = 0."""
+    """Return ``(measured - simulated) / scale``, complex; a NaN of the model counts as N = 0."""
     filled = np.where(np.isfinite(simulated), simulated, 0.0)
     # a resonance on the grid must not outweigh all other points while a fit is on its way
-    error = (points.N - filled) / np.abs(points.N)
+    error = (points.N - filled) / points.scale
     size = np.abs(error)
     return np.where(size > 30.0, 30.0 * error / np.maximum(size, 1e-300), error)
 
@@ -136,10 +145,10 @@ class FittedTable:
     weighted : (2 n,) array
         The same weighted, real parts, then imaginary ones.
     jacobian : (2 n, p) array
-        Of the weighted errors (real parts, then imaginary ones) by the coordinates.
-    coordinates : tuple of Coordinate
-    z : (p,) array
-        The coordinates found.
+        Of the weighted errors by the scaled values.
+    variables : tuple of Variable
+    q : (p,) array
+        Their scaled values.
     evaluations : int
         Tables computed.
     converged : bool
@@ -150,8 +159,8 @@ class FittedTable:
     error: np.ndarray
     weighted: np.ndarray
     jacobian: np.ndarray
-    coordinates: tuple[Coordinate, ...]
-    z: np.ndarray
+    variables: tuple[Variable, ...]
+    q: np.ndarray
     evaluations: int
     converged: bool
 
@@ -184,8 +193,9 @@ def fit_table(
     work : mapping or None
         Bounds on the work of one point, `QUICK` or `CAREFUL` (the default).
     """
-    job = _Job(block, points, tuple(coordinates(block, names, scales)), work)
-    z = np.array([c.z(block.parameters[c.name].value) for c in job.coords])
+    table = block.parameters
+    job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)
+    z = np.array([v.q(table[v.name].value) for v in job.variables])
     e = job.errors(z)
     jacobian = np.zeros((len(e), len(z)))
     damping, cost, converged = 1e-3, float(e @ e), len(z) == 0
@@ -198,9 +208,10 @@ def fit_table(
         accepted = None
         for _ in range(6):
             move = np.clip(-np.linalg.solve(normal + damping * np.diag(diagonal), gradient), -0.7, 0.7)
-            trial = job.errors(z + move)
+            moved = np.array([v.clip(q) for v, q in zip(job.variables, z + move, strict=True)])
+            trial = job.errors(moved)
             if float(trial @ trial) < cost:
-                accepted = z + move, trial
+                accepted = moved, trial
                 break
             damping = max(damping, 1e-6) * 8
         if accepted is None:
@@ -215,17 +226,18 @@ def fit_table(
     model = job.model(z)
     n = len(points)
     error = (e[:n] + 1j * e[n:]) / points.weight
-    return FittedTable(model, tuple(names), error, e, jacobian, job.coords, z, job.count, converged)
+    return FittedTable(model, tuple(names), error, e, jacobian, tuple(job.variables), z, job.count, converged)
 
 
 class _Job:
     """Weighted errors of one fit as a real function of real coordinates."""
 
-    def __init__(self, block, points, coords, work=None):
-        self.block, self.points, self.coords, self.work, self.count = block, points, coords, work, 0
+    def __init__(self, block, points, variables, work=None):
+        self.block, self.points, self.variables, self.work, self.count = block, points, variables, work, 0
 
     def model(self, z):
-        return with_values(self.block, {c.name: c.value(v) for c, v in zip(self.coords, z, strict=True)})
+        values = {v.name: v.p(q) for v, q in zip(self.variables, z, strict=True)}
+        return self.block.with_parameters(feasible(self.block, values)) if values else self.block
 
     def errors(self, z) -> np.ndarray:
         self.count += 1
@@ -238,8 +250,8 @@ class _Job:
 
     def slopes(self, z, e) -> np.ndarray:
         columns = []
-        for i, c in enumerate(self.coords):
-            step = 1e-3 if c.value(z[i] + 1e-3) != c.value(z[i]) else -1e-3
+        for i, variable in enumerate(self.variables):
+            step = 1e-3 if variable.p(z[i] + 1e-3) != variable.p(z[i]) else -1e-3
             moved = z.copy()
             moved[i] += step
             slope = (self.errors(moved) - e) / step

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 
-from .diagnose import NONE, UNKNOWN, _classes, block_of, free_names
+from .diagnose import block_of, effect_classes, free_names
+from .diagnosis import NONE, UNKNOWN
 from .frequency_compare import as_tables
 from .frequency_diagnosis import SIGNIFICANT, FrequencyStudy
 from .frequency_fit import fit_table
@@ -48,7 +49,7 @@ def improve_frequency(
     while True:
         study = FrequencyStudy(block, records, held, [k for k in free_names(block) if k not in fixed])
         if len(steps) < max_effects:
-            study.screen(_classes(candidates), executor)
+            study.screen(effect_classes(candidates), executor)
         found = study.verdict(time.perf_counter(), None)
         block = found.model
         values = {k: p.value for k, p in block.parameters.items()}

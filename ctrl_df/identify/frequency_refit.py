@@ -50,9 +50,9 @@ def refit_frequency(model, data, free=None, *, start=None, budget=600, **keyword
     parameters = {
         k: FittedParameter(
             k, table[k].value, errors[k], table[k].unit, begun.parameters[k].value,
-            table[k].value in (c.lower, c.upper), k not in doubtful,
+            table[k].value in (v.lower, v.upper), k not in doubtful,
         )
-        for k, c in zip(names, found.coordinates, strict=True)
+        for k, v in zip(names, found.variables, strict=True)
     }  # fmt: skip
     return Fit(
         _as_given(model, found.block), MappingProxyType(parameters), comparison_of_tables(found.block, records),
@@ -66,9 +66,8 @@ def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[
     if not names:
         return np.zeros((0, 0)), {}, {}
     doubtful: dict[str, str] = {}
-    values = np.array([c.value(z) for c, z in zip(found.coordinates, found.z, strict=True)])
-    steps = np.array([c.value(z + 1e-4) - c.value(z - 1e-4) for c, z in zip(found.coordinates, found.z, strict=True)])
-    slope = steps / 2e-4
+    values = np.array([v.p(q) for v, q in zip(found.variables, found.q, strict=True)])
+    slope = np.array([v.slope(q) for v, q in zip(found.variables, found.q, strict=True)])
     size = np.linalg.norm(j, axis=0)
     for k, s in zip(names, size, strict=True):
         if s < 1e-6 * max(float(size.max()), 1e-300):

@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from ..blocks.core import level
+from .attach import attach
 from .frequency_fit import QUICK, Points, Scales, relative_error, rms, simulate_table
-from .screen import attach
 
 # Multiples of the table's own scale for the parameters of an effect; the others stay at their defaults.
 _MULTIPLES: dict[str, dict[str, tuple[float, ...]]] = {
