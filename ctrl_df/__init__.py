@@ -51,7 +51,7 @@ _LAZY = {
     "DescribingFunctionResponse": "limit_cycles.predict",
     "describing_function_response": "limit_cycles.predict",
     "LimitCycle": "limit_cycles.grade",
-    "find_limit_cycle": "limit_cycles.orbit",
+    "find_limit_cycle": "limit_cycles.finder",
     "Orbit": "limit_cycles.orbit",
     "verify": "limit_cycles.verify",
     "describing_function_plot": "plot.describing",

@@ -26,8 +26,8 @@ print(check.table())
 finish(resp.plot().figure)
 
 # %% [markdown]
-# The frequency is right to 0.8 %, the amplitude 13 % short: the two curves cross almost along each other, so that a
-# small error in N slides the crossing far along the amplitude. The cycle says so itself.
+# The frequency is right to 0.8 %, the amplitude 13 % short: the two curves cross almost along each other, so
+# that a small error in N slides the crossing far along the amplitude. The cycle says so itself.
 
 # %%
 orbit = check.rows[0].exact

@@ -7,9 +7,9 @@ from _shown import finish
 import ctrl_df as cdf
 
 # %% [markdown]
-# A mass of 9 kg, Coulomb friction 5 N, and a PID with much integral action. At standstill the integral winds up until
-# the force exceeds the *static* level; the mass jumps, overshoots, sticks again. Only a few per cent of
-# difference between static and kinetic friction do it.
+# A mass of 9 kg, Coulomb friction 5 N, and a PID with much integral action. At standstill the integral winds
+# up until the force exceeds the *static* level; the mass jumps, overshoots, sticks again. Only a few per cent
+# of difference between static and kinetic friction do it.
 
 # %%
 pid = cdf.pid(2000, 44250, 130)
@@ -22,8 +22,9 @@ for static in (5.25, 5.5, 5.75):
           f"{'stable' if orbit.stable else 'unstable'}")  # fmt: skip
 
 # %% [markdown]
-# The describing function answers 13.06 to 13.13 rad/s for all three, and the same 13.05 rad/s without stiction, where
-# there is no such cycle at all: it weighs a whole period and hardly sees the short instant of breakaway.
+# The describing function answers 13.06 to 13.13 rad/s for all three, and the same 13.05 rad/s without
+# stiction, where there is no such cycle at all: it weighs a whole period and hardly sees the short instant of
+# breakaway.
 
 # %%
 finish(exact[5.5].plot().figure)

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 import ctrl_df as cdf
 
 # %% [markdown]
-# A magnetic brake: its drag grows with speed, has its greatest value at a critical speed and falls again. One class
-# says it all: parameters with units, the role, the law.
+# A magnetic brake: its drag grows with speed, has its greatest value at a critical speed and falls again. One
+# class says it all: parameters with units, the role, the law.
 
 # %%
 

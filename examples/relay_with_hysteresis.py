@@ -30,9 +30,8 @@ print(f"Tsypkin:             {tsypkin:.6f} rad/s")
 relay = cdf.relay_with_hysteresis(level, hysteresis)
 resp = cdf.describing_function_response(H, relay, np.geomspace(0.11, 5, 20))
 cycle = resp.limit_cycles[0]
-print(
-    f"describing function: {cycle.omega:.6f} rad/s, band {cycle.omega_band[0]:.4f} to {cycle.omega_band[1]:.4f}"
-)
+low, high = cycle.omega_band
+print(f"describing function: {cycle.omega:.6f} rad/s, band {low:.4f} to {high:.4f}")
 
 # %%
 orbit = cdf.find_limit_cycle(cdf.closed_loop(H, relay), guess=cycle)
@@ -40,8 +39,8 @@ print(f"exact orbit:         {orbit.omega:.6f} rad/s, {'stable' if orbit.stable 
 finish(orbit.plot().figure)
 
 # %% [markdown]
-# The square wave's harmonics come back through a plant that attenuates them by 9 or more: the prediction is off by
-# less than the band it states.
+# The square wave's harmonics come back through a plant that attenuates them by 9 or more: the prediction is
+# off by less than the band it states.
 
 # %%
 error = cycle.omega / tsypkin - 1

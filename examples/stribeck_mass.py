@@ -9,8 +9,8 @@ from _shown import finish
 import ctrl_df as cdf
 
 # %% [markdown]
-# The same mass with and without a Stribeck curve: static level 8 N falling to 5 N within about 2 cm/s. There is no
-# closed form for this one; the forced periodic motion is found by shooting.
+# The same mass with and without a Stribeck curve: static level 8 N falling to 5 N within about 2 cm/s. There
+# is no closed form for this one; the forced periodic motion is found by shooting.
 
 # %%
 plain = cdf.Mass(9).with_effect(cdf.Coulomb(5)).with_effect(cdf.Viscous(0.5))
@@ -24,16 +24,18 @@ for a, row, regime in zip(A, change, family.regime, strict=True):
     print(f"{a:5.0f} N", *(f"{100 * c:6.2f} % {r:10s}" for c, r in zip(row, regime, strict=True)))
 
 # %% [markdown]
-# Where the force is large against friction, or the motion fast against the Stribeck velocity, nothing changes. The
-# picture is about small, slow motion, and so is the trouble in practice.
+# Where the force is large against friction, or the motion fast against the Stribeck velocity, nothing
+# changes. The picture is about small, slow motion, and so is the trouble in practice.
 
 # %%
 figure, ax = plt.subplots(layout="constrained")
 for a, row in zip(A, change, strict=True):
     ax.semilogy(omega, row, "k", lw=1)
     ax.annotate(f"{a:g} N", (omega[-1], row[-1]), xytext=(4, 0), textcoords="offset points", va="center")
+ax.margins(x=0.1)
 ax.set_xlabel("omega [rad/s]")
 ax.set_ylabel("|N / N without Stribeck - 1|")
+ax.set_title("Change of N by the Stribeck curve, by force amplitude", fontsize=10)
 finish(figure)
 
 # %%

@@ -27,7 +27,8 @@ print(f"harmonics fed back: {100 * cycle.distortion:.0f} % of the fundamental")
 print(f"band of omega: {cycle.omega_band[0]:.0f} to {cycle.omega_band[1]:.0f} rad/s")
 
 # %% [markdown]
-# The exact orbit is a rattle of the motor within the gap, two impacts a period, a quarter faster than predicted.
+# The exact orbit is a rattle of the motor within the gap, two impacts a period, a quarter faster than
+# predicted.
 
 # %%
 orbit = cdf.find_limit_cycle(cdf.closed_loop(pid, drive), guess=cycle)
@@ -35,8 +36,8 @@ print(f"exact: {orbit.omega:.6f} rad/s, F1 {orbit.amplitude:.4f} N, multiplier {
 finish(orbit.plot().figure)
 
 # %% [markdown]
-# A multiplier this near to one also says that the rattle is reached slowly: minutes of irregular motion come first.
-# The paper's Fig. 10 shows those.
+# A multiplier this near to one also says that the rattle is reached slowly: minutes of irregular motion come
+# first. The paper's Fig. 10 shows those.
 
 # %%
 assert abs(orbit.omega - 156.045031) < 1e-5

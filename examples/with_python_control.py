@@ -9,8 +9,8 @@ from _shown import finish
 import ctrl_df as cdf
 
 # %% [markdown]
-# The call is the same; H may be discrete. A sampled version of a third-order plant at 10 ms, with python-control's own
-# saturation.
+# The call is the same; H may be discrete. A sampled version of a third-order plant at 10 ms, with
+# python-control's own saturation.
 
 # %%
 H = ct.c2d(ct.tf([8], [1, 2, 2, 1]), 0.01)
@@ -21,8 +21,8 @@ a, omega = mine.intersections[0]
 print(f"ctrl_df: {a:.5f} at {omega:.5f} rad/s")
 
 # %% [markdown]
-# python-control 0.10.2 evaluates the refined crossing of a discrete H on the imaginary axis instead of the unit circle.
-# A plain linear check tells who is right: at the crossing the phase of H is -180 degrees.
+# python-control 0.10.2 evaluates the refined crossing of a discrete H on the imaginary axis instead of the
+# unit circle. A plain linear check tells who is right: at the crossing the phase of H is -180 degrees.
 
 # %%
 phase = np.degrees(np.angle(H(np.exp(1j * omega * 0.01))))

@@ -8,7 +8,7 @@ where it is known.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import control as ct
@@ -29,11 +29,11 @@ class Problem:
     H: Any
     block: Any
     A: Any
-    omega: Any
-    predicted: tuple[float, float] | None
-    cycle: tuple[float, float] | None
-    stable: bool | None
-    source: str
+    omega: Any = None
+    predicted: tuple[float, float] | None = None
+    cycle: tuple[float, float] | None = None
+    stable: bool | None = None
+    source: str = field(kw_only=True)
 
 
 def tsypkin_relay(H, level=1.0, hysteresis=0.0, low=0.05, high=50.0, harmonics=20_001):
@@ -68,109 +68,94 @@ PROBLEMS = [
         _THIRD,
         saturation(1),
         np.linspace(1, 4, 10),
-        None,
-        (3.343998730206496, math.sqrt(2)),  # H(j sqrt 2) = -8/3, so N = 3/8
-        (3.39494014929, 1.40670188630),
-        True,
-        "DOP853, rtol 1e-12, after 20 periods of settling",
+        predicted=(3.343998730206496, math.sqrt(2)),  # H(j sqrt 2) = -8/3, so N = 3/8
+        cycle=(3.39494014929, 1.40670188630),
+        stable=True,
+        source="DOP853, rtol 1e-12, after 20 periods of settling",
     ),
     Problem(
         "saturation, servo above its critical gain 6",
         _SERVO,
         saturation(1),
         np.geomspace(1, 10, 20),
-        None,
-        None,
-        (4.37665557144, 1.38692646218),
-        True,
-        "DOP853, rtol 1e-12, after 20 periods of settling",
+        cycle=(4.37665557144, 1.38692646218),
+        stable=True,
+        source="DOP853, rtol 1e-12, after 20 periods of settling",
     ),
     Problem(
         "saturation, servo below its critical gain",
         ct.tf([5.9], [1, 3, 2, 0]),
         saturation(1),
         np.geomspace(0.5, 10, 20),
-        None,
-        None,
-        None,
-        None,
-        "Routh: the linear loop is stable up to a gain of 6 and saturation only lowers it",
+        source="Routh: the linear loop is stable up to a gain of 6 and saturation only lowers it",
     ),
     Problem(
         "relay, integrator and double lag",
         _RELAY,
         relay(1),
         np.geomspace(0.05, 5, 20),
-        None,
-        (2 / math.pi, 1.0),  # H(j) = -1/2, N = 4/(pi a)
-        tsypkin_relay(_RELAY),
-        True,
-        "Tsypkin (1984)",
+        predicted=(2 / math.pi, 1.0),  # H(j) = -1/2, N = 4/(pi a)
+        cycle=tsypkin_relay(_RELAY),
+        stable=True,
+        source="Tsypkin (1984)",
     ),
     Problem(
         "relay with hysteresis, integrator and lag",
         _LAG,
         relay_with_hysteresis(1, 0.1),
         np.geomspace(0.05, 5, 20),
-        None,
-        None,
-        tsypkin_relay(_LAG, hysteresis=0.1),
-        True,
-        "Tsypkin (1984)",
+        cycle=tsypkin_relay(_LAG, hysteresis=0.1),
+        stable=True,
+        source="Tsypkin (1984)",
     ),
     Problem(
         "relay with hysteresis, first-order plant",  # has a cycle, T = 2 ln((1 + h)/(1 - h)), that N misses
         ct.tf([1], [1, 1]),
         relay_with_hysteresis(1, 0.1),
         np.geomspace(0.05, 5, 20),
-        None,
-        None,
-        None,
-        None,
-        "the Nyquist curve stays in the fourth quadrant, -1/N in the third",
+        source="the Nyquist curve stays in the fourth quadrant, -1/N in the third",
     ),
     Problem(
         "friction mass under PID",
         pid(2000, 44250, 130),
         friction_mass(9, 5, 0.5),
         np.geomspace(5.5, 40, 30),
-        np.geomspace(5, 40, 30),
-        (11.082170, 13.898109),
-        (10.850004, 13.792124),
-        False,
-        "event-located shooting",
+        omega=np.geomspace(5, 40, 30),
+        predicted=(11.082170, 13.898109),
+        cycle=(10.850004, 13.792124),
+        stable=False,
+        source="event-located shooting",
     ),
     Problem(
         "friction mass with stiction 5.5 under PID",
         pid(2000, 44250, 130),
         friction_mass(9, 5, 0.5, 5.5),
         np.geomspace(5.6, 10.5, 30),
-        np.geomspace(5, 40, 30),
-        None,
-        (math.nan, 11.628680),
-        True,
-        "event-located shooting",
+        omega=np.geomspace(5, 40, 30),
+        cycle=(math.nan, 11.628680),
+        stable=True,
+        source="event-located shooting",
     ),
     Problem(
         "backlash, restitution 0.2, under PID",
         pid(1800, 19500, 100),
         backlash_masses(1, 8, 0.018, 0.2),
         np.geomspace(5, 60, 30),
-        np.geomspace(8, 40, 30),
-        (17.750443, 14.844564),
-        (20.459998, 14.733968),
-        True,
-        "event-located shooting",
+        omega=np.geomspace(8, 40, 30),
+        predicted=(17.750443, 14.844564),
+        cycle=(20.459998, 14.733968),
+        stable=True,
+        source="event-located shooting",
     ),
     Problem(
         "backlash, restitution 0.8, under PID",
         pid(1800, 19500, 100),
         backlash_masses(1, 8, 0.018, 0.8),
         np.geomspace(8, 13, 12),
-        np.geomspace(100, 160, 12),
-        (10.278, 125.754),
-        (12.717699, 156.045031),
-        True,
-        "event-located shooting",
+        omega=np.geomspace(100, 160, 12),
+        predicted=(10.278, 125.754),
+        cycle=(12.717699, 156.045031),
+        stable=True,
+        source="event-located shooting",
     ),
 ]

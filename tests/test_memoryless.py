@@ -23,7 +23,7 @@ from ctrl_df.blocks.memoryless import (
     saturation,
 )
 from ctrl_df.blocks.primitives import PiecewiseAffine
-from ctrl_df.df import describing
+from ctrl_df.df import work
 from ctrl_df.df.describing import describing_function, describing_function_family
 from ctrl_df.df.family import load_family
 
@@ -291,7 +291,7 @@ def test_interrupted_work_resumes(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return method.harmonics(a, omega, orders)
 
-    monkeypatch.setattr(describing, "compute_part", interrupted)
+    monkeypatch.setattr(work, "compute_part", interrupted)
     with ThreadPoolExecutor(1) as pool, pytest.raises(KeyboardInterrupt):
         describing_function_family(block, A, [5.0, 9.0], executor=pool, save=path)
     with pytest.raises(ValueError, match="2 of 4"):

@@ -13,7 +13,7 @@ import math
 import control as ct
 import numpy as np
 
-from .memoryless import Element, _finite, builder
+from .element import Element, builder, finite
 from .parameter import checked
 from .primitives import PiecewiseAffine, Play, RateLimiter
 
@@ -55,7 +55,7 @@ def play(gap, *, name=None) -> Element:
     ----------
     Gelb & Vander Velde (1968), appendix B, nonlinearity 48.
     """
-    spec = _finite(lower=0.0, strict=True, meaning="total clearance")
+    spec = finite(lower=0.0, strict=True, meaning="total clearance")
     gap = checked("play", "gap", gap, spec, "For a tight joint leave the block out.")
     return _PlayElement("play", dict(gap=gap), Play(gap), specs=dict(gap=spec), name=name)
 
@@ -93,8 +93,8 @@ def relay_with_hysteresis(level, hysteresis, *, name=None) -> Element:
     Astrom & Murray, Feedback Systems, 2nd ed., example 10.12.
     """
     specs = dict(
-        level=_finite(lower=0.0, strict=True, meaning="output level"),
-        hysteresis=_finite(lower=0.0, strict=True, meaning="half width of the loop"),
+        level=finite(lower=0.0, strict=True, meaning="output level"),
+        hysteresis=finite(lower=0.0, strict=True, meaning="half width of the loop"),
     )
     level = checked("relay_with_hysteresis", "level", level, specs["level"])
     h = checked(
@@ -127,7 +127,7 @@ def rate_limiter(rate, *, name=None) -> Element:
     ----------
     Klyde, McRuer & Myers (1997), J. Guidance, Control, and Dynamics 20(1), 81-89; Duda (1997), ibid. 20(3).
     """
-    spec = _finite(lower=0.0, strict=True, meaning="largest speed of the output")
+    spec = finite(lower=0.0, strict=True, meaning="largest speed of the output")
     rate = checked("rate_limiter", "rate", rate, spec)
     return _RateElement("rate_limiter", dict(rate=rate), RateLimiter(rate), specs=dict(rate=spec), name=name)
 

@@ -1,4 +1,4 @@
-"""The demo: the paper's systems and figures, and a hidden-effect study; the paper is Azenha & Machado (1997)."""
+"""The demo: systems and figures of Azenha & Machado (1997), and a hidden-effect study."""
 
 from .run import run
 

@@ -53,8 +53,8 @@ class Finding:
 
     def _predicted(self) -> str:
         lines = [
-            f"{c.omega:.4f} rad/s, F1 {c.amplitude:.3f} N, x1 {1e3 * c.output_amplitude:.3f} mm, "
-            f"{_stability(c.stable)}, {c.grade}"
+            f"{c.omega:.4f} rad/s, {_stability(c.stable)}, {c.grade}\n"
+            f"  F1 {c.amplitude:.3f} N, x1 {1e3 * c.output_amplitude:.3f} mm"
             for c in self.response.limit_cycles
         ]
         return "\n".join(lines) or "no limit cycle"
@@ -69,8 +69,9 @@ class Finding:
             elif row.exact is not None and row.exact.status.ok:
                 o = row.exact
                 lines.append(
-                    f"{o.omega:.6f} rad/s, F1 {o.amplitude:.5f} N, x1 {1e3 * o.output_amplitude:.4f} mm, "
-                    f"{_stability(o.stable)} (multiplier {o.multiplier:.5f})"
+                    f"{o.omega:.6f} rad/s, {_stability(o.stable)}\n"
+                    f"  F1 {o.amplitude:.5f} N, x1 {1e3 * o.output_amplitude:.4f} mm\n"
+                    f"  multiplier {o.multiplier:.5f}"
                 )
         return "\n".join(lines) or "no limit cycle"
 
@@ -78,12 +79,12 @@ class Finding:
         lines = []
         for start, run in self.runs:
             end = ending(run)
-            lines.append(f"from {1e3 * start:g} mm: {end}")
+            lines.append(f"from {1e3 * start:g} mm:\n{end}")
         return "\n".join(lines)
 
 
 def find(loop: PaperLoop, known: list[Finding] | None = None) -> Finding:
-    """Predict, verify and simulate one loop; a prediction for the same plant is taken from `known` findings."""
+    """Predict, verify and simulate one loop; `known` findings lend a prediction for the same plant."""
     same = [f.response for f in known or () if f.loop.plant == loop.plant and f.loop.box is loop.box]
     response = same[0] if same else describing_function_response(loop.controller, loop.plant, *loop.box)
     system = closed_loop(loop.controller, loop.plant, dt=loop.dt)  # type: ignore[arg-type]
@@ -107,14 +108,14 @@ def ending(run: EventResponse) -> str:
     """Say in a few words how a simulation ends."""
     x = np.asarray(run.outputs)[0]
     if np.abs(x).max() > _GONE:
-        return "grows without bound"
+        return "  grows without bound"
     end = settled(run)
     if end is None:
-        return "comes to rest"
+        return "  comes to rest"
     how = "decays" if end.trend < 0.97 else "grows" if end.trend > 1.03 else ""
     if how:
-        return f"{how} slowly, at {end.omega:.2f} rad/s"
-    return f"{end.omega:.3f} rad/s, F1 {end.force:.3f} N, x1 {1e3 * end.position:.3f} mm"
+        return f"  {how} slowly, at {end.omega:.2f} rad/s"
+    return f"  {end.omega:.3f} rad/s\n  F1 {end.force:.3f} N, x1 {1e3 * end.position:.3f} mm"
 
 
 def settled(run: EventResponse) -> Settled | None:

@@ -47,14 +47,14 @@ def draw_all(findings: Findings, folder: Path) -> list[Path]:
 def _figure_3(_):
     family = describing_function_family(friction_plant(), np.geomspace(6, 60, 60), np.geomspace(2, 30, 90))
     figure, ax = plt.subplots(figsize=(6.8, 5), layout="constrained")
-    plot_family(family, ax=ax, title="Fig. 3: -1/N(a, ω) of the mass with friction [N/m]")
+    plot_family(family, ax=ax, title="Fig. 3: -1/N(a, ω) of the mass with friction")
     return figure
 
 
 def _figure_4(_):
     family = describing_function_family(friction_plant(), np.geomspace(5.2, 60, 60), np.geomspace(2, 40, 60))
     return plot_harmonics(
-        family, title="Fig. 4: harmonic content of x, mass with friction [m/N]", amplitude=15, omega=14
+        family, title="Fig. 4: harmonic content of x, mass with friction", amplitude=15, omega=14
     ).figure
 
 
@@ -79,7 +79,7 @@ def _figure_7(_):
         plant = backlash_plant(restitution)
         family = describing_function_family(plant, np.geomspace(10, 100, 40), np.geomspace(5, 60, 40))
         plot_family(family, ax=ax, title=f"restitution {restitution}")
-    figure.suptitle("Fig. 7: -1/N(a, ω) of two masses with backlash [N/m]", fontsize="medium")
+    figure.suptitle("Fig. 7: -1/N(a, ω) of two masses with backlash", fontsize="medium")
     return figure
 
 
@@ -103,7 +103,8 @@ def _figure_9(findings):
     return loop_response_plot(
         run,
         window=(0, 6),
-        title=f"Fig. 9: backlash, restitution 0.2: settles to {end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
+        title="Fig. 9: backlash, restitution 0.2: settles to "
+        f"{end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
     ).figure
 
 
@@ -143,7 +144,7 @@ def _crossings(key):
         describing_function_plot(
             findings[key].response, ax=ax, label="PID", point_label="%.4g N @ %.4g rad/s"
         )
-        ax.set_title(f"PID and -1/N(a, ω) [N/m]: {findings[key].loop.title}", fontsize="medium")
+        ax.set_title(f"PID and -1/N(a, ω): {findings[key].loop.title}", fontsize="medium")
         return figure
 
     return draw

@@ -82,8 +82,8 @@ def paper_loops() -> list[PaperLoop]:
             "a limit cycle; omega predicted well, amplitude less so",
             (0.0040, 0.0043), 12.0,
             "Does not hold: the only orbit is unstable, a boundary between decay and growth, and the second "
-            "crossing has no orbit at all. Fig. 5 can only show the slow drift beside that boundary. The frequency "
-            "of the boundary is right to 0.8 %.",
+            "crossing has no orbit at all. Fig. 5 can only show the slow drift beside that boundary. The "
+            "frequency of the boundary is right to 0.8 %.",
         )
     ]  # fmt: skip
     for static in (5.25, 5.5, 5.75):
@@ -97,8 +97,8 @@ def paper_loops() -> list[PaperLoop]:
                 "with stiction almost the same",
                 (0.0015,),
                 600.0,
-                "Does not hold: a few per cent of static friction make the loop hunt, stably, at a frequency of its "
-                "own. The describing function hardly notices the static level.",
+                "Does not hold: a few per cent of static friction make the loop hunt, stably, at a frequency "
+                "of its own. The describing function hardly notices the static level.",
             )  # fmt: skip
         )
     loops.append(
@@ -111,8 +111,8 @@ def paper_loops() -> list[PaperLoop]:
             "with stiction almost the same",
             (0.003,),
             20.0,
-            "Does not hold: above 5.9016 N there is no hunting cycle left; every breakaway throws the mass beyond "
-            "the boundary and the loop diverges.",
+            "Does not hold: above 5.9016 N there is no hunting cycle left; every breakaway throws the mass "
+            "beyond the boundary and the loop diverges.",
         )  # fmt: skip
     )
     loops.append(
@@ -138,8 +138,9 @@ def paper_loops() -> list[PaperLoop]:
             "a limit cycle, almost chaotic; larger errors, above all in amplitude",
             (0.02,),
             500.0,
-            "Half of it: the irregular 14 rad/s motion of Fig. 10 is real but dies out. What remains is a rattle "
-            "within the gap eleven times as fast, which the crossing near 126 rad/s announces and misplaces by 19 %.",
+            "Half of it: the irregular 14 rad/s motion of Fig. 10 is real but dies out. What remains is a "
+            "rattle within the gap eleven times as fast, which the crossing near 126 rad/s announces and "
+            "misplaces by 19 %.",
             search=False,
         )  # fmt: skip
     )

@@ -47,8 +47,8 @@ def orbit_attractors(block, A, omega, *, starts=24, orders=9, output=None, seed=
     seed : int
         Of the random states.
     tol : float
-        Two motions are one if regime and harmonics agree within this, relative; a motion and its mirror image are
-        one, aperiodic motions agree within their errors.
+        Two motions are one if regime and harmonics agree within this, relative; a motion and its mirror image
+        are one, aperiodic motions agree within their errors.
     **options
         `transient`, `averages`, `max_steps` as in `ctrl_df.df.orbits.orbit_family`.
 

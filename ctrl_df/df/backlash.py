@@ -41,7 +41,7 @@ _STARTS = np.array([[_RELEASE, 0.0], [-1.0, 0.7], [0.9, 0.4], [2.2, 1.3], [-2.6,
 
 
 def backlash_family(
-    motor_mass, load_mass, gap, restitution, A, omega, orders=9, periods=600, transient=300, progress=None
+    motor_mass, load_mass, gap, restitution, A, omega, orders=9, periods=400, transient=300, progress=None
 ):
     """Harmonics of the load position of two masses with a gap, under ``F = a cos(omega t)`` on the motor.
 

@@ -10,9 +10,11 @@ import control as ct
 import numpy as np
 from control import descfcn
 
+from ..blocks.element import Element
 from ..blocks.hysteresis import play, relay_with_hysteresis
 from ..blocks.mechanism import Mass, Mechanism, TwoMass
-from ..blocks.memoryless import Element, saturation
+from ..blocks.memoryless import saturation
+from ..status import Status
 from .memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
 
 # python-control's own classes, held at import: someone may put ours in their place.
@@ -165,6 +167,7 @@ def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, opt
     F = translated(F)
     options = options or {}
     if isinstance(F, Element):
+        _output_name(F, output)
         return Method("rate" if F.kind == "rate_limiter" else "element", F)
     if isinstance(F, Mechanism):
         return _for_mechanism(F, _output_name(F, output), options)
@@ -174,7 +177,8 @@ def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, opt
         name = _output_name(F, output)
         if F._isstatic():
             own = getattr(F, "describing_function", None) if try_method else None
-            return Method("law", _static_law(F, F.output_labels.index(name)), name, own_method=own)
+            law = _Guarded(_static_law(F, F.output_labels.index(name)), F.name)
+            return Method("law", law, name, own_method=own)
         return Method("orbit", F, name, options=options)
     own = getattr(F, "describing_function", None) if try_method else None
     if own is not None and not _implemented(own, largest):
@@ -186,8 +190,24 @@ def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, opt
                 "Wrap a table with ctrl_df.piecewise_linear."
             )
         return Method("law", F, own_method=own)
-    static = own is not None or _is_static(F, largest)
-    return Method("law" if static else "memory", F, own_method=own, samples=max(4096, int(num_points)))
+    law = _Guarded(F, getattr(F, "__name__", type(F).__name__))
+    static = own is not None or _is_static(law, largest)
+    return Method("law" if static else "memory", law, own_method=own, samples=max(4096, int(num_points)))
+
+
+class _Guarded:
+    """A user's law whose errors say that they are the law's, and where it was."""
+
+    def __init__(self, law, name):
+        self.law, self.name = law, name
+
+    def __call__(self, u):
+        try:
+            return self.law(u)
+        except NotImplementedError:  # a class with N but no law
+            raise
+        except Exception as error:
+            raise RuntimeError(f"{Status.USER_ERROR} (law {self.name} at u = {u!r}: {error!r})") from error
 
 
 def named(code, names) -> np.ndarray:
@@ -259,7 +279,7 @@ def _implemented(own, largest) -> bool:
 
 def _is_static(F, largest) -> bool:
     """Whether a callable gives the same values on the way up and on the way down."""
-    told = getattr(F, "_isstatic", None)
+    told = getattr(F.law, "_isstatic", None)
     if told is not None and told():
         return True
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any
 
 import control as ct
 import numpy as np
+
+from ..drawing import draw
 
 FORMAT = 1
 
@@ -106,15 +109,16 @@ class Family:
             upper = int(np.clip(np.searchsorted(grid, np.log(amplitude)), 1, grid.size - 1))
             share = (np.log(amplitude) - grid[upper - 1]) / (grid[upper] - grid[upper - 1])
             response = (1 - share) * table[upper - 1] + share * table[upper]
-        return ct.frd(np.array(response), self.omega, name=f"N({amplitude:g})")
+        name = f"N({amplitude:g})".replace(".", "_")  # python-control allows no point in a name
+        return ct.frd(np.array(response), self.omega, name=name)
 
     def plot(self, **kwargs) -> ct.ControlPlot:
         """Draw -1/N in the complex plane, at constant amplitude and at constant frequency."""
-        return _drawing("ctrl_df.plot.family").plot_family(self, **kwargs)
+        return draw("family", self, **kwargs)
 
     def plot_harmonics(self, **kwargs) -> ct.ControlPlot:
         """Draw |Y_k| / A over frequency or over amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
-        return _drawing("ctrl_df.plot.family").plot_harmonics(self, **kwargs)
+        return draw("harmonics", self, **kwargs)
 
     def save(self, path) -> Path:
         """Write the family to an ``.npz`` file (no pickle inside), whole or not at all."""
@@ -164,6 +168,8 @@ def minus_inverse(N) -> np.ndarray:
 def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
     """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
     path = Path(path)
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -178,9 +184,12 @@ def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
 def read_arrays(path) -> dict[str, np.ndarray]:
     """Read an npz file of a family, refusing pickles and strangers."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open(path, "rb") as handle:
+            file = np.load(handle, allow_pickle=False)
+            if isinstance(file, np.ndarray):
+                raise ValueError("it holds one bare array")
             data = {key: file[key] for key in file.files}
-    except (ValueError, EOFError, OSError) as error:
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
         if isinstance(error, FileNotFoundError):
             raise
         raise ValueError(f"a family file must be an npz without pickled objects; {path}: {error}.") from None
@@ -205,10 +214,3 @@ def _arrays(family: Family) -> dict[str, Any]:
         description=family.description,
         output=family.output,
     )
-
-
-def _drawing(module: str):
-    """Import the drawing layer, which lies above this one, only when a picture is asked for."""
-    import importlib
-
-    return importlib.import_module(module)

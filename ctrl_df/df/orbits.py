@@ -235,12 +235,15 @@ class OrbitSolver(OrbitSearch):
         self._stop_if_running_away(y)
         size = np.where(self.shot.size > 0, self.shot.size, 1.0)
         self.previous = state
+        least = 3e-3  # mismatch of the shorter periods: a multiple that closes no better is not tried
         for periods in range(1, LONGEST + 1):
             gap = (y[-1] - y[-1 - periods]) / size
             gap -= np.where(
                 s.wrap > 0, np.round(gap * size / np.where(s.wrap > 0, s.wrap, 1)) * s.wrap / size, 0
             )
-            if np.max(np.abs(gap[s.free]), initial=0.0) < 1e-3:
+            apart = np.max(np.abs(gap[s.free]), initial=0.0)
+            if apart < 0.3 * least:
+                least = apart
                 orbit = self._periodic(state, periods, orders)
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1

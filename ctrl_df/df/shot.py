@@ -71,7 +71,8 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
     arguments = (
         engine.program, drive, np.zeros(9), vector, modes, 1.0, none, rows_x, rows_y, 8, 1e-9, 1e-12, 1.0,
-        True, False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, vector, 0, engine._space, no_spectrum, 1.0,
+        True, False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, vector, 0, engine._space,
+        no_spectrum, 1.0,
     )  # fmt: skip
     shot = Shot(
         native_address(run, arguments), 0, engine.program, engine._space, np.full(ng, 1e-13), np.zeros(9),

@@ -15,8 +15,8 @@ from .shot import coordinates, place
 
 @njit(cache=True, error_model="numpy")
 def sweep(
-    shot, samples, coefficients, amplitudes, omegas, least, power, inertia, past, past_mode, known, mirrored, rtol,
-    hmax, budget, out, ends, miss, kinds, still,
+    shot, samples, coefficients, amplitudes, omegas, least, power, inertia, past, past_mode, known, mirrored,
+    rtol, hmax, budget, out, ends, miss, kinds, still,
 ):  # fmt: skip
     """Close the orbits of consecutive points, each started from those before; stop where one does not close.
 

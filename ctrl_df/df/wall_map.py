@@ -20,6 +20,9 @@ import numpy as np
 from numba import njit
 
 CHATTER = 3e-4  # [rad] remaining time of a chatter below which contact is sustained
+# The time of an impact is taken when Halley's step is this part of it, and the step is still made: it is then
+# good to the cube. Rough serves where a motion is only followed.
+EXACT, ROUGH = 1e-6, 1e-3
 LONGEST = 1e4  # periods of one flight beyond which the motion counts as free of contact
 
 
@@ -52,7 +55,7 @@ def two_impact(A, eps):
             continue
         if stays(A, eps, -cs, -sn, eps * v):
             continue
-        kind, time, speed = flight(A, -cs, -sn, eps * v)
+        kind, time, speed = flight(A, -cs, -sn, eps * v, EXACT)
         closing = abs(time - math.pi) + abs(speed - v) / v
         if kind == 1 and closing < 1e-6:
             return True, tau, v, closing
@@ -73,18 +76,19 @@ def two_impact_harmonics(A, eps, tau, v, out):
 
 
 @njit(cache=True)
-def flight(A, c, s, w):
+def flight(A, c, s, w, near):
     """Follow the ball from a wall to its next impact: (kind, time, speed).
 
     Left at speed w >= 0 in phase phi, c = cos(phi), s = sin(phi). Kind 0: back on the same wall, 1: on the
     opposite one, 2: never. The velocity w + A (sin(phi + r) - s) repeats, so that the extremes of xi follow
-    in closed form; between two of them xi is monotone, and no impact, grazing included, escapes.
+    in closed form; between two of them xi is monotone, and no impact, grazing included, escapes. `near` is
+    `EXACT` or `ROUGH`.
     """
     W = w / A
     reach = c * c + W * (2.0 * s - W)
     drift = w - A * s
     if reach <= 0.0:  # never turns back
-        return impact(A, c, s, w, 0.0, (1.0 + 2.0 * A) / drift, 1)
+        return impact(A, c, s, w, 0.0, (1.0 + 2.0 * A) / drift, 1, near)
     # velocity = 0 is a quadratic in tan(r/2); each root in the form that does not cancel
     D = math.sqrt(reach)
     if c >= 0.0:
@@ -92,13 +96,13 @@ def flight(A, c, s, w):
     else:
         top, peak = extreme(A, c, s, w, W, D - c)
     if peak >= 1.0:
-        return impact(A, c, s, w, 0.0, top, 1)
+        return impact(A, c, s, w, 0.0, top, 1, near)
     if c >= 0.0:
         bottom, low = extreme(A, c, s, w, W, -c - D)
     else:
         bottom, low = extreme(A, c, s, w, D - c, W - 2.0 * s)
     if low <= 0.0:
-        return impact(A, c, s, w, top, bottom, 0)
+        return impact(A, c, s, w, top, bottom, 0, near)
     step = 2.0 * math.pi * drift  # shift of the extremes from period to period
     gap = 1.0 - peak if drift > 0.0 else low
     if gap > LONGEST * abs(step):
@@ -107,10 +111,10 @@ def flight(A, c, s, w):
     if drift > 0.0:
         if place(A, c, s, w, top + late) < 1.0:
             late += 2.0 * math.pi
-        return impact(A, c, s, w, bottom + late - 2.0 * math.pi, top + late, 1)
+        return impact(A, c, s, w, bottom + late - 2.0 * math.pi, top + late, 1, near)
     if place(A, c, s, w, bottom + late) > 0.0:
         late += 2.0 * math.pi
-    return impact(A, c, s, w, top + late, bottom + late, 0)
+    return impact(A, c, s, w, top + late, bottom + late, 0, near)
 
 
 @njit(cache=True)
@@ -122,7 +126,7 @@ def extreme(A, c, s, w, up, along):
 
 
 @njit(cache=True)
-def impact(A, c, s, w, low, high, kind):
+def impact(A, c, s, w, low, high, kind, near):
     """Time and speed at which xi reaches the wall within a monotone piece, by safeguarded Halley steps."""
     target = 1.0 if kind == 1 else 0.0
     sign = 1.0 if kind == 1 else -1.0
@@ -151,8 +155,8 @@ def impact(A, c, s, w, low, high, kind):
         r = new
         if abs(move) <= 4e-16 * r:
             break
-        if inside and abs(move) <= 1e-6 * r and abs(move * force) <= 1e-6 * v:
-            # the next step would be 1e-12 of this one
+        if inside and abs(move) <= near * r and abs(move * force) <= near * v:
+            # the next step would be near^2 of this one
             jerk = -sign * A * (c * sn + s * (1.0 - versine))
             v += move * (force + 0.5 * move * jerk)
             break

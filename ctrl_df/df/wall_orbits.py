@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .wall_map import flight, lag, place, stays, wrap
+from .wall_map import EXACT, ROUGH, flight, lag, place, stays, wrap
 
 NEAR = 1e-5  # distance of a recurrence from which Newton's method is tried
 BLOCKS = 8  # an average's spread is estimated from that many parts
@@ -22,12 +22,12 @@ RELEASE = -0.5 * math.pi  # phi at which a pressing acceleration changes sign
 
 
 @njit(cache=True)
-def event(A, eps, phi, c, s, w):
+def event(A, eps, phi, c, s, w, near):
     """One flight, the impact, and sustained contact if it follows.
 
     Returns kind, time of flight, time of contact; phi, its cosine and sine, and w after; impact speed.
     """
-    kind, time, speed = flight(A, c, s, w)
+    kind, time, speed = flight(A, c, s, w, near)
     if kind == 2:
         return kind, 0.0, 0.0, phi, c, s, w, 0.0
     phi = wrap(phi + time + math.pi * kind)
@@ -48,7 +48,7 @@ def settle(A, eps, phi, w, transient):
     ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
     c, s = math.cos(phi), math.sin(phi)
     for _ in range(IMPACTS * transient):
-        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w)
+        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, ROUGH)
         if kind == 2:
             return 2, 0, 0, phi, w, False, 0.0, 0.0
         since += 1
@@ -92,7 +92,7 @@ def polish(A, eps, phi, w, count, lap):
         j11, j12, j21, j22 = 1.0, 0.0, 0.0, 1.0
         for _ in range(count):
             p0, c0, s0 = p, c, s
-            kind, time, rest, p, c, s, v, speed = event(A, eps, p, c, s, v)
+            kind, time, rest, p, c, s, v, speed = event(A, eps, p, c, s, v, EXACT)
             if kind == 2 or (speed == 0.0 and rest == 0.0):
                 return False, phi, w, False, 0.0, 0.0
             total += time + rest
@@ -148,7 +148,7 @@ def measure(A, eps, phi, w, count, out):
     wall = np.zeros(out.size, dtype=np.complex128)
     for _ in range(count):
         c0, s0, w0 = c, s, w
-        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w)
+        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w, EXACT)
         area += side * (0.5 * time - swept(A, c0, s0, w0, time))
         clock += time + rest
         side = -side if kind == 1 else side
@@ -181,7 +181,7 @@ def average(A, eps, phi, w, periods, out):
     area, cuts, squares = 0.0, 0, 0.0
     for _ in range(periods * IMPACTS):
         c0, s0, w0, side0 = c, s, w, side
-        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w)
+        kind, time, rest, phi, c, s, w, speed = event(A, eps, phi, c, s, w, ROUGH)
         if kind == 2:
             return -1.0
         side = -side if kind == 1 else side

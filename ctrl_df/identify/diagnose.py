@@ -12,14 +12,18 @@ import numpy as np
 from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.mechanism import Mechanism
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
-from .equivalence import coloured_floor
 from .explain import explain, find_regions
+from .lack_of_fit import lacks
 from .measurement import Measurement
 from .study import Study
 from .trial import Trial
+from .windows import facts
 
 SIGNIFICANT = 20.0
 """Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
+
+_LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
+_NOISIER = 1.4  # error on held-out windows over that on fitted ones that may be chance
 
 
 def diagnose(
@@ -130,8 +134,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     chosen = study.confirm(found)
     base = study.base
     best = chosen[0] if chosen else base
-    noise, structure = _split(best, study)
-    _, structure0 = _split(base, study)
+    missed = lacks(best, study.data, study.noise)
     base_errors = _errors(base, study)
     keys = {c.key for c in chosen}
     weights = np.exp(
@@ -147,7 +150,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     significant = (
         first is not None and first.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * base_errors[1]
     )
-    if _unexplained(noise, structure, structure0):
+    noise, structure, share = _left(best, base, missed, study)
+    if share > _LEFT:
         verdict = UNKNOWN
     elif first is None or not significant:
         verdict = NONE
@@ -156,32 +160,35 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         verdict = EFFECT if all(c.id in first.equivalents for c in others) else AMBIGUOUS
     where = find_regions(best if verdict == UNKNOWN else base, study.data.train)
     kinds = tuple(where.kinds) if where is not None else ()
+    if verdict == UNKNOWN:
+        kinds = tuple(m.kind for m in missed if m.evidence > 0.8 * missed[0].evidence)
     held = () if study.data.held.records is study.data.train.records else study.data.held.records
     result = Diagnosis(
         verdict, tuple(ranking), base.block, base.block, *base_errors, noise, structure, "", kinds, where,
         study.data.train.records, held, time.perf_counter() - began, dict(limits or {}),
     )  # fmt: skip
-    object.__setattr__(result, "explanation", explain(result, structure0))
+    object.__setattr__(result, "explanation", explain(result, missed))
     return result
 
 
-def _unexplained(noise, structure, structure0):
-    """Whether the best candidate leaves most of the structure.
+def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float, float]:
+    """Return the noise, the structure that the best candidate leaves (rms), and its share of what was there.
 
-    Noise of a colour within the band of motion makes up to 2.5 times the noise seen above that band. A test
-    of the residual against the input would be sharper, but under feedback the input knows the noise.
+    Structure shows on the windows fitted by what free forces explain, and on those held out by an error beyond
+    the noise: that of the fitted windows, times what the records' own noise floors say of the two.
     """
-    return structure > 3.0 * noise and structure > 0.2 * structure0
-
-
-def _split(tried: Trial, study: Study) -> tuple[float, float]:
-    """Return the rms of noise and of structure in a candidate's residuals."""
+    structure = missed[0].rms if missed and missed[0].evidence > SIGNIFICANT else 0.0
+    noise = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
+    there = math.sqrt(max(base.train.rmse**2 - noise**2, structure**2, 1e-300))
+    assert best.held is not None and base.held is not None
     data = study.data
-    velocities = [*data.train.velocities, *data.held.velocities]
-    steps = [r.dt for view in (data.train, data.held) for r in view.records]
-    parts = [coloured_floor(e, v, dt) for e, v, dt in zip(tried.residuals, velocities, steps, strict=True)]
-    noise, structure = (math.sqrt(float(np.mean([p[i] ** 2 for p in parts]))) for i in (0, 1))
-    return noise, structure
+    floors = [
+        math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records]))) for v in (data.train, data.held)
+    ]
+    expected = _NOISIER * noise * floors[1] / floors[0]
+    outside = math.sqrt(max(best.held.rmse**2 - expected**2, 0.0))
+    there_outside = math.sqrt(max(base.held.rmse**2 - expected**2, outside**2, 1e-300))
+    return noise, max(structure, outside), max(structure / there, outside / there_outside)
 
 
 def _errors(tried: Trial, study: Study) -> tuple[float, float]:

@@ -35,7 +35,7 @@ def values_of(effect) -> str:
     )
 
 
-def explain(diagnosis, structure0) -> str:
+def explain(diagnosis, missed) -> str:
     """Return the verdict in sentences."""
     d = diagnosis
     first: Any = d.ranking[0] if d.ranking else None
@@ -52,7 +52,7 @@ def explain(diagnosis, structure0) -> str:
         return (
             f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}; {tried}"
             f"{d.structure:.2g} of structure remain beside {d.noise:.2g} of noise (rms, output unit). "
-            f"Look here: {where or 'the error is spread over the whole record.'}"
+            f"It acts like {missed[0].sentence}. {where}".rstrip()
         )
     size = f"{d.nrmse:.2%} to {first.nrmse:.2%} (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
     same = ""

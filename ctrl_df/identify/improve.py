@@ -10,6 +10,7 @@ from typing import Any
 from .diagnose import SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
 from .diagnosis import NONE, UNKNOWN, Diagnosis
 from .study import Study as Fits
+from .study import ranked
 from .trial import Trial
 
 _LESS = 0.98  # the held-out error a step must reach, relative to the one before
@@ -227,7 +228,7 @@ def _without_idle(block, start, fits, names):
         whole = data.judged(
             Trial(key, data.fit(block, full_free, iterations=4), extra=len(full_free) - len(free))
         )
-        if fits.ranked([whole])[0].evidence < SIGNIFICANT:
+        if ranked(fits.base, [whole])[0][0].evidence < SIGNIFICANT:
             block = fits.base.block
             dropped.append(key)
     return block, tuple(dropped)

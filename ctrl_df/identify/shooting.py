@@ -105,6 +105,8 @@ class Problem:
             self.nuisance = [np.zeros_like(p) for p in self.priors]
         else:
             self.nuisance = [np.array(a) for a in starts]  # type: ignore[union-attr]
+            # Starts that a fit before has found stay within reach.
+            self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
 
     def simulate(self, theta, nuisance) -> Signals:
         """Return the outputs within the windows."""

@@ -59,6 +59,8 @@ class Simulator:
         run as many times faster and the result a little coarser; for first iterations.
     rtol : float
         Relative tolerance of the engine.
+    force : (n,) array or None
+        Input in place of the recorded one.
 
     Raises
     ------
@@ -66,8 +68,17 @@ class Simulator:
         A model that is neither.
     """
 
-    def __init__(self, model, record: Measurement, *, thin: int = 1, rtol: float = 1e-6):
+    def __init__(
+        self,
+        model,
+        record: Measurement,
+        *,
+        thin: int = 1,
+        rtol: float = 1e-6,
+        force: np.ndarray | None = None,
+    ):
         self.model, self.record, self.rtol = model, record, rtol
+        self.input = np.asarray(record.u if force is None else force)
         self.parts: Any = getattr(model, "parts", None)
         self.closed = self.parts is not None
         self.block = self.parts.block if self.closed else model
@@ -229,7 +240,7 @@ class Simulator:
         elif self.mechanism:
             part = self._prepare_block(model)
         else:
-            time, value = self._before(self.record.t, self.record.u)
+            time, value = self._before(self.record.t, self.input)
             part = _Parts(Engine(model), None, 0, time, value)
         self._prepared = (key, part)
         return part
@@ -240,14 +251,14 @@ class Simulator:
 
     def _prepare_loop(self, loop) -> _Parts:
         channels = self.record.channels or {}
-        reference = next((channels[k] for k in REFERENCE if k in channels), self.record.u)
+        reference = next((channels[k] for k in REFERENCE if k in channels), self.input)
         time, value = self._before(self.record.t, reference)
         block = loop.parts.block
         offset = (loop.nstates or 0) - (block.nstates or 0)
         return _Parts(Engine(loop), block.core if self.mechanism else None, offset, time, value)
 
     def _prepare_block(self, block) -> _Parts:
-        record, t, u = self.record, self.record.t, np.asarray(self.record.u)
+        record, t, u = self.record, self.record.t, self.input
         outside, input_delay, static = [], 0.0, record.input_hold == "zoh"
         held = u
         for key, effect in zip(block._keys, block.effects, strict=True):

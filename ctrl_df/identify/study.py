@@ -9,6 +9,7 @@ import numpy as np
 
 from .attach import applicable, attach
 from .equivalence import indistinguishable, whitened_power, whitener
+from .residual_tests import NoiseModel
 from .screen import Screen, Start, force_regression, motion_of, starts_for
 from .simulator import feasible
 from .trial import SHORTEST, Data, Trial, prepare
@@ -62,29 +63,17 @@ class Study:
 
     def candidates(self, classes, executor=None) -> list[Trial]:
         """Return every effect that can be added, fitted, the one with most evidence first."""
-        screen = Screen(self.base.train, self.data)
+        shortest, data = (level.sampled for level in self.levels[:2])
+        screen = Screen(data.moved(self.base.train, 3), data)
         run = map if executor is None else executor.map
         kinds = [c for c in classes if applicable(c, screen.block)]
-        jobs = [(cls, screen, self.levels[0], self.free) for cls in kinds]
+        jobs = [(cls, screen, shortest, self.free) for cls in kinds]
         span = float(np.ptp(screen.motion.x))
         found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
-        self._rebase(self.ranked(found))
-        return self.ranked(found)
-
-    def ranked(self, trials) -> list[Trial]:
-        """Return the trials with their evidence over the baseline, best first.
-
-        Residuals are whitened by the noise model of the best one's.
-        """
-        best = min([self.base, *trials], key=lambda t: t.size)
-        self.noise = noise = whitener(best.residuals)
-        base_power, count = whitened_power(self.base.residuals, noise)
-        judged = []
-        for t in trials:
-            power, _ = whitened_power(t.residuals, noise)
-            gain = 0.5 * count * math.log(base_power / power) - 0.5 * t.extra * math.log(count)
-            judged.append(replace(t, evidence=gain))
-        return sorted(judged, key=lambda t: -t.evidence)
+        base = Trial("", screen.base)
+        found = ranked(base, found)[0]
+        self._rebase(found)
+        return found
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -99,22 +88,19 @@ class Study:
 
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
-        best = found[:CONFIRMED]
-        stages = [[self._moved(t, level) for t in (self.base, *best)] for level in self.levels]
-        at = _longest_coherent([[_error(t) for t in stage] for stage in stages])
-        self.data, (self.base, *best) = self.levels[at], stages[at]
+        shortest, middle, longest = self.levels
+        fits = [middle.moved(t.train) for t in (self.base, *found[:CONFIRMED])]
+        stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
+        at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
+        self.data = self.levels[at]
         fine = self.data.fine
-        self.base = self._polished(self.base, fine)
-        return self.ranked([self._polished(t, fine) for t in best])
-
-    def _moved(self, tried: Trial, level: Data) -> Trial:
-        """Refit in windows of another length, and judge."""
-        train = tried.train if level is self.data else level.moved(tried.train)
-        return level.judged(replace(tried, train=train))
-
-    def _polished(self, tried: Trial, fine: Data) -> Trial:
-        better = fine.moved(tried.train, 3)
-        return fine.judged(replace(tried, train=better, confirmed=True))
+        best = [
+            fine.judged(replace(t, train=fine.moved(f, 3, 1e-3), confirmed=True))
+            for t, f in zip((self.base, *found[:CONFIRMED]), stages[at], strict=True)
+        ]
+        self.base = best[0]
+        chosen, self.noise = ranked(self.base, best[1:])
+        return chosen
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise."""
@@ -142,9 +128,20 @@ def _longest_coherent(errors) -> int:
     return at
 
 
-def _error(tried: Trial) -> float:
-    """Return the rms residual of all windows."""
-    return math.sqrt(tried.size / sum(map(len, tried.residuals)))
+def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
+    """Return the trials with their evidence over the baseline, best first, and the noise by which it was judged.
+
+    Residuals are whitened by the noise model of the best one's.
+    """
+    best = min([base, *trials], key=lambda t: t.size)
+    noise = whitener(best.residuals)
+    base_power, count = whitened_power(base.residuals, noise)
+    judged = []
+    for t in trials:
+        power, _ = whitened_power(t.residuals, noise)
+        gain = 0.5 * count * math.log(base_power / power) - 0.5 * t.extra * math.log(count)
+        judged.append(replace(t, evidence=gain))
+    return sorted(judged, key=lambda t: -t.evidence), noise
 
 
 def _try(job) -> Trial | None:
@@ -173,7 +170,7 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
     rough = "sensor_quantization" in key
     names = (*free, *(() if rough else own))
     if start.effect.id in _CURVED:
-        fitted = data.moved(shortest.fit(block, names, iterations=8, tolerance=3e-3))
+        fitted = data.moved(shortest.fit(block, names, iterations=6, tolerance=1e-2), 4, 1e-2)
     else:
-        fitted = data.fit(block, names, iterations=1 if rough else 10)
+        fitted = data.fit(block, names, iterations=1 if rough else 6, tolerance=1e-2)
     yield Trial(start.effect.id, fitted, extra=len(own))

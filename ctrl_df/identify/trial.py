@@ -60,6 +60,10 @@ class View:
             finer.append(new.only(inside[middle]))
         return View(self.records, tuple(finer))
 
+    def every(self, step: int) -> View:
+        """Return every `step`-th window."""
+        return View(self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.windows))
+
     @property
     def outputs(self) -> list[np.ndarray]:
         """Measured outputs within the windows."""
@@ -108,6 +112,11 @@ class Trial:
         """Sum of squared residuals."""
         return float(sum(np.sum(r * r) for r in self.residuals))
 
+    @property
+    def rms(self) -> float:
+        """Root mean square residual of all windows."""
+        return math.sqrt(self.size / sum(map(len, self.residuals)))
+
 
 @dataclass(frozen=True, eq=False)
 class Data:
@@ -125,6 +134,11 @@ class Data:
         return replace(self, train=train.shorter(factor), held=held.shorter(factor), whole=(train, held))
 
     @property
+    def sampled(self) -> Data:
+        """The same with every second window to learn from: enough for a first look."""
+        return replace(self, train=self.train.every(2))
+
+    @property
     def fine(self) -> Data:
         """The same at the records' full rate."""
         return replace(self, thin=1)
@@ -137,10 +151,13 @@ class Data:
             tolerance=tolerance,
         )  # fmt: skip
 
-    def moved(self, found: Candidate, iterations=8) -> Candidate:
+    def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
         """Fit a model found over other windows to these; windows that begin at one sample share initial states."""
         starts = same_begins(found, self.train.windows)
-        return self.fit(found.model, found.names, starts=starts, iterations=iterations)
+        if sum(map(len, self.train.windows)) > sum(map(len, found.windows)):
+            # The initial states of new windows first: parameters would bend to make up for them.
+            starts = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2).starts
+        return self.fit(found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance)
 
     def judged(self, tried: Trial) -> Trial:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
@@ -170,7 +187,17 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
         judge = View(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
+        thin //= 2
     return Data(learn, judge, thin, _scales(block, records))
+
+
+def _rough(record, thin: int) -> bool:
+    """Whether the input jumps about within the steps of a thinned one: its peaks then decide what breaks away."""
+    u, t = record.u, record.t
+    off = np.abs(u - np.interp(t, t[::thin], u[::thin]))
+    # single jumps (steps of the force) are no harm: what counts is what most samples do
+    return float(np.quantile(off, 0.75)) > 0.05 * float(np.std(u))
 
 
 def _count(record) -> int:

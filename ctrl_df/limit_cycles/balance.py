@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
-from ..blocks.memoryless import Element
+from ..blocks.element import Element
 from ..blocks.primitives import PiecewiseAffine, Play
 from ..df.dispatch import Method
 
@@ -25,7 +25,7 @@ _ROUNDS, _MEMORY = 40, 8
 
 @dataclass(frozen=True)
 class Balance:
-    """The outcome: corrected amplitude and frequency with the block's input as Fourier coefficients, or why there is none."""
+    """Corrected amplitude and frequency, with the block's input as Fourier coefficients, or why none."""
 
     solution: tuple[float, float] | None
     reason: str = ""

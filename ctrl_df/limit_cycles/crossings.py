@@ -20,6 +20,7 @@ _MOST_STARTS = 600
 _MOST_PER_CELL = 4
 _STEP = 1e-5  # of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10
 _ACCEPT = 1e-8
+_TOGETHER = 1e-3  # of a cell: starts so near to each other converge to one zero
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,8 @@ def _polish(D, p, q, reach, box, refine):
             alive &= np.abs(value) < 1e-3
         far = np.abs((x - start) / reach).max(axis=1) > 6  # wandered off: another start owns what is there
         alive &= ~far
+        if refine:
+            alive &= ~_followers(x, np.where(alive, np.abs(value), np.inf), reach)
     good = alive & (np.abs(value) <= (_ACCEPT if refine else np.inf))
     slack = 1e-9
     inside = (x[:, 0] >= box[0] - slack) & (x[:, 0] <= box[1] + slack)
@@ -169,6 +172,18 @@ def _polish(D, p, q, reach, box, refine):
         found.append(Crossing(float(np.exp(x[i, 0])), float(np.exp(x[i, 1])), float(abs(value[i])), J))
     lost = _neighbourhoods(x[~good], value[~good], reach[~good], places)
     return sorted(found, key=lambda c: (c.amplitude, c.omega)), lost
+
+
+def _followers(x, size, reach):
+    """Mark the starts that a better one is leading to the same zero: they need not be computed on."""
+    led = np.zeros(size.size, dtype=bool)
+    order = np.argsort(size)
+    for n, i in enumerate(order):
+        if not np.isfinite(size[i]):
+            break
+        ahead = order[:n][~led[order[:n]]]
+        led[i] = bool((np.abs(x[ahead] - x[i]) < _TOGETHER * reach[i]).all(axis=1).any())
+    return led
 
 
 def _neighbourhoods(x, value, reach, places):

@@ -40,6 +40,7 @@ class LinearPart:
                 f"H must have one input and one output; got {H.ninputs} inputs, {H.noutputs} outputs. "
                 "Select one channel, H[i, j]."
             )
+        _require_finite(H)
         self.H: Any = H  # control's stubs know less of it than it can
         self.measured = isinstance(H, ct.FrequencyResponseData)
         self.dt = 0.0 if not H.isdtime(strict=True) else (1.0 if H.dt is True else float(self.H.dt))
@@ -111,12 +112,12 @@ class LinearPart:
             values = np.geomspace(values[0], values[1], points)
         if self.measured:
             self._require_inside(values)
-        if values.size and values[0] > self.top:
+        if values.size and values[-1] > self.top * (1 + 1e-9):
             raise ValueError(
-                f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[0]:g} "
-                f"rad/s."
+                f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[-1]:g} "
+                f"rad/s. A sampled loop knows no higher one: end the range there."
             )
-        return values[values <= self.top * (1 + 1e-12)]
+        return np.minimum(values, self.top)
 
     def _own_grid(self, points):
         if self.measured:
@@ -169,3 +170,15 @@ class LinearPart:
                 f"{omega.min():g} "
                 f"to {omega.max():g}. Keep omega inside the data, or fit a model to them."
             )
+
+
+def _require_finite(H):
+    """Refuse NaN or infinity among the numbers of a model; those of measured points are looked at later."""
+    if isinstance(H, ct.TransferFunction):
+        numbers = [H.num[0][0], H.den[0][0]]
+    elif isinstance(H, ct.StateSpace):
+        numbers = [H.A, H.B, H.C, H.D]
+    else:
+        return
+    if not all(np.isfinite(n).all() for n in numbers):
+        raise ValueError(f"H needs finite coefficients; got NaN or infinity in {H!r}. Correct the model.")

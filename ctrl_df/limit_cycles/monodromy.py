@@ -2,9 +2,9 @@
 
 Between events the perturbation of a state is carried by the flow of the mode, differentiated here by central
 differences (exact to rounding where the flow is linear). At an event it is carried by the saltation matrix
-``S = R + (f+ - R f-) n^T / (n f-)`` with f the rates before and after, R the derivative of the reset (impact, or the loss
-of a velocity to sticking) and n the gradient of the event's margin (Leine & Nijmeijer 2004, ch. 7). S loses rank where
-a body sticks, and is singular where the margin is grazed.
+``S = R + (f+ - R f-) n^T / (n f-)`` with f the rates before and after, R the derivative of the reset (impact,
+or the loss of a velocity to sticking) and n the gradient of the event's margin (Leine & Nijmeijer 2004, ch.
+7). S loses rank where a body sticks, and is singular where the margin is grazed.
 """
 
 from __future__ import annotations
@@ -81,7 +81,9 @@ class Tracer:
             if len(segments) >= self.max_events:
                 status = Status.WORK_LIMIT
                 break
-            run = self.engine.run(now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=2, max_steps=200_000)
+            run = self.engine.run(
+                now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=2, max_steps=200_000
+            )
             if not run.status.ok:
                 status = run.status
                 break
@@ -116,7 +118,9 @@ class Tracer:
                 moved = state.copy()
                 moved.x[j] += sign * h
                 ends.append(
-                    self.engine.run(moved, state.time + span, self.drive, rtol=RTOL, locate=False, log=1).state.x
+                    self.engine.run(
+                        moved, state.time + span, self.drive, rtol=RTOL, locate=False, log=1
+                    ).state.x
                 )
             columns.append((ends[0] - ends[1]) / (2 * h))
         return np.array(columns).T

@@ -5,17 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import control as ct
 import numpy as np
 
+from ..blocks.element import Element
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
+from .finder import OrbitFinder
 from .grade import LimitCycle
-from .orbit import Orbit, OrbitFinder
+from .orbit import Orbit
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "not tested"
 
-# Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle, shifted.
+# Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle,
+# shifted.
 CONFIRMED_WITHIN = 0.05
 SHIFTED_WITHIN = (1.25, 2.0)  # frequency, amplitude
 
@@ -87,7 +91,16 @@ class Check:
 
     def table(self) -> str:
         """Return the rows as text: predicted | exact | simulated, errors and verdict."""
-        head = ("predicted a @ w", "exact a @ w", "multiplier", "simulated y @ w", "error a", "error w", "grade", "verdict")
+        head = (
+            "predicted a @ w",
+            "exact a @ w",
+            "multiplier",
+            "simulated y @ w",
+            "error a",
+            "error w",
+            "grade",
+            "verdict",
+        )
         lines: list[tuple[str, ...]] = [head]
         for row in self.rows:
             p, e, s = row.predicted, row.exact, row.simulated
@@ -97,7 +110,9 @@ class Check:
                     f"{p.amplitude:.6g} @ {p.omega:.6g}" if p else "-",
                     f"{shown.amplitude:.7g} @ {shown.omega:.7g}" if shown else "-",
                     _multiplier(shown),
-                    f"{s[1]:.4g} @ {s[0]:.6g}" if s else ("leaves" if shown is not None and shown.stable is False else "-"),
+                    f"{s[1]:.4g} @ {s[0]:.6g}"
+                    if s
+                    else ("leaves" if shown is not None and shown.stable is False else "-"),
                     _percent(row.amplitude_error),
                     _percent(row.omega_error),
                     p.grade if p else "-",
@@ -105,7 +120,9 @@ class Check:
                 )
             )
         if len(lines) == 1:
-            lines.append(("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found"))
+            lines.append(
+                ("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found")
+            )
         widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
         text = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
         text.insert(1, "  ".join("-" * w for w in widths))
@@ -129,7 +146,8 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     resp : DescribingFunctionResponse
         From `ctrl_df.describing_function_response`.
     loop : ct.InterconnectedSystem, optional
-        The loop to simulate; default ``closed_loop(resp.H, resp.block)``. Give the sampled loop to see what sampling does.
+        The loop to simulate; default ``closed_loop(resp.H, resp.block)``. Give the sampled loop to see what
+        sampling does.
     search : bool
         Also search, from simulations of many sizes, for orbits that the prediction missed.
     search_time : float
@@ -138,15 +156,23 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     Returns
     -------
     Check
-        ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or more improper
-        than a PID) rows say ``not tested`` and ``.note`` why.
+        ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or
+        more improper than a PID) rows say ``not tested`` and ``.note`` why.
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    if not hasattr(resp, "limit_cycles"):
+        raise TypeError(
+            f"verify needs the answer of describing_function_response; got {type(resp).__name__}. "
+            "python-control's own result does not keep H and the block."
+        )
     cycles = list(resp.limit_cycles)
     if loop is None:
         try:
-            loop = closed_loop(resp.H, translated(resp.block))
+            block = translated(resp.block)
+            described = resp.family.output if resp.family is not None else None
+            output = described if described in getattr(block, "output_labels", ()) else None
+            loop = closed_loop(_advanced(resp.H, block), block, output=output)
             finder = OrbitFinder(loop)
         except (ValueError, TypeError) as error:
             return Check(tuple(Row(c, None, None, UNTESTED) for c in cycles), [], f"not simulated: {error}")
@@ -177,7 +203,9 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
             rows.append(Row(cycle, None, None, NONE))
             continue
         worst = max(abs(cycle.omega / match.omega - 1), abs(cycle.amplitude / match.amplitude - 1))
-        rows.append(Row(cycle, match, simulated(finder, match), CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED))
+        rows.append(
+            Row(cycle, match, simulated(finder, match), CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED)
+        )
     paired = {id(orbit) for orbit in partner.values()}
     for orbit in orbits:
         if id(orbit) not in paired:
@@ -185,14 +213,38 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     return Check(tuple(rows), orbits, loop=loop)
 
 
+def _advanced(H, block):
+    """Return what a sampled loop of a discrete H around a law without time must run: z H.
+
+    The sampler of `closed_loop` reads the block just before its tick, where the output of a law still answers
+    the sample before; u[k] = H y[k], y[k] = f(u[k]) needs it one sample ahead.
+    """
+    if not isinstance(H, ct.TransferFunction | ct.StateSpace) or not H.isdtime(strict=True):
+        return H
+    if isinstance(block, ct.NonlinearIOSystem) and block.nstates and not isinstance(block, Element):
+        return H
+    ss: Any = ct.ss(H)
+    a, b, c, d = (np.asarray(m, float) for m in (ss.A, ss.B, ss.C, ss.D))
+    if np.any(d):
+        raise ValueError(
+            "H and the block answer each other within one sample (an algebraic loop, D != 0), so the loop "
+            "has no order of steps; give H at least one sample of delay."
+        )
+    return ct.ss(a, b, c @ a, c @ b, ss.dt)
+
+
 def _pairs(cycles, orbits) -> dict[int, Orbit]:
-    """Pair predictions with orbits, nearest first, each once; of equally near ones those that agree on stability."""
+    """Pair predictions with orbits, nearest first, each once; agreeing on stability brings them nearer."""
     near = []
     for cycle in cycles:
         for orbit in orbits:
             if _close(cycle, orbit):
-                distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(np.log(cycle.amplitude / orbit.amplitude))
-                disagree = orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
+                distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(
+                    np.log(cycle.amplitude / orbit.amplitude)
+                )
+                disagree = (
+                    orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
+                )
                 near.append((distance * (2.0 if disagree else 1.0), len(near), cycle, orbit))
     partner: dict[int, Orbit] = {}
     taken: set[int] = set()
@@ -203,13 +255,15 @@ def _pairs(cycles, orbits) -> dict[int, Orbit]:
     return partner
 
 
-def simulated(finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01) -> tuple[float, float] | None:
-    """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves the orbit."""
+def simulated(
+    finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01
+) -> tuple[float, float] | None:
+    """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves."""
     if orbit.stable is False:
         return None
     if orbit.stable is None:
         return orbit.omega, orbit.output_amplitude
-    swings = finder._swings(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps, None)
+    swings = finder.swings.follow(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps)
     if len(swings) < 8:
         return None
     t = np.array([s[0] for s in swings])
@@ -221,7 +275,9 @@ def simulated(finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 
     engine = finder.engine
     spectrum = np.zeros((engine.noutputs, 2), complex)
     period = 2 * np.pi / omega
-    run = engine.run(engine.start(swings[-1][1]), period, rtol=1e-8, max_step=period / 8, spectrum=spectrum, omega=omega)
+    run = engine.run(
+        engine.start(swings[-1][1]), period, rtol=1e-8, max_step=period / 8, spectrum=spectrum, omega=omega
+    )
     amplitude = 2 * abs(spectrum[0, 1]) / period
     if not run.status.ok or not 0.2 < amplitude / orbit.output_amplitude < 5:
         return None
@@ -243,5 +299,3 @@ def _multiplier(orbit) -> str:
 
 def _percent(value) -> str:
     return "-" if np.isnan(value) else f"{100 * value:+.2f} %"
-
-

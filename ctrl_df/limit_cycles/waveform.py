@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
+from ..df.symmetries import find_symmetries
+from ..simulate import layout
 from ..simulate.engine import Engine, harmonic_drive
 
-_ANCHORS = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
-_UNSUITED = {"input_delay", "sensor_delay", "drift", "sensor_quantization"}
+# Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
+_UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)
 _CLOSED = 1e-8  # mismatch after a period, relative to the size of the motion
 RTOL = 1e-9
 
@@ -30,16 +32,12 @@ class WaveformOrbit:
         self.row = list(block.output_labels).index(output)
         self.max_steps = max_steps
         self.core = block.core if isinstance(block, Mechanism) else None
-        ids = {e.id for e in block.effects} if isinstance(block, Mechanism) else set()
-        self.suited = not ids & _UNSUITED
-        self.adrift = self.core is not None and not ids & _ANCHORS
-        n = self.engine.nstates
-        self.transform, self.kept = np.eye(n), np.arange(n)
-        if self.core is not None and self.core.bodies == 2:
-            self.transform[2, 0] = -1.0  # the stretch x_motor - x repeats, the place of both may be free
-        if self.adrift:
-            self.kept = self.kept[1:]
-        self.inverse = np.linalg.inv(self.transform)
+        laws = find_symmetries(self.engine, block)
+        kinds = self.engine.program.nodes[:, layout.KIND]
+        self.suited = laws.autonomous and not np.isin(kinds, _UNSUITED).any()
+        # a free mass may be anywhere, and has no mean position of its own
+        self.adrift = self.core is not None and bool(laws.shifts)
+        self.transform, self.inverse, self.kept = laws.transform, laws.inverse, laws.free
         self.previous = None
 
     def respond(self, U, omega: float):
@@ -183,5 +181,5 @@ class WaveformOrbit:
         Y = spectrum[self.row] * 2 / self.period
         travel = run.outputs[-1, self.row] - run.outputs[0, self.row]
         Y[1:] -= 1j * travel / (np.pi * np.arange(1, count))  # coefficients of the ramp travel t / period
-        Y[0] = 0.0 if self.adrift else Y[0] / 2  # a free mass has no mean position of its own
+        Y[0] = 0.0 if self.adrift else Y[0] / 2
         return Y

@@ -18,6 +18,7 @@ from .family import (
     memoryless,
     set_view,
     short,
+    units,
     view_of,
 )
 
@@ -35,7 +36,10 @@ _ANALYSIS = (
 )
 
 
-def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None, **kwargs) -> ct.ControlPlot:
+_POINT_LABEL = "%5.2g @ %-5.2g"  # python-control's
+
+
+def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **kwargs) -> ct.ControlPlot:
     """Nyquist plot of H with the -1/N curves of the block; crossings carry amplitude and frequency.
 
     Called as ``describing_function_plot(response)`` or ``describing_function_plot(H, F, A[, omega])``; the
@@ -49,7 +53,8 @@ def describing_function_plot(*sysdata, point_label="%5.2g @ %-5.2g", label=None,
     *sysdata
         A response, or H, F, A and optionally omega.
     point_label : str or None
-        Format of the crossings' labels, two numbers: amplitude and frequency. None: no labels.
+        Format of the crossings' labels, two numbers: amplitude and frequency. None: no labels. The default is
+        python-control's, for a mechanism with units and more digits.
     label : str, False or None
         Name of the Nyquist curve.
     ax, title
@@ -124,7 +129,8 @@ def _family_picture(response, point_label, label, kwargs):
     seen = (w >= family.omega.min() * (1 - 1e-9)) & (w <= family.omega.max() * (1 + 1e-9))
     curve = np.asarray(H.response)[seen]
     include = response.positions or ()
-    set_view(ax, view_of(np.concatenate([family.minus_inverse.ravel(), curve]), include))
+    z = family.minus_inverse.ravel()
+    set_view(ax, view_of(z if include else np.concatenate([z, curve]), include))
     solid, dashed = draw_curves(ax, family)
     lines = np.empty(2, dtype=object)
     options = {"color": NYQUIST_COLOR, "lw": 2.2, "label": label or None, **kwargs}
@@ -132,7 +138,7 @@ def _family_picture(response, point_label, label, kwargs):
     lines[1] = solid + dashed
     _name_curve(ax, curve, label if isinstance(label, str) else "H(jω)")
     _mark(ax, response, point_label)
-    finish(ax, _title(response) if title is None else title)
+    finish(ax, _title(response) if title is None else title, units(family)[2])
     return ct.ControlPlot(lines, np.array([[ax]]), fig)
 
 
@@ -154,16 +160,20 @@ def _name_curve(ax, curve, name):
 
 def _mark(ax, response, point_label):
     """Mark the crossings: filled where Loeb calls the cycle stable, open otherwise."""
+    force = units(response.family)[0]
+    if force and point_label == _POINT_LABEL:
+        point_label = f"%.4g{force} @ %.4g rad/s"
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    taken: list[tuple[float, float]] = []
-    for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
+    places = [
+        ((p.real - left) / (right - left), (p.imag - bottom) / (top - bottom)) for p in response.positions
+    ]
+    for (x, y), position, cycle in zip(places, response.positions, response.limit_cycles, strict=True):
         fill = CROSSING_COLOR if cycle.stable else "white"
         ax.plot(position.real, position.imag, "o", ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
         if not point_label:
             continue
-        x, y = (position.real - left) / (right - left), (position.imag - bottom) / (top - bottom)
-        shift = -14 if any(abs(x - u) < 0.25 and abs(y - v) < 0.06 for u, v in taken) else 6
-        taken.append((x, y))
+        # of two that lie together the lower one's label goes below
+        shift = -16 if any(abs(x - u) < 0.25 and 0 < v - y < 0.1 for u, v in places) else 6
         aside = (-8, "right") if x > 0.72 else (8, "left")
         ax.annotate(
             (point_label % (cycle.amplitude, cycle.omega)).strip(),

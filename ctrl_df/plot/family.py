@@ -9,6 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import ticker
 
+from ..blocks.mechanism import Mechanism
+
 AMPLITUDE_COLOR, OMEGA_COLOR, NYQUIST_COLOR, CROSSING_COLOR = "#1f5a99", "#b3541e", "#222222", "#a3123a"
 _HARMONIC_STYLES = (("-", "o"), ("--", "s"), ("-", "^"), ("--", "v"), ("-.", "D"), (":", "x"))
 
@@ -43,7 +45,7 @@ def plot_family(family, *, ax=None, title=None, amplitudes=5, frequencies=5, **k
     else:
         set_view(ax, view_of(family.minus_inverse))
         lines[0], lines[1] = draw_curves(ax, family, amplitudes, frequencies, **kwargs)
-    finish(ax, title or f"-1/N of {short(family.description)}")
+    finish(ax, title or f"-1/N of {short(family.description)}", units(family)[2])
     return ct.ControlPlot(lines, np.array([[ax]]), fig)
 
 
@@ -70,6 +72,7 @@ def plot_harmonics(
     ControlPlot
     """
     orders = [k for k in (orders or range(1, 6)) if k <= family.orders]
+    force, gain, _ = units(family)
     i = _nearest(family.amplitudes, amplitude)
     k = _nearest(family.omega, omega)
     over_w, over_a = family.omega.size > 1 and not memoryless(family), family.amplitudes.size > 1
@@ -83,14 +86,15 @@ def plot_harmonics(
     lines = np.empty((1, axes.size), dtype=object)
     for j, panel in enumerate(panels):
         if panel == "omega":
-            x, y, where = family.omega, np.abs(family.harmonics[i]), f"A = {family.amplitudes[i]:.3g}"
+            x, y = family.omega, np.abs(family.harmonics[i])
+            where = f"A = {family.amplitudes[i]:.3g}{force}"
             axes[j].set_xlabel(r"$\omega$ [rad/s]")
         else:
             at = "" if memoryless(family) else rf"$\omega$ = {family.omega[k]:.3g} rad/s"
             x, y, where = family.amplitudes, np.abs(family.harmonics[:, k]), at
-            axes[j].set_xlabel("input amplitude A")
+            axes[j].set_xlabel(f"input amplitude A{in_brackets(force)}")
         lines[0, j] = _draw_harmonics(axes[j], x, y, orders, where, kwargs)
-    axes[0].set_ylabel(r"$|Y_k|\,/\,A$")
+    axes[0].set_ylabel(r"$|Y_k|\,/\,A$" + in_brackets(gain))
     fig.suptitle(title or f"Harmonic content of {short(family.description)}", fontsize=10)
     return ct.ControlPlot(lines, axes.reshape(1, -1), fig)
 
@@ -111,17 +115,36 @@ def _draw_harmonics(ax, x, y, orders, where, kwargs):
         drawn += ax.loglog(x, values, **options)
         last = np.nonzero(live)[0][-1]
         places.append((k, x[last], values[last], shade))
-    for k, px, py, shade in places:
-        ax.annotate(
-            f"{k}", (px, py), xytext=(5, 0), textcoords="offset points", color=shade, va="center", fontsize=9
-        )
-    note = where + (f"\nharmonics {', '.join(map(str, silent))}: none" if silent else "")
-    ax.text(0.03, 0.04, note, transform=ax.transAxes, fontsize=8.5, color="0.3", va="bottom")
+    none = f"harmonics {', '.join(map(str, silent))}: none" if silent else ""
+    note = ", ".join(text for text in (where, none) if text)
+    ax.set_title(note, loc="left", fontsize=8.5, color="0.3")
     ax.grid(True, which="major", color="0.9", lw=0.7)
     ax.margins(x=0.08)
     log_ticks(ax.xaxis, x.min(), x.max())
     _plain_spines(ax)
+    _end_names(ax, places)
     return drawn
+
+
+def _end_names(ax, places, apart=8.0):
+    """Write each curve's order at its end, names at one place moved apart (in points)."""
+    ax.figure.draw_without_rendering()  # a constrained layout moves the axes
+    points = 72.0 / ax.figure.dpi
+    written: list[tuple[float, float]] = []
+    for k, x, y, shade in sorted(places, key=lambda place: place[2]):
+        across, up = points * ax.transData.transform((x, y))
+        near = [at for over, at in written if abs(over - across) < apart]
+        lifted = max([up, *(at + apart for at in near)])
+        written.append((across, lifted))
+        ax.annotate(
+            f"{k}",
+            (x, y),
+            xytext=(5, lifted - up),
+            textcoords="offset points",
+            color=shade,
+            va="center",
+            fontsize=9,
+        )
 
 
 # --- shared with the Nyquist picture ------------------------------------------------------------------------
@@ -132,6 +155,19 @@ def memoryless(family) -> bool:
     first, N = family.N[:, :1], family.N
     same = np.isclose(N, first, rtol=1e-12, atol=0, equal_nan=True)
     return bool(N.shape[1] == 1 or same.all())
+
+
+def units(family) -> tuple[str, str, str]:
+    """Units of A, of N and of -1/N, each with a space before it; empty where the block does not tell."""
+    if not isinstance(family.block, Mechanism):
+        return "", "", ""
+    motion = "m/s" if family.output.startswith("v") else "m"
+    return " N", f" {motion}/N" if motion == "m" else " m/(N s)", " N/m" if motion == "m" else " N s/m"
+
+
+def in_brackets(unit) -> str:
+    """Return `` [unit]``, or nothing."""
+    return f" [{unit.strip()}]" if unit else ""
 
 
 def axes_for(ax):
@@ -146,14 +182,18 @@ def axes_for(ax):
 
 
 def view_of(values, include=()) -> tuple[float, float, float, float]:
-    """Limits (left, right, bottom, top) that show the bulk of complex values, and all of `include`."""
+    """Limits (left, right, bottom, top) that show the bulk of complex values.
+
+    With `include` they show its surroundings, as far as values lie there.
+    """
     z = np.asarray(values).ravel()
     z = z[np.isfinite(z)]
     include = np.asarray(list(include), dtype=complex)
     if include.size:
-        size = 0.75 * np.abs(include).max()
-        low = complex(min(np.real(include)) - size, min(np.imag(include)) - size)
-        high = complex(max(np.real(include)) + size, max(np.imag(include)) + size)
+        (left, right), (bottom, top) = (
+            _around(part(z), part(include), include) for part in (np.real, np.imag)
+        )
+        low, high = complex(left, bottom), complex(right, top)
     elif z.size:
         reach = np.quantile(np.abs(z), 0.8)
         z = z[np.abs(z) <= reach * 1.001]
@@ -166,6 +206,16 @@ def view_of(values, include=()) -> tuple[float, float, float, float]:
     height, width = max(height, 0.25 * width), max(width, 0.25 * height)
     mid_x, mid_y = 0.5 * (left + right), 0.5 * (bottom + top)
     return mid_x - 0.58 * width, mid_x + 0.58 * width, mid_y - 0.58 * height, mid_y + 0.58 * height
+
+
+def _around(values, include, places):
+    """Bounds about `include` that leave out what holds no values; the sizes of `places` set the margins."""
+    size = 0.75 * np.abs(places).max()
+    some = np.concatenate([values[np.abs(values - include[0]) <= 3 * size], include])
+    spare = 0.25 * size
+    low = max(include.min() - size, some.min() - spare)
+    high = min(include.max() + size, some.max() + spare)
+    return low, high
 
 
 def set_view(ax, view):
@@ -200,28 +250,25 @@ def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):
         options = {"color": AMPLITUDE_COLOR, "lw": 1.1, "alpha": 0.9, **kwargs}
         curve = unbroken(z[i], family.regime[i])
         solid += ax.plot(np.real(curve), np.imag(curve), **options)
-        _end_label(ax, z[i], f"{'A = ' if n == 0 else ''}{family.amplitudes[i]:.3g}", AMPLITUDE_COLOR, taken)
+        text = (
+            f"A = {family.amplitudes[i]:.3g}{units(family)[0]}" if n == 0 else f"{family.amplitudes[i]:.3g}"
+        )
+        _end_label(ax, z[i], text, AMPLITUDE_COLOR, taken)
     for n, k in enumerate(columns):
         options = {"color": OMEGA_COLOR, "lw": 1.1, "ls": (0, (4, 2)), "alpha": 0.9, **kwargs}
         curve = unbroken(z[:, k], family.regime[:, k])
         dashed += ax.plot(np.real(curve), np.imag(curve), **options)
-        _end_label(
-            ax,
-            z[:, k],
-            f"{'ω = ' if n == 0 else ''}{family.omega[k]:.3g}",
-            OMEGA_COLOR,
-            taken,
-            from_start=True,
-        )
+        text = f"ω = {family.omega[k]:.3g} rad/s" if n == 0 else f"{family.omega[k]:.3g}"
+        _end_label(ax, z[:, k], text, OMEGA_COLOR, taken, from_start=True)
     return solid, dashed
 
 
-def finish(ax, title):
-    """Axes through the origin, labels and title."""
+def finish(ax, title, unit=""):
+    """Axes through the origin, labels and title; `unit` that of -1/N."""
     ax.axhline(0, color="0.75", lw=0.8, zorder=0)
     ax.axvline(0, color="0.75", lw=0.8, zorder=0)
-    ax.set_xlabel("Real part")
-    ax.set_ylabel("Imaginary part")
+    ax.set_xlabel(f"Real part{in_brackets(unit)}")
+    ax.set_ylabel(f"Imaginary part{in_brackets(unit)}")
     ax.set_title(title, fontsize=10)
     _plain_spines(ax)
 
@@ -236,10 +283,13 @@ def short(text: str, most=46) -> str:
 
 def unbroken(curve, regime):
     """Cut a curve (by NaN) where it jumps between different motions: no motion lies on the line between."""
+    if curve.size < 2:
+        return curve.astype(complex)
     step = np.abs(np.diff(curve))
     size = np.maximum(np.abs(curve[1:]), np.abs(curve[:-1]))
+    usual = np.median(step[np.isfinite(step)]) if np.isfinite(step).any() else np.inf
     with np.errstate(invalid="ignore"):
-        jump = (step > 4 * np.nanmedian(step)) & (step > 0.25 * size) & (regime[1:] != regime[:-1])
+        jump = (step > 4 * usual) & (step > 0.25 * size) & (regime[1:] != regime[:-1])
     return np.insert(curve.astype(complex), np.nonzero(jump)[0] + 1, np.nan)
 
 
@@ -284,9 +334,11 @@ def _label(ax, place, text, color, taken, offset=(3, 3)) -> bool:
     x, y = (place.real - left) / (right - left), (place.imag - bottom) / (top - bottom)
     if not (0.01 < x < 0.93 and 0.01 < y < 0.96):
         return False
-    if any(abs(x - u) < 0.10 and abs(y - v) < 0.05 for u, v in taken):
+    box = ax.get_position()
+    wide = 5.5 * len(text) / (72 * ax.figure.get_figwidth() * box.width)  # of the axes; 5.5 points a letter
+    if any(x < end and start < x + wide and abs(y - v) < 0.05 for start, end, v in taken):
         return False
-    taken.append((x, y))
+    taken.append((x, x + wide, y))
     ax.annotate(
         text,
         (place.real, place.imag),

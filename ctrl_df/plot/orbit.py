@@ -1,4 +1,4 @@
-"""One period of an exact limit cycle: output and force over time, and the phase portrait."""
+"""One period of an exact limit cycle: output and block input over time, and the phase portrait."""
 
 from __future__ import annotations
 
@@ -6,11 +6,17 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..blocks.mechanism import Mechanism
+
 _MARKS = {"impact": "x", "stick": "s", "breakaway": "o", "reversal": "|", "contact": "v", "release": "^"}
+_SMALL = 0.1  # [m]: below it lengths are drawn in millimetres
 
 
 def orbit_plot(orbit, *, ax=None, title=None, **line) -> ct.ControlPlot:
-    """Draw an `Orbit`: output and block input over one period with the events marked, and output against its rate.
+    """Draw an `Orbit`: output and block input over one period, events marked, and the phase portrait.
+
+    The portrait shows a mechanism's output against its rate; of an element, whose output may jump, the input
+    and its rate.
 
     Parameters
     ----------
@@ -33,32 +39,57 @@ def orbit_plot(orbit, *, ax=None, title=None, **line) -> ct.ControlPlot:
         figure = axes[0].figure
     style = {"color": "k", "lw": 1.5, **line}
     names = list(getattr(orbit.loop, "output_labels", ["x", "F"]))
+    scale, length, force = _units(orbit, names)
+    output, drive = scale * orbit.outputs[0], orbit.outputs[-1]
     drawn = []
-    for axis, row, unit in ((axes[0], 0, "m"), (axes[1], -1, "N")):
-        y = orbit.outputs[row]
+    for axis, y, name, unit in ((axes[0], output, names[0], length), (axes[1], drive, names[-1], force)):
         drawn.append(axis.plot(orbit.time, y, **style))
-        axis.set_ylabel(f"{names[row]} [{unit}]" if hasattr(orbit.loop, "parts") else names[row])
+        axis.set_ylabel(name + (f" [{unit}]" if unit else ""))
         axis.axhline(0, color="0.8", lw=0.8, zorder=0)
         axis.grid(False)
-        seen = set()
-        for event in orbit.events:
-            mark = _MARKS.get(event.kind)
-            if mark is None:
-                continue
-            label = event.kind if event.kind not in seen else None
-            seen.add(event.kind)
-            axis.plot(event.time, np.interp(event.time, orbit.time, y), mark, color="0.35", ms=5, label=label)
+    _mark(axes[0], orbit, output, _MARKS)
+    _mark(axes[1], orbit, drive, {kind: mark for kind, mark in _MARKS.items() if kind != "impact"})
     axes[0].tick_params(labelbottom=False)
     axes[1].set_xlabel("time [s]")
-    if orbit.events and axes[0].get_legend_handles_labels()[1]:
-        axes[0].legend(frameon=False, fontsize="small", ncols=3, loc="upper right")
-    x = orbit.outputs[0]
+    if axes[0].get_legend_handles_labels()[1]:
+        axes[0].legend(
+            frameon=False,
+            fontsize="small",
+            ncols=4,
+            loc="lower left",
+            bbox_to_anchor=(0, 0.98),
+            borderpad=0.1,
+        )
+    mechanical = bool(force)
+    x, name, unit = (output, names[0], length) if mechanical else (drive, names[-1], "")
     drawn.append(axes[2].plot(x, np.gradient(x, orbit.time), **style))
-    axes[2].set_xlabel(f"{names[0]} [m]")
-    axes[2].set_ylabel(f"d{names[0]}/dt [m/s]")
+    axes[2].set_xlabel(name + (f" [{unit}]" if unit else ""))
+    axes[2].set_ylabel(f"d{name}/dt" + (f" [{unit}/s]" if unit else " [1/s]"))
     axes[2].locator_params(nbins=5)
     if title is None:
         kind = {True: "stable", False: "unstable", None: "irregular"}[orbit.stable]
-        title = f"{kind} limit cycle, {orbit.omega:.5g} rad/s, fundamental {orbit.output_amplitude:.4g} m"
+        size = f"{scale * orbit.output_amplitude:.4g} {length}".strip()
+        title = f"{kind} limit cycle, {orbit.omega:.5g} rad/s, fundamental of {names[0]} {size}"
     figure.suptitle(title, fontsize="medium")
     return ct.ControlPlot(np.array(drawn, dtype=object), np.array(axes), figure)
+
+
+def _units(orbit, names) -> tuple[float, str, str]:
+    """Scale and unit of the output, unit of the input; none where the block is no mechanism."""
+    parts = getattr(orbit.loop, "parts", None)
+    if parts is None or not isinstance(parts.block, Mechanism):
+        return 1.0, "", ""
+    suffix = "/s" if names[0].startswith("v") else ""
+    small = np.max(np.abs(orbit.outputs[0])) < _SMALL
+    return (1e3, "mm" + suffix, "N") if small else (1.0, "m" + suffix, "N")
+
+
+def _mark(axis, orbit, y, marks):
+    """Mark the events on a curve, each kind named once."""
+    seen = set()
+    for event in orbit.events:
+        if event.kind in marks:
+            label = event.kind if event.kind not in seen else None
+            seen.add(event.kind)
+            place = np.interp(event.time, orbit.time, y)
+            axis.plot(event.time, place, marks[event.kind], color="0.35", ms=5, label=label)

@@ -1,0 +1,81 @@
+"""N at scattered pairs (A, omega), grouped so that methods that like grids see grids."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .dispatch import Method
+
+_RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
+
+
+def points(method: Method, A, omega, zero_check=False):
+    """N, regime and residual at pairs (A, omega), grouped so that grid solvers see grids.
+
+    Parameters
+    ----------
+    method : Method
+    A, omega : ndarray of one shape; omega may be None for a memoryless block
+    zero_check : bool
+        As in `describing_function`.
+
+    Returns
+    -------
+    N : ndarray of complex
+    regime : ndarray of str
+    residual : ndarray
+    """
+    N, regime, residual = (
+        np.empty(A.shape, dtype=complex),
+        np.full(A.shape, "", dtype="U24"),
+        np.zeros(A.shape),
+    )
+    flat, names, errors, a = N.reshape(-1), regime.reshape(-1), residual.reshape(-1), A.reshape(-1)
+    zero = a == 0
+    if zero.any():
+        flat[zero] = _slope_at_zero(method, a.max(), zero_check)
+    live = np.nonzero(~zero)[0]
+    if not live.size:
+        return N, regime, residual
+    levels, row = np.unique(a[live], return_inverse=True)
+    if not method.needs_omega or omega is None:
+        y, kind, error = method.harmonics(levels, None, 1)
+        flat[live], names[live], errors[live] = y[row, 0, 1], kind[row, 0], error[row, 0]
+        return N, regime, residual
+    w = omega.reshape(-1)[live]
+    frequencies, column = np.unique(w, return_inverse=True)
+    if levels.size * frequencies.size <= _RECTANGLE * live.size:
+        y, kind, error = method.harmonics(levels, frequencies, 1)
+        flat[live], names[live] = y[row, column, 1], kind[row, column]
+        errors[live] = error[row, column]
+        return N, regime, residual
+    for k, frequency in enumerate(frequencies):
+        mine = np.nonzero(column == k)[0]
+        some, where = np.unique(row[mine], return_inverse=True)
+        y, kind, error = method.harmonics(levels[some], np.array([frequency]), 1)
+        flat[live[mine]], names[live[mine]] = y[where, 0, 1], kind[where, 0]
+        errors[live[mine]] = error[where, 0]
+    return N, regime, residual
+
+
+def _slope_at_zero(method, largest, zero_check):
+    """Limit of N for A -> 0: the slope at the origin, infinite across a jump."""
+    if method.needs_omega:
+        raise ValueError(
+            "a dynamic block has no describing function at A = 0; got A=0. Leave zero out, or use "
+            "ct.linearize."
+        )
+    if method.own_method is not None:
+        return complex(method.own_method(0.0))
+    if zero_check and method.name != "element":
+        at_zero = np.squeeze(np.asarray(method.subject(0.0), dtype=float))
+        if at_zero != 0:
+            raise ValueError(
+                f"function must evaluate to zero at zero; got f(0) = {at_zero}. "
+                "Subtract the bias, or pass zero_check=False."
+            )
+    small = (largest or 1.0) * np.array([1e-9, 1e-8])
+    N = method.harmonics(small, None, 1)[0][:, 0, 1]
+    if abs(N[0]) > 5 * abs(N[1]):
+        return complex(np.inf)
+    return N[0] if abs(N[0]) > 1e-13 else 0j

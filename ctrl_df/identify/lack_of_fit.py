@@ -1,0 +1,217 @@
+"""What a fitted model still misses, by free forces: over time, place, speed, load, after reversals, at one frequency.
+
+Each kind adds forces of no particular law (bumps along the record, along the stroke, ...). Their effect on the
+output is simulated, what the model's own parameters and initial states could do is projected out, and the
+residual is regressed on the rest, whitened. A kind that explains more than chance tells that something is
+missing, and where.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .equivalence import whitener
+from .residual_tests import NoiseModel
+from .simulator import Simulator
+from .trial import Data, Trial
+
+# Amplitude of a test force over the rms of the force: linear still, and far above rounding.
+_SMALL = 3e-3
+
+
+@dataclass(frozen=True)
+class Lack:
+    """Forces of one kind, fitted to a residual.
+
+    Attributes
+    ----------
+    kind : str
+        As in `ctrl_df.identify.where`: time, position, low_speed, load, after_reversal, frequency.
+    evidence : float
+        Log likelihood ratio [nats] less the price of the free forces (Schwarz).
+    rms : float
+        Of the output these forces explain, and the model does not [output unit].
+    span : (float, float)
+        Where the force found is largest, in the unit of the kind.
+    sentence : str
+    """
+
+    kind: str
+    evidence: float
+    rms: float
+    span: tuple[float, float]
+    sentence: str
+
+
+def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
+    """Return every kind of free force with what it explains, the most telling first."""
+    tangent = tried.train.tangent
+    if tangent is None:
+        return []
+    scene = _Scene(tried, data)
+    residual = tangent.project(tried.train.residual)
+    tables = []
+    for kind, shapes, spans in scene.kinds():
+        columns = [tangent.project(r) for r in map(scene.response, shapes)]
+        alive = [
+            i for i, c in enumerate(columns) if np.linalg.norm(c) > 1e-9 * scene.scale * math.sqrt(len(c))
+        ]
+        if alive:
+            matrix = np.array([columns[i] for i in alive]).T
+            tables.append((kind, matrix, [spans[i % len(spans)] for i in alive]))
+    found = [_regressed(k, m, s, residual, noise) for k, m, s in tables]
+    if found:
+        # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
+        _, explained = max(found, key=lambda f: f[0].evidence)
+        noise = whitener([residual - explained])
+        found = [_regressed(k, m, s, residual, noise) for k, m, s in tables]
+    return sorted((f[0] for f in found), key=lambda f: -f.evidence)
+
+
+def _regressed(kind, matrix, spans, residual, noise) -> tuple[Lack, np.ndarray]:
+    """Fit forces of one kind; return what they tell and the output they explain."""
+    white = noise.whiten(residual)[noise.order :]
+    filtered = np.array([noise.whiten(c)[noise.order :] for c in matrix.T]).T
+    weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
+    left = white - filtered @ weights
+    # a frequency is found by looking at many
+    extra, count = matrix.shape[1] + (2 if kind == "frequency" else 0), len(white)
+    gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
+    explained = matrix @ weights
+    span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
+    rms = math.sqrt(float(explained @ explained) / len(explained))
+    return Lack(kind, gain, rms, span, _SENTENCES[kind].format(*span)), explained
+
+
+_SENTENCES = {
+    "time": "a force that changes along the record, most between {0:.3g} and {1:.3g} s",
+    "position": "a force bound to the place, most between {0:.3g} and {1:.3g} m",
+    "low_speed": "a force over speed of a shape not in the library, most between {0:.3g} and {1:.3g} m/s",
+    "load": "a force that goes with the load, most between {0:.3g} and {1:.3g} N",
+    "after_reversal": "a force that builds up after each reversal, over {1:.3g} m",
+    "frequency": "a force at one frequency, {0:.4g} Hz",
+}
+
+
+class _Scene:
+    """The motion the model makes, and its answer to small forces."""
+
+    def __init__(self, tried, data):
+        self.view, self.data = data.train, data
+        self.fit = tried.train
+        self.scale = data.scales.position
+        self.size = _SMALL * data.scales.force
+        self.motion = [
+            _motion(r, w, y)
+            for r, w, y in zip(self.view.records, self.view.windows, tried.train.simulated, strict=True)
+        ]
+
+    def response(self, shape) -> list[np.ndarray]:
+        """Return the change of output by a force; `shape` gives it (n,) for one record's motion, of order one."""
+        changes = []
+        for record, windows, start, y, motion in zip(
+            self.view.records,
+            self.view.windows,
+            self.fit.starts,
+            self.fit.simulated,
+            self.motion,
+            strict=True,
+        ):
+            force = record.u + self.size * shape(motion)
+            simulator = Simulator(self.fit.model, record, thin=self.data.thin, force=force)
+            changes.append((simulator.run(windows, None, start) - y) / self.size)
+        return changes
+
+    def kinds(self):
+        """Yield (kind, shapes, spans of the shapes)."""
+        every = {k: np.concatenate([m[k] for m in self.motion]) for k in ("t", "x", "v", "u")}
+        middles, width = _grid(every["t"], 0.0, 8)
+        bumps = [_bump("t", m, width) for m in middles]
+        shapes = bumps + [_times(b, _direction) for b in bumps] + [_times(b, _acceleration) for b in bumps]
+        yield "time", shapes, _spans(middles, width)
+        middles, width = _grid(every["x"], 0.005, 12)
+        bumps = [_bump("x", m, width) for m in middles]
+        yield "position", bumps + [_times(b, _direction) for b in bumps], _spans(middles, width)
+        middles, width = _grid(every["v"], 0.01, 12)
+        yield "low_speed", [_bump("v", m, width) for m in middles], _spans(middles, width)
+        middles, width = _grid(every["u"], 0.01, 8)
+        bumps = [_bump("u", m, width) for m in middles]
+        yield "load", bumps + [_times(b, _direction) for b in bumps], _spans(middles, width)
+        lengths = [f * self.scale for f in (0.03, 0.1, 0.3, 1.0)]
+        yield "after_reversal", [_since(n) for n in lengths], [(0.0, n) for n in lengths]
+        line = self._line()
+        yield "frequency", [_wave(line, math.cos), _wave(line, math.sin)], [(line, line)]
+
+    def _line(self) -> float:
+        """Return the frequency [Hz] at which the residual's acceleration stands out most from its neighbours."""
+        from scipy.ndimage import median_filter
+
+        i = int(np.argmax([len(e) for e in self.fit.residual]))
+        e, t = self.fit.residual[i], self.motion[i]["t"]
+        dt = float(np.median(np.diff(t)))
+        # fine enough that a line between two bins is not lost
+        power = np.abs(np.fft.rfft(np.diff(e, 2) * np.hanning(len(e) - 2), 4 * len(e))) ** 2
+        ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
+        ratio[:12] = 0.0
+        return float(np.argmax(ratio)) / (4 * len(e) * dt)
+
+
+def _motion(record, windows, y):
+    inside = windows.samples
+    x = np.array(record.y, dtype=float)
+    x[inside] = y
+    v = np.gradient(_smooth(x), record.t)
+    a = np.gradient(_smooth(v), record.t)
+    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": np.asarray(record.u)}
+
+
+def _smooth(x, reach=2):
+    kernel = np.ones(2 * reach + 1) / (2 * reach + 1)
+    return np.convolve(np.pad(x, reach, mode="edge"), kernel, mode="valid")
+
+
+def _grid(values, tail, count):
+    low, high = np.quantile(values, (tail, 1 - tail))
+    middles = np.linspace(low, high, count)
+    return middles, float(middles[1] - middles[0])
+
+
+def _spans(middles, width):
+    return [(float(m - width), float(m + width)) for m in middles]
+
+
+def _bump(name, middle, width):
+    return lambda m: np.clip(1 - np.abs(m[name] - middle) / width, 0, None)
+
+
+def _times(first, second):
+    return lambda m: first(m) * second(m)
+
+
+def _direction(m):
+    slow = 0.05 * float(np.sqrt(np.mean(m["v"] ** 2))) + 1e-300
+    return np.tanh(m["v"] / slow)
+
+
+def _acceleration(m):
+    return m["a"] / (float(np.sqrt(np.mean(m["a"] ** 2))) + 1e-300)
+
+
+def _since(length):
+    def shape(m):
+        direction, x = np.sign(m["v"]), m["x"]
+        turn = np.flatnonzero(np.diff(direction) != 0) + 1
+        last = np.zeros(len(x), int)
+        last[turn] = turn
+        last = np.maximum.accumulate(last)
+        return direction * np.exp(-np.abs(x - x[last]) / length)
+
+    return shape
+
+
+def _wave(frequency, function):
+    phase = np.vectorize(function, otypes=[float])
+    return lambda m: phase(2 * math.pi * frequency * m["t"])

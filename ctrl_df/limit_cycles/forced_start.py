@@ -1,0 +1,99 @@
+"""Where a prediction starts the search for its orbit: the loop as its block's forced motion would have it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..df.describing import describing_function
+from ..simulate.engine import Engine, harmonic_drive
+
+_PERIODS = 40  # of forced motion before it is measured
+
+
+def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None) -> np.ndarray:
+    """State of a loop at t = 0 when its block is driven by ``amplitude cos(omega t)``.
+
+    Parameters
+    ----------
+    loop : ct.InterconnectedSystem
+        From `closed_loop`.
+    amplitude : float or array of complex
+        Peak value at the block's input, or its Fourier coefficients U_k, k = 0, 1, ...
+    omega : float
+        [rad/s].
+    output_amplitude : float, optional
+        Of several coexisting motions the one nearest to it is taken; default the largest.
+
+    Raises
+    ------
+    ValueError
+        The loop does not tell its controller and block apart.
+    """
+    if getattr(loop, "parts", None) is None:
+        raise ValueError(
+            "a guess of amplitude and frequency needs a loop made by closed_loop; "
+            "give a state instead, or no guess."
+        )
+    U = np.array([0.0, amplitude], complex) if np.ndim(amplitude) == 0 else np.asarray(amplitude, complex)
+    x_block, Y = _forced_motion(loop, U, omega, output_amplitude)
+    controller = loop.syslist[0]
+    nc = controller.nstates or 0
+    x_control = np.zeros(nc)
+    if nc and isinstance(controller, ct.StateSpace):
+        a, b = np.asarray(controller.A), np.asarray(controller.B)
+        for k in range(1, len(Y)):
+            inputs = np.array([-Y[k], 1j * k * omega * Y[k]])[: controller.ninputs]
+            x_control = x_control + np.real(np.linalg.solve(1j * k * omega * np.eye(nc) - a, b @ inputs))
+    return np.concatenate([x_control, x_block])
+
+
+def _forced_motion(loop, U, omega, wanted):
+    """State of the block alone at t = 0 under the guessed input, its mean position removed, and its Y_k."""
+    block, amplitude = loop.parts.block, abs(U[1])
+    if not block.nstates:
+        return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])
+    engine = Engine(block)
+    core = getattr(block, "core", None)
+    row = list(block.output_labels).index(loop.output_labels[0])
+    starts = [np.zeros(engine.nstates)]
+    if core is not None:
+        # the bare mass moves with v = (a / m w) sin wt: at rest at t = 0
+        reach = amplitude / (sum(core.masses) * omega**2)
+        starts[0][0] = -reach
+        if core.bodies == 2:
+            starts[0][2] = -reach
+            for stretch, speed in ((0.1, 0.0), (0.5, 3.0), (0.5, -3.0)):
+                x = starts[0].copy()
+                x[2] += stretch * core.gap
+                x[3] = speed * core.gap * omega
+                x[1] = (
+                    -core.masses[1] / core.masses[0] * x[3]
+                )  # no net momentum: the pair must not drift away
+                starts.append(x)
+    found = [_forced_from(engine, core, row, x, U, omega) for x in starts]
+    if wanted is not None:
+        return min(found, key=lambda f: abs(abs(f[1][1]) - wanted))
+    return max(found, key=lambda f: abs(f[1][1]))
+
+
+def _forced_from(engine, core, row, x0, U, omega):
+    drive, period = harmonic_drive([U], omega), 2 * np.pi / omega
+    options = dict(rtol=1e-8, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=400_000)
+    state = engine.run(engine.start(x0), _PERIODS * period, drive, **options).state
+    if not np.all(np.isfinite(state.x)):
+        return np.zeros(engine.nstates), np.zeros(2, complex)
+    state.time, state.fresh = 0.0, True
+    spectrum = np.zeros((engine.noutputs, len(U)), complex)
+    ends = np.array([0.0, period])
+    run = engine.run(state, period, drive, ends, spectrum=spectrum, omega=omega, **options)
+    x, Y = run.state.x.copy(), 2 * spectrum[row] / period
+    drift = run.outputs[-1, row] - run.outputs[0, row]
+    k = np.arange(1, len(U))
+    Y[1:] -= 1j * drift / (np.pi * k)
+    if core is not None:
+        mean, travel = 2 * spectrum[0, 0].real / period / 2, run.outputs[-1, 0] - run.outputs[0, 0]
+        x[: 2 * core.bodies : 2] -= mean + travel / 2
+    return x, Y

@@ -1,0 +1,61 @@
+"""python-control's Nyquist response of H, for plots and for whoever reads ``.response``."""
+
+from __future__ import annotations
+
+import warnings
+
+import control as ct
+import numpy as np
+
+from .linear import LinearPart
+from .scan_grid import refined_omega
+
+
+def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
+    """Return the Nyquist response of H over `omega`, or over python-control's own choice.
+
+    Parameters
+    ----------
+    linear : LinearPart
+    omega : array_like or None
+        As in `describing_function_response`.
+    warn : bool or None
+        Whether the contour may warn; None: only if `omega` is None.
+    check : bool
+        Whether unknown keywords are refused.
+    kwargs : dict
+        Further keywords of ``ct.nyquist_response``.
+    """
+    if warn is None:
+        warn = omega is None
+    H = linear.H
+    if linear.measured:
+        own = np.asarray(H.omega)
+        w = own if omega is None else linear.grid(omega, 500)
+        # python-control evaluates points along j omega only; a sampled H gets its circle afterwards
+        H = ct.frd(linear(w[w > 0]), w[w > 0], name=H.name)
+        omega, warn = None, False
+    elif isinstance(omega, list | tuple) and len(omega) == 2:
+        omega = linear.grid(omega, 1000)
+    elif omega is not None:
+        omega = linear.grid(np.asarray(omega, dtype=float).reshape(-1))
+        omega = refined_omega(linear, omega, most=1000)  # the drawn curve passes through the crossings
+    if omega is None and not linear.proper:  # its contour never closes: draw what is scanned
+        omega, warn = linear.grid(), False
+    with warnings.catch_warnings():
+        if not warn:
+            warnings.simplefilter("ignore")
+        response = ct.nyquist_response(
+            H, omega, warn_encirclements=warn, warn_nyquist=warn, _check_kwargs=check, **_rest(kwargs, check)
+        )
+    if linear.measured and linear.dt:
+        response.contour, response.dt = np.exp(np.asarray(response.contour) * linear.dt), linear.H.dt
+    return response
+
+
+def _rest(kwargs, check):
+    known = {"omega_limits", "omega_num", "return_contour", "_kwargs"}
+    unknown = [k for k in kwargs if k not in known and not k.startswith(("indent_", "encirclement_"))]
+    if check and unknown:
+        raise TypeError(f"unrecognized keywords: {', '.join(unknown)}")
+    return kwargs

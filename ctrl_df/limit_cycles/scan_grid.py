@@ -1,0 +1,102 @@
+"""The grid on which 1 + N H is searched: the family's, finer where that costs little or H varies fast."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..df.dispatch import Method
+from ..df.family import Family
+from ..df.points import points
+from .linear import LinearPart
+
+FAST = ("element", "law", "rate", "linear", "friction")
+_NOISE = 1e-6  # spread of an average from which N jumps from point to point
+
+
+def defect(method: Method, linear: LinearPart, bar=None):
+    """D(ln a, ln omega) = 1 + N H, for matching 1-D arrays; NaN where N is a noisy average.
+
+    `bar`, a progress bar, counts the points asked.
+    """
+
+    def D(p, q):
+        a, w = np.exp(p), np.exp(q)
+        h, _ = linear.clamped(w)
+        if bar is not None:
+            bar.update(a.size)
+        N, regime, spread = points(method, a, w)
+        with np.errstate(all="ignore"):
+            return np.where(noisy(regime, spread), np.nan, 1 + N * h)
+
+    return D
+
+
+def scan_grid(method: Method, linear: LinearPart, family: Family):
+    """Return the grid to search: the family's, finer where that costs little or H varies fast."""
+    w = refined_omega(linear, family.omega)
+    if method.name in FAST:
+        coarse = family.amplitudes
+        a = _refined(coarse, 160 if not method.needs_omega else 60)
+        if method.needs_omega and a.size * w.size > 60_000:
+            a = coarse
+        N = method.harmonics(a, w if method.needs_omega else None, 1)[0][..., 1]
+    else:
+        a, N = family.amplitudes, _interpolated(np.log(family.omega), family.N, np.log(w))
+    with np.errstate(all="ignore"):
+        values = 1 + np.broadcast_to(N, (a.size, w.size)) * linear(w)
+    return np.log(a), np.log(w), values
+
+
+def _refined(grid, least):
+    """Points between those of a grid, equally many in each step, so that there are at least `least`."""
+    if grid.size < 2:
+        return grid
+    cuts = max(1, math.ceil(least / (grid.size - 1)))
+    return np.unique(
+        np.concatenate([np.geomspace(lo, hi, cuts + 1) for lo, hi in zip(grid[:-1], grid[1:], strict=True)])
+    )
+
+
+def refined_omega(linear, w, change=0.15, most=3000):
+    """Halve steps of ln omega until H changes by at most `change` (relative) from point to point."""
+    for _ in range(12):
+        if w.size < 2 or w.size >= most:
+            break
+        h = linear(w)
+        with np.errstate(all="ignore"):
+            step = np.abs(np.diff(h)) / np.minimum(np.abs(h[1:]), np.abs(h[:-1]))
+        coarse = (step > change) & (np.diff(np.log(w)) > 1e-5)
+        if not coarse.any():
+            break
+        w = np.unique(np.concatenate([w, np.sqrt(w[:-1] * w[1:])[coarse]]))
+    return w
+
+
+def _interpolated(q, N, fine):
+    """N between columns, linear in log magnitude and phase over ln omega (a power of omega is exact)."""
+    if q.size == fine.size:
+        return N
+    upper = np.clip(np.searchsorted(q, fine), 1, q.size - 1)
+    share = (fine - q[upper - 1]) / (q[upper] - q[upper - 1])
+    left, right = N[:, upper - 1], N[:, upper]
+    with np.errstate(all="ignore"):
+        turn = np.where(left == 0, 0, right / np.where(left == 0, 1, left))
+        smooth = left * np.exp(share * np.log(np.where(turn == 0, 1, turn)))
+    return np.where(turn == 0, (1 - share) * left + share * right, smooth)
+
+
+def grid_slope(log_a, log_w, values, place):
+    """Return the derivatives of the interpolant in the cell that holds `place`."""
+    i = int(np.clip(np.searchsorted(log_a, place[0]) - 1, 0, log_a.size - 2))
+    k = int(np.clip(np.searchsorted(log_w, place[1]) - 1, 0, log_w.size - 2))
+    v = values[i : i + 2, k : k + 2]
+    by_a = (v[1] - v[0]).mean() / (log_a[i + 1] - log_a[i])
+    by_w = (v[:, 1] - v[:, 0]).mean() / (log_w[k + 1] - log_w[k])
+    return np.array([[by_a.real, by_w.real], [by_a.imag, by_w.imag]])
+
+
+def noisy(regime, spread):
+    """Where N is an average over irregular motion rather than a function of (a, omega)."""
+    return (np.asarray(regime) == "aperiodic") & ~(np.asarray(spread) < _NOISE)
