@@ -117,7 +117,9 @@ class FrequencyComparison:
     def where(self) -> Regions:
         """Amplitudes and frequencies ranked by their share of the error."""
         points = points_of([r.record for r in self.records])
-        error = np.concatenate([r.relative[np.isfinite(r.record.N) & (r.record.N != 0)] for r in self.records])
+        error = np.concatenate(
+            [r.relative[np.isfinite(r.record.N) & (r.record.N != 0)] for r in self.records]
+        )
         return plane_regions(points, error)
 
     def report(self) -> str:

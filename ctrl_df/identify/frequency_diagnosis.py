@@ -148,7 +148,8 @@ class FrequencyStudy:
         few, fewer = inside.thinned(_SCREEN), inside.thinned(_ROUGH)
         kinds = [c for c in classes if applicable(c, self.base.fitted.block)]
         jobs = [
-            (c, self.base.fitted.block, fewer if c.id in _SLOWER else few, self.free, self.scales) for c in kinds
+            (c, self.base.fitted.block, fewer if c.id in _SLOWER else few, self.free, self.scales)
+            for c in kinds
         ]
         run = map if executor is None else executor.map
         rough = [self._tried(*r, QUICK) for r in run(_try, jobs) if r is not None]
@@ -180,7 +181,9 @@ class FrequencyStudy:
             except ValueError:
                 continue
             again = fit_table(begin, inside, self.free, self.scales, iterations=10)
-            if float(again.weighted @ again.weighted) < float(self.base.fitted.weighted @ self.base.fitted.weighted):
+            if float(again.weighted @ again.weighted) < float(
+                self.base.fitted.weighted @ self.base.fitted.weighted
+            ):
                 self.base = self._tried("", again, ())
 
     def _power(self, tried) -> float:
@@ -214,13 +217,17 @@ class FrequencyStudy:
         weights /= weights.sum()
         ranking = []
         for i, t in enumerate(self.found):
-            alike = [o.id for o in self.found if o is not t and t.confirmed and o.confirmed and self._alike(t, o)]
+            alike = [
+                o.id for o in self.found if o is not t and t.confirmed and o.confirmed and self._alike(t, o)
+            ]
             ranking.append(self._entry(t, float(weights[i]) if t.confirmed else 0.0, tuple(alike)))
         first = ranking[0] if ranking else None
         noise, structure = self._split(best)
         _, structure0 = self._split(self.base)
         errors = self._errors(self.base)
-        significant = first is not None and best.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * errors[1]
+        significant = (
+            first is not None and best.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * errors[1]
+        )
         if self._unexplained(best if significant else self.base, noise, structure, structure0):
             verdict = UNKNOWN
         elif first is None or not significant:
@@ -310,11 +317,15 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     cls, block, points, free, scales = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     best = None
-    for grown in best_starts(cls, block, points, scales, keep=1 if cls.id in _SLOWER else 2):
+    for grown in best_starts(cls, block, points, scales, keep=1 if cls.id in _SLOW else 2):
         own = tuple(k for k in grown.parameters if k not in block.parameters and grown.parameters[k].free)
         iterations = 3 if cls.id in _SLOW else 5
-        fitted = fit_table(grown, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK)
-        if best is None or float(fitted.weighted @ fitted.weighted) < float(best[1].weighted @ best[1].weighted):
+        fitted = fit_table(
+            grown, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK
+        )
+        if best is None or float(fitted.weighted @ fitted.weighted) < float(
+            best[1].weighted @ best[1].weighted
+        ):
             best = cls.id, fitted, own
     return best
 

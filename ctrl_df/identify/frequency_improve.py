@@ -57,11 +57,7 @@ def improve_frequency(
             Step(effect, dropped, block, found.nrmse, found.nrmse_holdout, evidence, values, same, found)
         )
         best = found.ranking[0] if found.ranking else None
-        if (
-            best is None
-            or best.evidence < SIGNIFICANT
-            or best.nrmse_holdout > _LESS * found.nrmse_holdout
-        ):
+        if best is None or best.evidence < SIGNIFICANT or best.nrmse_holdout > _LESS * found.nrmse_holdout:
             break
         effect, evidence, same = best.id, best.evidence, best.equivalents
         block, dropped = _without_idle(best.model, start, study)

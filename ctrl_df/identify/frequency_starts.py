@@ -17,7 +17,7 @@ _MULTIPLES: dict[str, dict[str, tuple[float, ...]]] = {
     "input_gain": {"gain": (0.7, 0.9, 1.1, 1.4)},
     "input_saturation": {"level": (0.2, 0.5, 0.9, 1.6)},
     "input_dead_zone": {"threshold": (0.02, 0.1, 0.3)},
-    "bristle": {"stiffness": (1.0, 4.0, 20.0, 100.0), "damping": (0.1,)},
+    "bristle": {"stiffness": (1.5, 5.0, 15.0, 60.0, 250.0), "damping": (0.1, 0.7)},
     "position_ripple": {"amplitude": (0.05, 0.2), "wavelength": (0.5, 2.0, 8.0)},
     "hard_stop": {"limit": (0.3, 1.0, 2.0), "restitution": (0.5,)},
     "backlash": {"gap": (0.03, 0.1, 0.3, 1.0), "restitution": (0.3,), "load_fraction": (0.3, 0.6)},
