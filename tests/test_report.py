@@ -142,7 +142,12 @@ def test_a_browser_shows_it(path, tmp_path, width):
     if BROWSER == "firefox":
         options += ["--window-size", f"{width},2400", "--profile", str(tmp_path)]
     else:
-        options += ["--disable-gpu", "--no-sandbox", f"--window-size={width},2400", f"--user-data-dir={tmp_path}"]
+        options += [
+            "--disable-gpu",
+            "--no-sandbox",
+            f"--window-size={width},2400",
+            f"--user-data-dir={tmp_path}",
+        ]
     subprocess.run(
         [BROWSER, *options, f"file://{path}"], check=True, timeout=120, capture_output=True, cwd=tmp_path
     )
@@ -154,4 +159,3 @@ def test_a_browser_shows_it(path, tmp_path, width):
         assert part.std() > 0.03
     blue = (shown[..., 2] - shown[..., 0] > 0.3).sum()
     assert blue > 1000
-

@@ -113,7 +113,9 @@ def render(study) -> str:
             "the structure is right."
         ),
         parameters=_parameters(study, fit),
-        doubts="".join(f"<p>{html.escape(s[0].upper() + s[1:])}</p>" for s in fit.unidentifiable) if fit else "",
+        doubts="".join(f"<p>{html.escape(s[0].upper() + s[1:])}</p>" for s in fit.unidentifiable)
+        if fit
+        else "",
         sections="\n".join(_section(i, s) for i, s in enumerate(study.steps)),
         closing=html.escape(
             "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's price of "
@@ -243,6 +245,4 @@ def _picture(draw, text, caption=False):
         plt.close(fig)
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     below = f"<figcaption>{html.escape(text)}</figcaption>" if caption else ""
-    return (
-        f'<figure><img alt="{html.escape(text)}" src="data:image/png;base64,{data}">{below}</figure>'
-    )
+    return f'<figure><img alt="{html.escape(text)}" src="data:image/png;base64,{data}">{below}</figure>'

@@ -49,11 +49,8 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **ke
         lines[1] += top.loglog(w, np.abs(model), "-", color=shade, lw=1.2)
         below.semilogx(w, phase, "o", color=shade, ms=4)
         below.semilogx(w, phase + step, "-", color=shade, lw=1.2)
-        top.annotate(
-            f"{data.A[i]:.3g} {data.input_unit}", (w[0], np.abs(measured[0])), xytext=(-6, 0), fontsize=8,
-            textcoords="offset points", color=shade, va="center", ha="right",
-        )  # fmt: skip
-    top.margins(x=0.14)
+        lines[1][-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
+    top.legend(frameon=False, fontsize=8, loc="lower left", handlelength=1.2, labelspacing=0.25)
     top.set_ylabel(f"|N| [{data.output_unit}/{data.input_unit}]")
     below.set_ylabel("Phase [deg]")
     below.set_xlabel("Frequency [rad/s]")
@@ -62,7 +59,8 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **ke
     for ax in (top, below):
         ax.spines[["top", "right"]].set_visible(False)
         ax.grid(True, which="major", color="0.92", lw=0.7)
-    top.tick_params(labelbottom=False)
+    _plain_ticks(below.xaxis)
+    top.tick_params(which="both", labelbottom=False)
     plane.set_title("Error over the plane", loc="left", fontsize=10)
     fig.suptitle(data.name if title is None else title, fontsize=11)
     fig.tight_layout()
@@ -84,9 +82,20 @@ def error_plane(fig, ax, data, error, limits=None, bar=True):
     ax.set_yscale("log")
     ax.set_xlabel("Frequency [rad/s]")
     ax.set_ylabel(f"Amplitude [{data.input_unit}]")
+    _plain_ticks(ax.xaxis)
+    _plain_ticks(ax.yaxis)
     if bar:
         fig.colorbar(picture, ax=ax, label="Error [% of |N|]", shrink=0.85)
     return picture
+
+
+def _plain_ticks(axis):
+    """Label a logarithmic axis at 1, 2, 5, 10, ... in plain numbers: it spans a decade or two."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _edges(values):
