@@ -10,7 +10,7 @@ _MODEL, _FADED = "#1f4e9c", "#9db4d8"
 
 
 def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **keywords) -> ct.ControlPlot:
-    """Draw a `FrequencyComparison`: magnitude and phase over frequency, dots measured, lines model; the error.
+    """Draw a `FrequencyComparison`: magnitude and phase over frequency, dots measured, lines model; error.
 
     Parameters
     ----------
