@@ -8,9 +8,7 @@ class Status(Enum):
 
     CONVERGED = "converged"
     NO_SOLUTION = "the whole box was scanned and holds no solution"
-    WORK_LIMIT = (
-        "stopped at the bound on work (steps or events); raise max_steps, loosen rtol, or shorten the time span"
-    )
+    WORK_LIMIT = "stopped at the bound on work (steps or events); raise max_steps, loosen rtol, or shorten the time span"
     DIVERGED = (
         "the state left every bound (overflow or NaN): the loop is unstable from here; "
         "lower the gains or start nearer to rest"
@@ -23,9 +21,17 @@ class Status(Enum):
         "the step fell below the resolution of time: the law is not continuous between its stated corners; "
         "state its corners, or loosen rtol"
     )
+    HISTORY_FULL = (
+        "a pure delay holds more steps than its history has room for; lengthen max_step or the sample time, "
+        "shorten the delay, or put a lag of the same time in its place"
+    )
     USER_ERROR = "a user-written law or system raised or returned NaN; see the exception it carries"
-    NOT_CONVERGED = "no periodic orbit was reached within the iterations allowed; start nearer or raise max_iterations"
-    NO_PERIOD = "the motion from this start settles to no period; averages over many periods are given instead"
+    NOT_CONVERGED = (
+        "no periodic orbit was reached within the iterations allowed; start nearer or raise max_iterations"
+    )
+    NO_PERIOD = (
+        "the motion from this start settles to no period; averages over many periods are given instead"
+    )
 
     @property
     def ok(self) -> bool:

@@ -19,8 +19,12 @@ def friction_reference(mass, coulomb, viscous, static, a, omega, t_end):
             force = a * math.cos(omega * t)
             if abs(force) <= static * (1 + 1e-12):
                 # the next time |F| reaches the static level
-                phases = [(s * math.acos(static / a) + k * math.pi) / omega for k in range(1000) for s in (1, -1)]
-                later = (p for p in phases if p > t + 1e-12 and abs(a * math.cos(omega * (p + 1e-9))) > static)
+                phases = [
+                    (s * math.acos(static / a) + k * math.pi) / omega for k in range(1000) for s in (1, -1)
+                ]
+                later = (
+                    p for p in phases if p > t + 1e-12 and abs(a * math.cos(omega * (p + 1e-9))) > static
+                )
                 t_next = min(later, default=t_end)
                 t = min(t_next, t_end)
             stuck = False
@@ -29,7 +33,9 @@ def friction_reference(mass, coulomb, viscous, static, a, omega, t_end):
         stop = lambda t, y, s=sign: s * y[1]  # noqa: E731
         stop.terminal, stop.direction = True, -1
         flow = lambda t, y, s=sign: [y[1], (a * math.cos(omega * t) - s * coulomb - viscous * y[1]) / mass]  # noqa: E731
-        sol = solve_ivp(flow, (t, t_end), [x, v], "DOP853", events=stop, rtol=1e-12, atol=1e-14, max_step=0.05 / omega)
+        sol = solve_ivp(
+            flow, (t, t_end), [x, v], "DOP853", events=stop, rtol=1e-12, atol=1e-14, max_step=0.05 / omega
+        )
         t, (x, v) = sol.t[-1], sol.y[:, -1]
         if sol.status == 1:
             v = 0.0
@@ -66,7 +72,9 @@ def backlash_reference(x0, gains, m0, m1, gap, e, t_end):
         high = lambda t, y: gap - (y[3] - y[1])  # noqa: E731
         low.terminal = high.terminal = True
         low.direction = high.direction = -1
-        sol = solve_ivp(flow, (t, t_end), y, "DOP853", events=[low, high], rtol=1e-12, atol=1e-15, max_step=2e-3)
+        sol = solve_ivp(
+            flow, (t, t_end), y, "DOP853", events=[low, high], rtol=1e-12, atol=1e-15, max_step=2e-3
+        )
         t, y = sol.t[-1], sol.y[:, -1].copy()
         if sol.status != 1:
             break
@@ -198,7 +206,9 @@ def test_sampled_controller_is_a_difference_equation():
 
 
 def test_user_system_runs_and_its_error_is_reported():
-    cubic = ct.nlsys(lambda t, x, u, p: [-x[0] ** 3 + u[0]], lambda t, x, u, p: x, inputs=1, outputs=1, states=1)
+    cubic = ct.nlsys(
+        lambda t, x, u, p: [-(x[0] ** 3) + u[0]], lambda t, x, u, p: x, inputs=1, outputs=1, states=1
+    )
     response = cdf.event_response(cubic, np.linspace(0, 1, 11), 0, [1.0])
     np.testing.assert_allclose(np.ravel(response.outputs)[-1], 1 / math.sqrt(3), rtol=1e-7)
 
@@ -222,7 +232,11 @@ def test_diverging_loop_ends_early_and_says_so():
 def test_work_is_bounded():
     with pytest.warns(RuntimeWarning, match="bound on work"):
         response = cdf.event_response(
-            cdf.Mass(1.0).with_effect(cdf.LinearSpring(1e6)), np.linspace(0, 100, 11), 0, [1.0, 0], max_steps=1000
+            cdf.Mass(1.0).with_effect(cdf.LinearSpring(1e6)),
+            np.linspace(0, 100, 11),
+            0,
+            [1.0, 0],
+            max_steps=1000,
         )
     assert response.status is Status.WORK_LIMIT
     assert len(response.time) < 11
@@ -235,12 +249,21 @@ def test_work_is_bounded():
         (lambda: cdf.event_response(cdf.Mass(1), [0, 1], np.nan * np.ones(2)), "finite"),
         (lambda: cdf.event_response(cdf.Mass(1), [0, 1], np.ones(3)), "shape"),
         (lambda: cdf.event_response(cdf.Mass(1), [0, 1], 0, [1, 2, 3]), "initial_state needs 2"),
-        (lambda: cdf.event_response(cdf.backlash_masses(1, 8, 0.02), [0, 1], 0, [0, 0, 0.03, 0]), "clearance"),
-        (lambda: cdf.event_response(cdf.Mass(1).with_effect(cdf.HardStop(0.1)), [0, 1], 0, [0.2, 0]), "stops"),
+        (
+            lambda: cdf.event_response(cdf.backlash_masses(1, 8, 0.02), [0, 1], 0, [0, 0, 0.03, 0]),
+            "clearance",
+        ),
+        (
+            lambda: cdf.event_response(cdf.Mass(1).with_effect(cdf.HardStop(0.1)), [0, 1], 0, [0.2, 0]),
+            "stops",
+        ),
         (lambda: cdf.closed_loop(cdf.pid(1, 1, 1), cdf.saturation(1)), "velocity output"),
         (lambda: cdf.closed_loop(ct.tf([1, 0, 0], [1]), cdf.Mass(1)), "one degree"),
         (lambda: cdf.closed_loop(ct.frd([1, 1], [1, 2]), cdf.Mass(1)), "fit a transfer function"),
-        (lambda: cdf.event_response(cdf.closed_loop(ct.tf([1], [1]), cdf.saturation(1)), [0, 1]), "algebraic loop"),
+        (
+            lambda: cdf.event_response(cdf.closed_loop(ct.tf([1], [1]), cdf.saturation(1)), [0, 1]),
+            "algebraic loop",
+        ),
     ],
 )
 def test_bad_input_is_told(call, says):

@@ -73,7 +73,9 @@ def test_relay_cycle_of_tsypkin():
 
     omega = np.pi / brentq(switching, 0.05, 5)
     plant = ct.tf([1], [1, 1]) * ct.tf([1], [0.2, 1])
-    response = cdf.describing_function_response(plant, cdf.relay_with_hysteresis(1, 0.1), np.geomspace(0.11, 5, 40))
+    response = cdf.describing_function_response(
+        plant, cdf.relay_with_hysteresis(1, 0.1), np.geomspace(0.11, 5, 40)
+    )
     check = cdf.verify(response)
     assert len(check) == 1
     assert check.rows[0].exact.omega == pytest.approx(omega, rel=1e-7)

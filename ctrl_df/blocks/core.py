@@ -128,7 +128,9 @@ def level(effects: Sequence[Effect], moving: float, direction: float, speed: flo
 def _only(effects, cls) -> Any:
     found = [e for e in effects if isinstance(e, cls)]
     if len(found) > 1:
-        raise ValueError(f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters.")
+        raise ValueError(
+            f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters."
+        )
     return found[0] if found else None
 
 

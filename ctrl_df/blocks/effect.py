@@ -120,7 +120,9 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
         raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
     known = _LIBRARY.get(cls.id)
     if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
-        raise ValueError(f"effect id {cls.id!r} is taken by {known.__module__}.{known.__qualname__}; rename the class.")
+        raise ValueError(
+            f"effect id {cls.id!r} is taken by {known.__module__}.{known.__qualname__}; rename the class."
+        )
     _LIBRARY[cls.id] = cls
     return cls
 

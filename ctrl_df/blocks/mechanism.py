@@ -30,10 +30,14 @@ class Mechanism(ct.NonlinearIOSystem):
 
     def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
         owner = type(self).__name__
-        self._values = {k: checked(owner, k, v, {**_MASS, "meaning": k.replace("_", " ")}) for k, v in inertias.items()}
+        self._values = {
+            k: checked(owner, k, v, {**_MASS, "meaning": k.replace("_", " ")}) for k, v in inertias.items()
+        }
         self._effects = _as_effects(effects)
         if measured not in ("load", "motor"):
-            raise ValueError(f"{owner} needs measured='load' or 'motor' (the body the sensor sees); got {measured!r}.")
+            raise ValueError(
+                f"{owner} needs measured='load' or 'motor' (the body the sensor sees); got {measured!r}."
+            )
         self._measured = measured
         self._keys = _effect_keys(self._effects)
         _check_levels(self._effects)
@@ -75,7 +79,9 @@ class Mechanism(ct.NonlinearIOSystem):
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Ordered mapping of name (``mass``, ``coulomb.level``, ...) to `Parameter` (value, unit, bounds)."""
-        table = {k: Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}) for k, v in self._values.items()}
+        table = {
+            k: Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}) for k, v in self._values.items()
+        }
         for key, effect in zip(self._keys, self._effects, strict=True):
             for name, p in effect.parameters.items():
                 if name == "load_fraction" and len(self._inertias) == 2:
@@ -90,7 +96,9 @@ class Mechanism(ct.NonlinearIOSystem):
     def without_effect(self, id: str) -> Mechanism:
         """Return the block without the effect of that id; ValueError if it has none."""
         if id not in self._keys:
-            raise ValueError(f"without_effect needs an id the block has ({', '.join(self._keys) or 'none'}); got {id!r}.")
+            raise ValueError(
+                f"without_effect needs an id the block has ({', '.join(self._keys) or 'none'}); got {id!r}."
+            )
         kept = [e for k, e in zip(self._keys, self._effects, strict=True) if k != id]
         return self._remade(self._values, kept)
 
@@ -209,7 +217,9 @@ class TwoMass(Mechanism):
     _inertias = ("load_mass", "motor_mass")
 
     def __init__(self, motor_mass, load_mass, effects=(), *, measured="load", name=None):
-        super().__init__({"load_mass": load_mass, "motor_mass": motor_mass}, effects, measured=measured, name=name)
+        super().__init__(
+            {"load_mass": load_mass, "motor_mass": motor_mass}, effects, measured=measured, name=name
+        )
 
     @property
     def motor_mass(self) -> float:
@@ -279,7 +289,9 @@ def _as_effects(effects) -> tuple[Effect, ...]:
     effects = tuple(effects)
     for effect in effects:
         if not isinstance(effect, Effect):
-            raise TypeError(f"an effect must be an instance of a ctrl_df Effect, e.g. Coulomb(5); got {effect!r}.")
+            raise TypeError(
+                f"an effect must be an instance of a ctrl_df Effect, e.g. Coulomb(5); got {effect!r}."
+            )
     return effects
 
 

@@ -41,7 +41,14 @@ class Parameter:
 
 
 def parameter(
-    unit, *, lower=0.0, upper=math.inf, strict=False, free=True, default: Any = dataclasses.MISSING, meaning=""
+    unit,
+    *,
+    lower=0.0,
+    upper=math.inf,
+    strict=False,
+    free=True,
+    default: Any = dataclasses.MISSING,
+    meaning="",
 ) -> Any:
     """Declare a dataclass field that is a physical parameter (unit, bounds, what it means)."""
     bounds = dict(unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning)
@@ -53,7 +60,9 @@ def checked(owner: str, name: str, value, spec: dict, remedy: str = "") -> float
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{owner} needs {name} as one real number [{spec['unit'] or '-'}]; got {value!r}.") from None
+        raise TypeError(
+            f"{owner} needs {name} as one real number [{spec['unit'] or '-'}]; got {value!r}."
+        ) from None
     lower, upper, strict = spec["lower"], spec["upper"], spec["strict"]
     low_ok = number > lower if strict else number >= lower
     if math.isnan(number) or not low_ok or not number <= upper or math.isinf(number):

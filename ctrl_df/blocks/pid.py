@@ -31,7 +31,9 @@ def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
         if not math.isfinite(value):
             raise ValueError(f"pid needs finite numbers; got {key}={value!r}.")
     if tf < 0:
-        raise ValueError(f"pid needs tf >= 0 (filter time constant [s]); got tf={tf!r}. Use tf=0 for the ideal PID.")
+        raise ValueError(
+            f"pid needs tf >= 0 (filter time constant [s]); got tf={tf!r}. Use tf=0 for the ideal PID."
+        )
     if ki == 0:
         num, den = [kp * tf + kd, kp], [tf, 1.0]
     else:

@@ -192,6 +192,7 @@ def fit_windows(
     iterations: int = 12,
     tolerance: float = 1e-3,
     robust: bool = False,
+    limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage, without the price of standard errors.
 
@@ -208,13 +209,15 @@ def fit_windows(
         Initial states to begin with.
     iterations, tolerance, robust
         As for `fit_candidate`.
+    limits : mapping or None
+        Least and largest values of some parameters, within their ranges.
 
     Returns
     -------
     Candidate
         With an empty covariance.
     """
-    problem = Problem(model, records, names, 100_000)
+    problem = Problem(model, records, names, 100_000, limits)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     return _outcome(problem, theta, np.zeros((0, 0)), [])

@@ -17,6 +17,7 @@ import numpy as np
 from ..blocks import effects as library
 from ..blocks.core import level
 from .attach import attach
+from .regression import ripple_turns
 
 if TYPE_CHECKING:
     from .screen import Screen
@@ -160,7 +161,7 @@ def _ripple(screen):
     """Try wavelengths over the stroke: sine and cosine are two small changes, fitted together."""
     s = screen.scales
     span = float(np.ptp(screen.motion.x))
-    turns = list(np.geomspace(0.6, 12.0, 30)) + list(force_ripple_turns(screen, span))
+    turns = [*np.geomspace(0.6, 12.0, 30), *ripple_turns(screen.full_motion, screen.scales)]
     amplitude = 0.01 * s.force
     total = float(screen.residual @ screen.residual)
     scored = []
@@ -186,34 +187,6 @@ def _ripple(screen):
         for factor in (1.0, 0.5):
             found.append(library.PositionRipple(min(size * factor, 2 * s.force), span / turn, phase))
     return found
-
-
-def force_ripple_turns(screen: Screen, span: float, count: int = 5) -> list[float]:
-    """Return the strongest periods of the force residual over position, as turns over the stroke `span`.
-
-    The force that motion demands minus the force given, cleaned of mass, friction and offset by least squares
-    where the mass moves; its spectrum is taken over position, not time.
-    """
-    tops: dict[float, float] = {}
-    grid = np.linspace(0.5, 60.0, 600)
-    m = screen.motion
-    moving = np.abs(m.v) > 0.2 * screen.scales.speed
-    if np.count_nonzero(moving) < 100:
-        return []
-    x, v, u = m.x[moving], m.v[moving], m.u[moving]
-    columns = np.column_stack([m.a[moving], np.sign(v), v, np.ones(len(v)), x, v * np.abs(v)])
-    columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)
-    w, *_ = np.linalg.lstsq(columns, u, rcond=None)
-    left = u - columns @ w
-    phase = np.exp(2j * math.pi * np.outer(grid / span, x))
-    power = np.abs(phase @ left) ** 2 / len(x)
-    for _ in range(count):
-        i = int(np.argmax(power))
-        if power[i] == 0:
-            break
-        tops[float(grid[i])] = power[i]
-        power[max(i - 6, 0) : i + 7] = 0.0
-    return list(tops)
 
 
 _MAKERS: dict[str, Callable] = {

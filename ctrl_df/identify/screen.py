@@ -8,39 +8,15 @@ the screening evidence, and the values that explain most are where the refit beg
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks import effects as library
-from ..blocks.effect import Effect
 from .attach import attach
 from .candidate import Candidate
 from .proposals import PROPORTIONAL, proposals
+from .regression import Start, motion_of, regressed
 from .simulator import Simulator
 from .trial import Data, Scales, carried
-from .windows import facts
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Samples of all records: force [N], reported position [m], smoothed velocity [m/s], acceleration [m/s^2]."""
-
-    u: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-
-
-def motion_of(view, thin: int) -> Motion:
-    """Return every `thin`-th sample within the windows."""
-    parts = []
-    for record, windows in zip(view.records, view.windows, strict=True):
-        velocity = facts(record).velocity
-        acceleration = np.gradient(velocity, record.t)
-        some = windows.samples[::thin]
-        parts.append([np.asarray(c)[some] for c in (record.u, record.y, velocity, acceleration)])
-    return Motion(*(np.concatenate(c) for c in zip(*parts, strict=True)))
 
 
 class Screen:
@@ -58,6 +34,7 @@ class Screen:
         self.base, self.data = base, data
         self.view = data.train
         self.motion = motion_of(data.train, data.thin)
+        self.full_motion = motion_of(data.train, 1)
         self.tangent = base.tangent
         self.residual = self.project(base.residual)
         self.simulators = [Simulator(base.model, r, thin=data.thin) for r in self.view.records]
@@ -96,15 +73,6 @@ class Screen:
         return change if all(np.all(np.isfinite(c)) for c in change) else None
 
 
-@dataclass(frozen=True)
-class Start:
-    """An effect with start values and the share of the residual it is expected to leave (1: explains nothing)."""
-
-    effect: Effect
-    left: float
-    values: tuple[tuple[str, float], ...] = ()  # baseline parameters that go with it
-
-
 def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
     """Return the best start values for one effect class, best first."""
     found: list[Start] = []
@@ -112,7 +80,7 @@ def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
     for effect in proposals(cls, screen):
         found += _judged(effect, screen, total)
     found.sort(key=lambda s: s.left)
-    chosen: list[Start] = list(_regressed(cls, screen))
+    chosen: list[Start] = list(regressed(cls, screen))
     keep += len(chosen)
     for start in found:
         if all(_apart(start.effect, other.effect) for other in chosen):
@@ -157,63 +125,3 @@ def _apart(a, b):
     return any(
         abs(x - y) > 0.25 * max(abs(x), abs(y), 1e-300) for x, y in zip(a.values, b.values, strict=True)
     )
-
-
-def _regressed(cls, screen) -> Iterator[Start]:
-    """Yield start values for Stribeck friction and the baseline together, by regression of the force on motion.
-
-    The refitted baseline has bent its own friction towards the truth as far as it could; the right start lies
-    elsewhere for all parameters at once.
-    """
-    if cls is not library.Stribeck:
-        return
-    s = screen.scales
-    names = {"mass", "coulomb.level", "viscous.coefficient"} & set(screen.block.parameters)
-    if "mass" not in names or screen.block.core.bodies > 1:
-        return
-    scored = []
-    for speed in s.speed * np.array([0.04, 0.08, 0.15, 0.3, 0.6]):
-        weights, left = force_regression(
-            screen.motion,
-            s,
-            lambda v, speed=speed: np.sign(v) * np.exp(-np.square(v / speed)),
-            friction=names,
-        )
-        scored.append((left, speed, weights))
-    _, speed, w = min(scored, key=lambda x: x[0])
-    mass, kinetic, viscous, extra = w
-    if mass <= 0 or extra <= 0:
-        return
-    values = {
-        "mass": mass,
-        "coulomb.level": max(kinetic, 0.01 * s.force),
-        "viscous.coefficient": max(viscous, 1e-3 * s.force / s.speed),
-    }
-    kinetic = values["coulomb.level"] if "coulomb.level" in names else 0.0
-    yield Start(
-        library.Stribeck(kinetic + extra, speed), 0.0, tuple((k, v) for k, v in values.items() if k in names)
-    )
-
-
-def force_regression(motion: Motion, scales, shape=None, friction=("coulomb.level", "viscous.coefficient")):
-    """Regress the force on acceleration, direction, speed (and a further shape of speed) where the mass moves.
-
-    Returns
-    -------
-    weights : array
-        mass [kg], Coulomb level [N], viscous coefficient [N s/m], weight of the shape [N]; 0 for those left out.
-    left : float
-        Mean squared force that remains [N^2].
-    """
-    moving = np.abs(motion.v) > 0.03 * scales.speed
-    v, force = motion.v[moving], motion.u[moving]
-    matrix = np.column_stack([
-        motion.a[moving],
-        np.sign(v) * ("coulomb.level" in friction),
-        v * ("viscous.coefficient" in friction),
-        np.zeros(len(v)) if shape is None else shape(v),
-    ])  # fmt: skip
-    size = np.linalg.norm(matrix, axis=0)
-    size[size == 0] = 1.0
-    weights = np.linalg.lstsq(matrix / size, force, rcond=None)[0] / size
-    return weights, float(np.mean((force - matrix @ weights) ** 2))

@@ -66,11 +66,11 @@ class Problem:
     states, `slopes` the derivatives of the last step.
     """
 
-    def __init__(self, model, records, names, budget):
+    def __init__(self, model, records, names, budget, limits=None):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
-        self.variables = variables_of(self.block, names, self.records, self.known[0])
+        self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
         self.steps = np.full(len(names), 1e-3)
         self.nfev = 0
         self.converged = False

@@ -9,13 +9,15 @@ import numpy as np
 
 from .attach import applicable, attach
 from .equivalence import indistinguishable, whitened_power, whitener
+from .proposals import proposals
+from .regression import Start, force_regression, motion_of
 from .residual_tests import NoiseModel
-from .screen import Screen, Start, force_regression, motion_of, starts_for
+from .screen import Screen, starts_for
 from .simulator import feasible
 from .trial import SHORTEST, Data, Trial, prepare
 
 CONFIRMED = 6
-"""Candidates that are refitted at the full rate."""
+"""Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
 
 _LEVELS = (SHORTEST, 4, 1)
 # Best error over windows four times as long that still counts as the same.
@@ -41,6 +43,7 @@ class Study:
     def __init__(self, block, records, held, free):
         self.free = free
         data = prepare(block, records, held)
+        self.nominal = {k: p.value for k, p in block.parameters.items()}
         self.levels = [data.level(f) for f in _LEVELS]
         self.data = self.levels[1]
         self.base = self._baseline(block)
@@ -49,7 +52,8 @@ class Study:
         """Fit the baseline from its own values and from a regression of the force on motion; keep the better."""
         shortest, data = self.levels[:2]
         begins, table = [block], block.parameters
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        names = {"mass", "coulomb.level", "viscous.coefficient"}
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, names)
         guess = dict(zip(("mass", "coulomb.level", "viscous.coefficient"), w, strict=False))
         guess = {k: float(v) for k, v in guess.items() if k in table and k in self.free and v > 0}
         if guess:
@@ -67,7 +71,8 @@ class Study:
         screen = Screen(data.moved(self.base.train, 3), data)
         run = map if executor is None else executor.map
         kinds = [c for c in classes if applicable(c, screen.block)]
-        jobs = [(cls, screen, shortest, self.free) for cls in kinds]
+        nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
+        jobs = [(cls, screen, shortest, self.free, nominal) for cls in kinds]
         span = float(np.ptp(screen.motion.x))
         found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
         base = Trial("", screen.base)
@@ -89,14 +94,15 @@ class Study:
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
         shortest, middle, longest = self.levels
-        fits = [middle.moved(t.train) for t in (self.base, *found[:CONFIRMED])]
+        found = _promising(found)
+        fits = [middle.moved(t.train) for t in (self.base, *found)]
         stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
         self.data = self.levels[at]
         fine = self.data.fine
         best = [
             fine.judged(replace(t, train=fine.moved(f, 3, 1e-3), confirmed=True))
-            for t, f in zip((self.base, *found[:CONFIRMED]), stages[at], strict=True)
+            for t, f in zip((self.base, *found), stages[at], strict=True)
         ]
         self.base = best[0]
         chosen, self.noise = ranked(self.base, best[1:])
@@ -110,6 +116,14 @@ class Study:
 def _periodic_enough(tried: Trial, span) -> bool:
     """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+
+
+def _promising(found) -> list[Trial]:
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by plain error."""
+    close = sorted(found, key=lambda t: t.train.rmse)[:3]
+    close = [t for t in close if t.train.rmse < 1.5 * close[0].train.rmse]
+    likely = found[:2] + [t for t in found[2:CONFIRMED] if t.evidence > 0.2 * found[0].evidence]
+    return likely + [t for t in close if not any(t is o for o in likely)]
 
 
 def _longest_coherent(errors) -> int:
@@ -146,14 +160,23 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
 
 def _try(job) -> Trial | None:
     """Fit one effect class from its best start values (a job of its own, for executors)."""
-    cls, screen, shortest, free = job
+    cls, screen, shortest, free, nominal = job
     found = []
     starts = starts_for(cls, screen)
     for i, start in enumerate(starts):
         if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
             break
         found += _fitted(start, screen, shortest, free)
+    if cls.id in _CURVED or screen.block.core.bodies == 2:
+        # The baseline may have bent far from the truth to make up for what is missing: begin where the user does.
+        for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
+            found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     return min(found, key=lambda t: t.train.rmse) if found else None
+
+
+def _spread(effects, count):
+    """Return some of the effects, evenly from the first to the last."""
+    return [effects[round((i + 0.5) * len(effects) / count - 0.5)] for i in range(min(count, len(effects)))]
 
 
 def _fitted(start: Start, screen: Screen, shortest: Data, free):

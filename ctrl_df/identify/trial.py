@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,9 @@ SAMPLES = 2500
 
 SHORTEST = 16
 """How many times as many the shortest windows are as the longest."""
+
+FAR = 12.0
+"""Factor by which the model's own parameters may be off: beyond it a fit explains with them what they are not."""
 
 PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
@@ -126,7 +129,9 @@ class Data:
     held: View
     thin: int
     scales: Scales
+    limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
+    step: int = 0  # samples a step of the input before this was made fine
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -140,15 +145,16 @@ class Data:
 
     @property
     def fine(self) -> Data:
-        """The same at the records' full rate."""
-        return replace(self, thin=1)
+        """The same at the records' full rate, or 12,000 steps of a longer one."""
+        longest = max(len(r) for view in (self.train, self.held) for r in view.records)
+        return replace(self, thin=min(max(1, round(longest / 12_000)), self.thin), step=self.thin)
 
     def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance,
+            tolerance=tolerance, limits=self.limits,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
@@ -162,10 +168,12 @@ class Data:
     def judged(self, tried: Trial) -> Trial:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
         # Those of short windows are found without fail; the others begin at the same places.
-        short = self.level(SHORTEST).held
-        near = self.fit(tried.block, (), view=short, iterations=6, tolerance=1e-2)
-        starts = same_begins(near, self.held.windows)
-        held = self.fit(tried.block, (), view=self.held, starts=starts, iterations=4, tolerance=1e-2)
+        rough, short = replace(self, thin=self.step or self.thin), self.level(SHORTEST).held
+        near = rough.fit(tried.block, (), view=short, iterations=4, tolerance=2e-2)
+        near = rough.fit(
+            tried.block, (), view=self.held, starts=same_begins(near, self.held.windows), iterations=3
+        )
+        held = self.fit(tried.block, (), view=self.held, starts=near.starts, iterations=1)
         return replace(tried, held=held)
 
 
@@ -189,7 +197,11 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
     while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
         thin //= 2
-    return Data(learn, judge, thin, _scales(block, records))
+    known = {k: p.value for k, p in block.parameters.items() if p.value > 0}
+    limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
+    # A lag much shorter than a sample is none, and a stiff equation.
+    limits["input_lag.time_constant"] = (0.05 * min(r.dt for r in records), max(r.duration for r in records))
+    return Data(learn, judge, thin, _scales(block, records), limits)
 
 
 def _rough(record, thin: int) -> bool:

@@ -17,7 +17,7 @@ def default_free(block) -> tuple[str, ...]:
 class Variable:
     """One parameter: physical value p, scaled value q; strictly positive ones on a logarithmic scale."""
 
-    def __init__(self, name, parameter, natural):
+    def __init__(self, name, parameter, natural, limits=None):
         self.name = name
         self.lower, self.upper = parameter.lower, parameter.upper
         # Bounded on both sides (a share, a restitution): linear. Strictly positive: logarithmic.
@@ -26,6 +26,8 @@ class Variable:
         self.natural = natural
         if parameter.strict and not self.log:
             self.lower = parameter.lower + 1e-3
+        if limits is not None:
+            self.lower, self.upper = max(self.lower, limits[0]), min(self.upper, limits[1])
 
     def q(self, p: float) -> float:
         """Return the scaled value of a physical one."""
@@ -40,7 +42,8 @@ class Variable:
     def clip(self, q: float) -> float:
         """Return the scaled value within the bounds nearest to `q`."""
         if self.log:
-            return q
+            low = self.q(self.lower) if self.lower > 0 else q
+            return min(max(q, low), self.q(self.upper) if self.upper < math.inf else q)
         return min(max(q, self.lower / self.scale), self.upper / self.scale)
 
     def slope(self, q: float) -> float:
@@ -52,12 +55,16 @@ class Variable:
         return 1.0 if self.log else 1.0 * max(abs(q), 1.0)
 
 
-def variables_of(block, names, records, known: Facts) -> list[Variable]:
-    """Return the named parameters of a block as variables, with scales natural on these records."""
+def variables_of(block, names, records, known: Facts, limits=None) -> list[Variable]:
+    """Return the named parameters of a block as variables, with scales natural on these records.
+
+    `limits`, a mapping of names to (least, largest), narrows their ranges.
+    """
     if not names:
         return []
     table = block.parameters
-    found = [Variable(k, table[k], natural_scale(table[k].unit, known)) for k in names]
+    limits = limits or {}
+    found = [Variable(k, table[k], natural_scale(table[k].unit, known), limits.get(k)) for k in names]
     for variable in found:
         if variable.name == "hard_stop.limit" and not {"sensor_offset", "drift"} & set(block._keys):
             # No body has been where a stop would not let it.

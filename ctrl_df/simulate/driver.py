@@ -9,123 +9,48 @@ import math
 import numpy as np
 from numba import njit
 
-from .flow import combine, external, input_rates, rates, signals
-from .layout import H_NG, H_NS, H_NX, H_OUT, H_SCRATCH, H_TRACK, KIND, NG, NIN, NOUT, NX, PAR, SAMPLED, G
-from .modes import event, sample, settle, track
-from .stepper import inside, prepare5, prepare8, roughness, step5, step8
+from . import history
+from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
+from .flow import rates
+from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
+from .locate import bump_share, complete, locate_event, margins, may_touch, tolerances, worst
+from .modes import event, settle, track
+from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
+from .stepper import inside, prepare, prepare8, roughness, step
 
-NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
-NODES = NODES + 0.5
-DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY = range(8)
+DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN, sliding, step
-below the resolution of time."""
+below the resolution of time, more steps within a delay than its history holds."""
+
+PATIENCE = 40  # steps of order 5 after one of order 3 that failed
 
 
-def workspace(prog):
-    """Scratch arrays of a run, made once: compiled code that counts no references needs memory from outside."""
+def workspace(prog, delays: bool = False):
+    """Scratch arrays of a run, made once: compiled code that counts no references needs memory from outside.
+
+    With `delays` the work vector also holds the history of pure delays, part of the state of the program. Who moves states
+    about without it cannot treat such a program.
+    """
     n, ng = int(prog.ints[H_NX]), int(prog.ints[H_NG])
-    size = int(prog.ints[H_SCRATCH]) + n + int(prog.ints[H_NS]) + 4
-    work = (np.zeros(size), np.zeros(2), np.zeros(max(n, 4) + 2))
+    past = int(prog.ints[H_DELAYS]) * history.SIZE
+    if past and not delays:
+        raise ValueError(
+            "exact orbits need a state of finitely many numbers; this system has a pure delay inside, whose state is a whole "
+            "history. Find its motion by simulation (event_response), or put a lag of the same time (input_lag) in its place."
+        )
+    work = (np.zeros(int(prog.ints[H_HISTORY]) + past), np.zeros(2), np.zeros(max(n, 4) + 2))
     owner = np.zeros(ng + 1, np.int64)
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
     vectors = [np.zeros(n) for _ in range(4)] + [np.zeros(ng + 1) for _ in range(5)]
-    return (work, np.zeros((16, n)), np.zeros((8, n)), *vectors, owner)
+    return (work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), memory(prog))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def copy(source, target):
     """Copy a vector in place."""
     for i in range(source.shape[0]):
         target[i] = source[i]
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def margins(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
-    """Rates and all margins at one point, those of input rates and of the section included."""
-    rates(prog, drive, segment, t, x, mode, work, dx, g, True)
-    if prog.ints[H_TRACK] == 1:
-        input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g)
-    last = g.shape[0] - 1
-    g[last] = math.inf
-    if watch >= 0:
-        w = work[0]
-        signals(prog, t, x, mode, w)
-        g[last] = watch_sign * (w[watch] - watch_level)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def next_sample(prog, t):
-    """Time of the next tick of any sampled controller."""
-    nearest = math.inf
-    for n in range(prog.nodes.shape[0]):
-        if prog.nodes[n, KIND] == SAMPLED:
-            dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
-            nearest = min(nearest, (math.floor(t / dt + 1e-6) + 1.0) * dt)
-    return nearest
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def _sampled_size(prog, n):
-    """Floats of a sampled node's matrices; its period follows them."""
-    no = prog.nodes[n, NOUT]
-    nd, ni = prog.nodes[n, NX] - no, prog.nodes[n, NIN]
-    return nd * nd + nd * ni + no * nd + no * ni
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def tick(prog, drive, segment, t, x, mode, work):
-    """Run the sampled controllers whose tick falls on `t`."""
-    w = work[0]
-    for n in range(prog.nodes.shape[0]):
-        if prog.nodes[n, KIND] == SAMPLED:
-            dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
-            if abs(t / dt - round(t / dt)) < 1e-6:
-                external(prog, drive, t, segment, w)
-                signals(prog, t, x, mode, w)
-                sample(prog, n, x, w)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def record(prog, drive, segment, t, x, mode, work, y):
-    """System outputs at one point."""
-    w = work[0]
-    external(prog, drive, t, segment, w)
-    signals(prog, t, x, mode, w)
-    for i in range(y.shape[0]):
-        y[i] = combine(prog, prog.ints[prog.ints[H_OUT] + i], w)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def accumulate(prog, drive, segment, t, length, theta, x, mode, work, order, poly, xi, spectrum, omega):
-    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss-Legendre quadrature."""
-    w = work[0]
-    for i in range(NODES.shape[0]):
-        at = theta * NODES[i]
-        time = t + at * length
-        inside(order, at, x, poly, xi)
-        external(prog, drive, time, segment, w)
-        signals(prog, time, xi, mode, w)
-        share = theta * length * WEIGHTS[i]
-        turn = complex(math.cos(omega * time), -math.sin(omega * time))
-        for row in range(spectrum.shape[0]):
-            value = share * combine(prog, prog.ints[prog.ints[H_OUT] + row], w)
-            rotation = complex(1.0, 0.0)
-            for harmonic in range(spectrum.shape[1]):
-                spectrum[row, harmonic] += value * rotation
-                rotation *= turn
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def _worst(g, gtol, scale, blocked):
-    """Smallest margin, relative to its scale, and its index."""
-    value, index = 1.0, -1
-    for i in range(g.shape[0]):
-        if i != blocked:
-            v = (g[i] + gtol[i]) / scale[i]
-            if v < value:
-                value, index = v, i
-    return value, index
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -143,32 +68,47 @@ def run(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are added; no
     columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner = space
+    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner, memo, store = space
     n, ng = x.shape[0], scale.shape[0]
+    t, index, h = clock[0], int(clock[1]), clock[2]
+    segment = int(clock[6])
+    nt, nh = drive.time.shape[0], drive.harmonics.shape[1]
+    held = nt > 0 and drive.linear == 0
+    has_tracked, bumpy, delays = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1, prog.ints[H_DELAYS] > 0
+    affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
+    if affine and nh > 1 and drive.omega > 0.0:
+        # the series of the forcing has to converge as well
+        hmax = min(hmax, 2.5 / ((nh - 1) * drive.omega))
+    if spectrum.shape[1] > 0 and omega > 0.0:
+        # ten nodes integrate a wave over so many radians of it
+        hmax = min(hmax, (6.0 if affine else 10.0) / (spectrum.shape[1] * omega))
+    steps = events_here = 0
+    # a run that goes on after a full event log goes on counting events without progress
+    zero_events = int(memo[0]) if memo[2] == 1.0 else 0
+    last_event_t = memo[1] if memo[2] == 1.0 else t
+    known = False  # k[0] holds the rates at (t, x)
+    jumped = False  # something outside the states jumped just now: modes may be out of line
+    generation = 1.0  # of the record that a delay opens next
+    patience = slot = 0
+    blocked = ng - 1 if clock[7] > 0.5 else -1
+    reason = DONE
+    for i in range(ng):
+        g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
         for j in range(n):
             size[j] = abs(x[j])
-    for i in range(ng):
-        g[i] = math.inf  # the section's margin must not outlive the run that watched it
-    t, index, h = clock[0], int(clock[1]), clock[2]
-    segment = int(clock[6])
-    steps = 0
-    events_here = 0
-    zero_events = 0
-    last_event_t = t
-    nt = drive.time.shape[0]
-    held = nt > 0 and drive.linear == 0
-    has_tracked = prog.ints[H_TRACK] == 1
-    known = False  # k[0] holds the rates at (t, x)
-    blocked = ng - 1 if clock[7] > 0.5 else -1
-    reason = DONE
-    if fresh == 1:
+        if delays:
+            start_delays(prog, drive, segment, t, x, mode, work)
         tick(prog, drive, segment, t, x, mode, work)
         if not settle(prog, drive, segment, t, x, mode, work, dx):
             reason = CHATTER
+        if delays:
+            start_delays(prog, drive, segment, t, x, mode, work)
     next_tick = next_sample(prog, t)
     while reason == DONE:
         while index < tout.shape[0] and tout[index] <= t:
+            if jumped:
+                settle(prog, drive, segment, t, x, mode, work, dx)
             for j in range(n):
                 xout[index, j] = x[j]
             record(prog, drive, segment, t, x, mode, work, yout[index])
@@ -182,123 +122,199 @@ def run(
         limit = t_end
         while segment + 1 < nt and drive.time[segment + 1] <= t:
             segment += 1
-            if held:
-                known = False
-                settle(prog, drive, segment, t, x, mode, work, dx)
+            generation = 1.0
+            jumped = jumped or held
         if segment + 1 < nt:
             limit = min(limit, drive.time[segment + 1])
         limit = min(limit, next_tick)
-        if not known:
-            if locate:
-                margins(
-                    prog, drive, segment, t, x, mode, work, k[0], g0, max(1e-4 * h, 1e-9), watch, watch_level, watch_sign
+        if delays:
+            limit, arrived = history.advance(prog, t, h if h > 0.0 else math.inf, limit, work[0])
+            if arrived > 0.0:
+                jumped = True
+                generation = arrived if generation == 0.0 else min(generation, arrived)
+        # --- rates and margins here
+        if jumped and (has_tracked or not locate):
+            settle(prog, drive, segment, t, x, mode, work, dx)
+            jumped = False
+        if affine:
+            slot = recall(prog, store, mode, work, x1, xi, dx, g)
+        if jumped or not known:
+            rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
+            if locate and (has_tracked or watch >= 0):
+                reach = max(1e-4 * h, 1e-9)
+                complete(
+                    prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign
                 )
             else:
-                rates(prog, drive, segment, t, x, mode, work, k[0], g0, False)
+                g0[ng - 1] = math.inf
             known = True
-        if h <= 0.0:
-            h = _first_step(x, k[0], rtol, atol, limit - t, hmax)
-        length = min(h, hmax)
-        truncated = t + length >= limit - 1e-12 * max(abs(limit), length)
-        if truncated:
-            length = limit - t
+        theta, at = 1.0, -1
         if locate:
             for i in range(ng):
                 if g0[i] < math.inf:
                     scale[i] = max(scale[i], abs(g0[i]))
-                gtol[i] = 1e-12 * scale[i] + 1e-2 * atol
-                lowest[i] = g0[i]
+            tolerances(prog, x, mode, scale, atol, gtol)
             # margins already crossed at the start (simultaneous events)
-            value, at = _worst(g0, gtol, scale, blocked)
+            value, at = worst(g0, gtol, scale, blocked)
+            if value < 0.0 and jumped:
+                jumped = known = False
+                settle(prog, drive, segment, t, x, mode, work, dx)
+                continue
+            jumped = False
             if at >= 0 and value < 0.0:
                 if at == ng - 1:
                     blocked = at
                     continue
                 theta = 0.0
-                zero_events += 1
-                if zero_events > 2000:
-                    reason = CHATTER
-                    break
             else:
-                theta = 1.0
                 at = -1
-        else:
-            theta = 1.0
-            at = -1
+        length = 0.0
         if theta > 0.0:
+            # --- a step
             steps += 1
-            if order == 8:
-                error = step8(
-                    prog, drive, segment, t, length, x, mode, work, k, g, lowest, x1, size, rtol, atol, locate
-                )
-            else:
-                error = step5(
-                    prog, drive, segment, t, length, x, mode, work, k, g, lowest, x1, size, rtol, atol, locate
-                )
-            if not error < math.inf:
-                h = 0.2 * length
-                if not h >= 1e-13 * max(abs(t), 1e-3):
-                    reason = NAN
-                continue
-            if error > 1.0:
-                h = length * max(0.2, 0.9 * error ** (-1.0 / order))
-                if t + h == t:
-                    reason = TINY
-                continue
-            grow = 5.0 if error == 0.0 else min(5.0, 0.9 * error ** (-1.0 / order))
-            h_next = length * max(grow, 0.3)
+            room = limit - t
+            length = min(h, hmax)
+            if affine and h <= 0.0:
+                length = min(room, hmax)
+            elif h <= 0.0:
+                length = h = _first_step(x, k[0], rtol, atol, room, hmax)
+            if bumpy:
+                for j in range(n):
+                    x1[j] = x[j] + length * k[0, j]
+                length *= bump_share(prog, x, x1)
+            truncated = t + length >= limit - 1e-12 * max(abs(limit), length)
             if truncated:
-                h_next = max(h_next, h)
+                length = room
+            prepared = False
+            terms = rank = 0
+            if affine:
+                least = forced(prog, drive, segment, t, length, rtol, store)
+                terms, share = series(store, slot, length, least, k[0], size, rtol, atol, poly)
+                if not share > 0.0:
+                    reason = NAN
+                    break
+                if share < 1.0:
+                    shrink(store, share, terms, poly)
+                    length *= share
+                    truncated = False
+                inside(terms, 1.0, x, poly, x1)
+                prepared = True
+                # a step costs the same however long: only an event cuts the next one short
+                h_next = max(h, 5.0 * length)
+            else:
+                for i in range(ng):
+                    lowest[i] = g0[i]
+                # samples much denser than the motion: a cheaper pair does
+                rank = order
+                if order == 5 and truncated and patience == 0 and h >= 2.0 * length:
+                    rank = 3
+                error = step(
+                    rank,
+                    prog,
+                    drive,
+                    segment,
+                    t,
+                    length,
+                    x,
+                    mode,
+                    work,
+                    k,
+                    g,
+                    lowest,
+                    x1,
+                    size,
+                    rtol,
+                    atol,
+                    locate,
+                )
+                if not error <= 1.0 and rank == 3:
+                    patience = PATIENCE
+                    continue
+                patience = max(patience - 1, 0)
+                if not error < math.inf:
+                    h = 0.2 * length
+                    if not h >= 1e-13 * max(abs(t), 1e-3):
+                        reason = NAN
+                    continue
+                if error > 1.0:
+                    h = length * max(0.2, 0.9 * error ** (-1.0 / order))
+                    if t + h == t:
+                        reason = TINY
+                    continue
+                if bumpy:
+                    share = bump_share(prog, x, x1)
+                    if share < 0.7:
+                        h = 0.9 * share * length
+                        continue
+                h_next = h
+                if rank != 3:
+                    grow = 5.0
+                    if error > (1e-6 if order == 8 else 1e-4):
+                        grow = min(5.0, 0.9 * error ** (-1.0 / order))
+                    h_next = length * max(grow, 0.3)
+                    if truncated:
+                        h_next = max(h_next, h)
             # --- events
-            last = 6 if order == 5 else 12
             suspect = False
             if locate:
-                if watch >= 0 or has_tracked:
-                    margins(
-                        prog, drive, segment, t + length, x1, mode, work, dx, g, 1e-4 * length, watch, watch_level,
-                        watch_sign,
-                    )  # fmt: skip
                 for i in range(ng):
-                    norm[i] = max(scale[i], abs(g[i])) if abs(g[i]) < math.inf else scale[i]
-                    if i != blocked and (g[i] + gtol[i] < 0.0 or lowest[i] + gtol[i] < 0.0):
+                    norm[i] = scale[i]
+                if affine and watch < 0:
+                    theta, at = crossing(
+                        prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm, g
+                    )
+                else:
+                    if affine or watch >= 0 or has_tracked:
+                        margins(
+                            prog, drive, segment, t + length, x1, mode, work, dx, g, 1e-4 * length, watch, watch_level,
+                            watch_sign,
+                        )  # fmt: skip
                         suspect = True
-                if has_tracked or watch >= 0:
-                    suspect = True
-            needed = suspect or spectrum.shape[1] > 0 or (index < tout.shape[0] and tout[index] < t + length)
-            if needed:
-                if order == 8:
+                    for i in range(ng):
+                        if abs(g[i]) < math.inf:
+                            norm[i] = max(scale[i], abs(g[i]))
+                        if i != blocked and (
+                            g[i] + gtol[i] < 0.0 or (rank == 8 and lowest[i] + gtol[i] < 0.0)
+                        ):
+                            suspect = True
+                    suspect = suspect or may_touch(prog, x, x1, mode, length)
+            inner = index < tout.shape[0] and tout[index] < t + length
+            if not prepared and (suspect or spectrum.shape[1] > 0 or inner or delays):
+                if rank == 8:
                     prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
                     rough = roughness(size, rtol, atol, poly)
                     if rough > 1.0:
                         h = length * max(0.3, 0.9 * rough ** (-0.125))
                         continue
                 else:
-                    prepare5(length, k, poly)
-                if suspect:
-                    theta, at = _locate(
-                        prog, drive, segment, t, length, x, mode, work, order, poly, xi, dx, g, lowest, gtol, norm,
-                        blocked, watch, watch_level, watch_sign, has_tracked or watch >= 0,
-                    )  # fmt: skip
+                    terms = prepare(rank, length, k, poly)
+            if suspect:
+                theta, at = locate_event(
+                    prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, norm, blocked, watch,
+                    watch_level, watch_sign,
+                )  # fmt: skip
             if blocked >= 0 and locate and g[blocked] > gtol[blocked]:
                 blocked = -1
             reached = t + theta * length if theta < 1.0 else (limit if truncated else t + length)
             # --- outputs inside the step
-            if index < tout.shape[0] and tout[index] < reached:
-                while index < tout.shape[0] and tout[index] < reached:
-                    inside(order, (tout[index] - t) / length, x, poly, xi)
-                    for j in range(n):
-                        xout[index, j] = xi[j]
-                    record(prog, drive, segment, tout[index], xi, mode, work, yout[index])
-                    index += 1
+            while index < tout.shape[0] and tout[index] < reached:
+                record_inside(
+                    prog, drive, segment, t, (tout[index] - t) / length, length, x, mode, work, terms, poly, xout[index],
+                    yout[index],
+                )  # fmt: skip
+                index += 1
             if spectrum.shape[1] > 0:
                 accumulate(
-                    prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, order, poly, xi, spectrum, omega
+                    prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, terms, poly, xi, spectrum, omega
                 )  # fmt: skip
+            if delays and not remember(
+                prog, drive, segment, t, length, min(theta, 1.0), generation, x, mode, work, terms, poly, xi
+            ):
+                reason = HISTORY
+                break
+            generation = 0.0
             if theta < 1.0:
-                if theta > 0.0:
-                    inside(order, theta, x, poly, x1)
-                else:
-                    copy(x, x1)
+                inside(terms, theta, x, poly, x1)
             t = reached
             copy(x1, x)
             for j in range(n):
@@ -306,42 +322,48 @@ def run(
                 size[j] = max(abs(x[j]), 0.98 * size[j])
             h = h_next
             if at < 0:
-                if locate:
-                    copy(g, g0)
-                copy(k[last], k[0])
-                known = theta == 1.0
+                known = False
+                if not affine:
+                    if locate:
+                        copy(g, g0)
+                    copy(k[12 if rank == 8 else (6 if rank == 5 else 3)], k[0])
+                    known = theta == 1.0
                 if has_tracked:
                     track(prog, drive, segment, t, x, mode, work)
                 if t == next_tick:
                     tick(prog, drive, segment, t, x, mode, work)
-                    settle(prog, drive, segment, t, x, mode, work, dx)
                     next_tick = next_sample(prog, t)
-                    known = False
+                    jumped, generation = True, 1.0
                 continue
         if theta < 1.0 and theta * length > 0.0:
             # a step that ran far beyond its event says little of what follows
-            h = min(h, 3.0 * theta * length)
+            h = max(min(h, 3.0 * theta * length), 1e-14 * abs(t))
         # --- an event at (t, x)
+        known = False
         if at == ng - 1:
             blocked = at
-            known = False
             if log_t.shape[0] > 0:
                 reason = SECTION
             copy(x, before)
             continue
         if has_tracked:
             track(prog, drive, segment, t, x, mode, work)
+            margins(prog, drive, segment, t, x, mode, work, dx, g, 1e-9, -1, 0.0, 1)
         copy(x, before)
         node = owner[at]
-        rates(prog, drive, segment, t, x, mode, work, dx, g, False)
-        kind = event(
-            prog, drive, segment, t, x, mode, work, dx, g, node, at - prog.nodes[node, G], height
-        )
-        known = False
-        for i in range(prog.nodes[node, G], prog.nodes[node, G] + prog.nodes[node, NG]):
-            scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
-        if not settle(prog, drive, segment, t, x, mode, work, dx):
+        modes = _signature(mode)
+        kind = event(prog, drive, segment, t, x, mode, work, dx, g, node, at - prog.nodes[node, G], height)
+        generation = 1.0
+        settled = settle(prog, drive, segment, t, x, mode, work, dx)
+        if not settled:
             zero_events += 100
+        if settled and _signature(mode) == modes and _same(x, before):
+            # nothing came of it: rounding alone crossed this margin, which thereby counts as larger
+            scale[at] *= 100.0
+        else:
+            for i in range(prog.nodes[node, G], prog.nodes[node, G] + prog.nodes[node, NG]):
+                scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
+        zero_events += 1
         if t - last_event_t > 1e-9 * max(abs(t), 1e-3):
             zero_events = 0
             last_event_t = t
@@ -352,7 +374,9 @@ def run(
             log_n[events_here] = node
             log_k[events_here] = kind
         events_here += 1
-        if stop_at_event:
+        if zero_events > 2000:
+            reason = CHATTER
+        elif stop_at_event:
             reason = EVENT
         elif log_t.shape[0] > 1 and events_here >= log_t.shape[0]:
             reason = FULL
@@ -361,7 +385,26 @@ def run(
     clock[5] = events_here
     clock[6] = segment
     clock[7] = 1.0 if blocked >= 0 else 0.0
+    memo[0], memo[1], memo[2] = zero_events, last_event_t, 1.0 if reason == FULL else 0.0
     return reason
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _signature(mode):
+    """One number that tells mode vectors apart."""
+    value = 0
+    for i in range(mode.shape[0]):
+        value = 31 * value + mode[i]
+    return value
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _same(a, b):
+    """Whether two vectors are equal."""
+    for i in range(a.shape[0]):
+        if a[i] != b[i]:
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -374,84 +417,3 @@ def _first_step(x, dx, rtol, atol, room, hmax):
         d1 += (dx[j] / scale) ** 2
     h = 1e-6 if d0 < 1e-10 or d1 < 1e-10 else 0.01 * math.sqrt(d0 / d1)
     return min(max(h, 1e-9), hmax, room)
-
-
-@njit(cache=True, error_model="numpy", _nrt=False)
-def _locate(
-    prog, drive, segment, t, length, x, mode, work, order, poly, xi, dx, g, lowest, gtol, scale, blocked, watch,
-    watch_level, watch_sign, scan,
-):  # fmt: skip
-    """Fraction of the step at which the first margin crosses zero, and its index (1.0, -1: none).
-
-    The inner stages of a step are crude; what they suspect is confirmed on the interpolant.
-    """
-    reach = 1e-4 * length
-    left, right = 0.0, -1.0
-    value_right, at = _worst(g, gtol, scale, blocked)
-    value_left = 1.0
-    inner = scan
-    for i in range(g.shape[0]):
-        if i != blocked and lowest[i] + gtol[i] < 0.0 <= g[i] + gtol[i]:
-            inner = True
-    end_value, end_at = value_right, at
-    if inner or value_right < 0.0:
-        # a margin may have gone below zero and come back before it went again: look from the left
-        pieces = 12
-        for p in range(1, pieces + 1):
-            theta = p / pieces
-            if p == pieces:
-                value, at = end_value, end_at
-            else:
-                inside(order, theta, x, poly, xi)
-                margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch,
-                        watch_level, watch_sign)  # fmt: skip
-                value, at = _worst(g, gtol, scale, blocked)
-            if value < 0.0:
-                right, value_right = theta, value
-                break
-            left, value_left = theta, value
-    if right < 0.0:
-        # g must again be the margins at the end of the step
-        inside(order, 1.0, x, poly, xi)
-        margins(prog, drive, segment, t + length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)
-        return 1.0, -1
-    if left == 0.0:
-        inside(order, 0.0, x, poly, xi)
-        margins(prog, drive, segment, t, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)
-        value_left, _ = _worst(g, gtol, scale, blocked)
-    if value_left < 0.0:
-        return 0.0, at
-    if left == 0.0:
-        # a flight or slip that began at this very point: its margin rises from zero before it falls
-        for _halving in range(50):
-            theta = 0.5 * right
-            inside(order, theta, x, poly, xi)
-            margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)
-            value, index = _worst(g, gtol, scale, blocked)
-            if value >= 0.0:
-                left, value_left = theta, value
-                break
-            right, value_right, at = theta, value, index
-    weight_left, weight_right, side = value_left, value_right, 0
-    for iteration in range(100):
-        width = right - left
-        if width * length <= 2e-16 * max(abs(t), length) or width < 1e-15 or value_right > -1e-15:
-            break
-        # Illinois: a secant that cannot hang on one side, with a bisection now and then
-        theta = left + width * weight_left / (weight_left - weight_right)
-        if iteration % 5 == 4 or not left < theta < right:
-            theta = 0.5 * (left + right)
-        inside(order, theta, x, poly, xi)
-        margins(prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign)
-        value, index = _worst(g, gtol, scale, blocked)
-        if value < 0.0:
-            right, value_right, weight_right, at = theta, value, value, index
-            if side < 0:
-                weight_left *= 0.5
-            side = -1
-        else:
-            left, weight_left = theta, value
-            if side > 0:
-                weight_right *= 0.5
-            side = 1
-    return right, at

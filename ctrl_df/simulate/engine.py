@@ -9,9 +9,10 @@ import control as ct
 import numpy as np
 
 from ..status import Status
-from . import driver, layout, pointers
-from .flatten import flatten, pack
+from . import driver, history, layout, pointers
+from .flatten import flatten
 from .layout import EVENT_KINDS, Drive
+from .pack import pack
 
 RTOL = 1e-9
 """Default relative tolerance; the absolute one is a thousandth of it."""
@@ -24,6 +25,7 @@ _STATUS = {
     driver.NAN: Status.DIVERGED,
     driver.CHATTER: Status.CHATTERING,
     driver.TINY: Status.STEP_TOO_SMALL,
+    driver.HISTORY: Status.HISTORY_FULL,
 }
 
 
@@ -38,7 +40,7 @@ class Event:
 
 @dataclass
 class State:
-    """Everything needed to go on: time, continuous state, discrete modes, step size."""
+    """Everything needed to go on: time, continuous state, discrete modes, step size, what pure delays remember."""
 
     time: float
     x: np.ndarray
@@ -48,10 +50,12 @@ class State:
     on_section: bool = False
     fresh: bool = True
     scale: np.ndarray | None = None
+    history: np.ndarray | None = None
 
     def copy(self) -> State:
         """Return an independent copy."""
         scale = None if self.scale is None else self.scale.copy()
+        # a history is written by no one once it stands in a state
         return replace(self, x=self.x.copy(), mode=self.mode.copy(), scale=scale)
 
 
@@ -120,14 +124,26 @@ class Engine:
         self.system = system
         self._flat = flatten(system)
         self.nstates = system.nstates or 0
-        self.program, self._modes, self.node_names = pack(self._flat, self.nstates)
-        self._space = driver.workspace(self.program)
+        self.program, self._initial, self.node_names = pack(self._flat, self.nstates)
+        self._space = driver.workspace(self.program, delays=True)
         self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
+
+    @property
+    def delayed(self) -> bool:
+        """Whether a pure delay stands inside, whose state is a history."""
+        return bool(self.program.ints[layout.H_DELAYS])
+
+    @property
+    def _modes(self) -> np.ndarray:
+        """Modes of a fresh state, for those who set states by themselves: not possible with a history."""
+        if self.delayed:
+            driver.workspace(self.program)
+        return self._initial
 
     def start(self, x0=None, time: float = 0.0) -> State:
         """Return a fresh state; its modes are settled when the run begins."""
         x = np.zeros(self.nstates) if x0 is None else np.array(x0, dtype=float)
-        return State(float(time), x, self._modes.copy())
+        return State(float(time), x, self._initial.copy())
 
     def run(
         self,
@@ -193,11 +209,22 @@ class Engine:
         scale = now.scale if now.scale is not None else np.full(ng, 1e-3 * rtol)
         xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
         clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1])
-        log_t, log_n, log_k = np.zeros(max(log, 1)), np.zeros(max(log, 1), np.int64), np.zeros(max(log, 1), np.int64)
+        log_t, log_n, log_k = (
+            np.zeros(max(log, 1)),
+            np.zeros(max(log, 1), np.int64),
+            np.zeros(max(log, 1), np.int64),
+        )
         before = now.x.copy()
         kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         fresh = int(now.fresh)
         pointers.raised.clear()
+        past = history.stored(self.program, self._space[0][0])
+        if self.delayed and not fresh:
+            if now.history is None:
+                raise ValueError(
+                    "a state of a system with pure delays is its history as well; go on from the state that a run returned."
+                )
+            past[:] = now.history
         while True:
             room = max_steps - int(clock[3])
             chunk = min(room, 1_000_000)
@@ -216,16 +243,29 @@ class Engine:
         status = _STATUS[reason]
         if pointers.raised:
             status = Status.USER_ERROR
-        events: Any = tuple(np.concatenate(c) for c in zip(*kept, strict=True)) if kept else (log_t[:0], log_n[:0], log_k[:0])
-        after = State(
-            float(clock[0]), now.x, now.mode, float(clock[2]), int(clock[6]), clock[7] > 0.5, False, scale
+        events: Any = (
+            tuple(np.concatenate(c) for c in zip(*kept, strict=True))
+            if kept
+            else (log_t[:0], log_n[:0], log_k[:0])
         )
+        after = State(
+            float(clock[0]), now.x, now.mode, float(clock[2]), int(clock[6]), clock[7] > 0.5, False, scale,
+            past.copy() if self.delayed else None,
+        )  # fmt: skip
         return Run(
-            after, status, reason, yout, xout, int(clock[1]), int(clock[3]), int(clock[4]), events, before, int(clock[8])
+            after,
+            status,
+            reason,
+            yout,
+            xout,
+            int(clock[1]),
+            int(clock[3]),
+            int(clock[4]),
+            events,
+            before,
+            int(clock[8]),
         )
 
     def name_events(self, events) -> list[Event]:
         """Turn the event arrays of a run into `Event` values."""
-        return [
-            Event(float(t), self.node_names[n], EVENT_KINDS[k]) for t, n, k in zip(*events, strict=True)
-        ]
+        return [Event(float(t), self.node_names[n], EVENT_KINDS[k]) for t, n, k in zip(*events, strict=True)]

@@ -27,7 +27,8 @@ A_BODIES, A_JOINT, A_STOP, A_BRISTLE, A_MEASURED, A_NFORCE, A_NFRIC0, A_NFRIC1, 
 J_NONE, J_RIGID, J_IMPACT, J_ELASTIC = range(4)
 
 # float layout of a mechanism in the parameter table
-P_M0, P_M1, P_GAP, P_REST, P_K, P_C, P_LOW, P_HIGH, P_STOP_REST, P_SIGMA0, P_SIGMA1, P_SIGMA_LEVEL, P_LAWS = range(13)
+P_M0, P_M1, P_GAP, P_REST, P_K, P_C, P_LOW, P_HIGH, P_STOP_REST, P_SIGMA0, P_SIGMA1, P_SIGMA_LEVEL = range(12)
+P_BUMP0, P_BUMP1 = 12, 13  # narrowest feature of each body's friction over speed [m/s], inf: none
 
 # event slots of a mechanism
 G_BODY0, G_BODY1, G_JOINT_LOW, G_JOINT_HIGH, G_WALL_LOW, G_WALL_HIGH = range(6)
@@ -65,8 +66,11 @@ EVENT_KINDS = (
 
 
 # header of the integer table: sizes of state, signals, inputs, outputs, modes, margins; widest node input; whether
-# margins need input rates; position of the output rows; offsets of node inputs and of scratch in the work vector
-H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_END = range(12)
+# margins need input rates; position of the output rows; offsets of node inputs and of scratch in the work vector;
+# whether a friction law has a narrow feature over speed; whether the flow of every mode is affine; number of delays, and
+# where their history begins in the work vector
+H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_BUMP = range(12)
+H_AFFINE, H_DELAYS, H_HISTORY = 12, 13, 14
 
 # a law's record in the integer table
 R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SIZE = range(5)
@@ -94,4 +98,3 @@ class Drive(NamedTuple):
     harmonics: np.ndarray  # (nr, nh) complex, k = 0, 1, ...
     omega: float
     address: int  # of a function called back, or 0
-

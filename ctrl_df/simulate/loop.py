@@ -55,7 +55,9 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     if controller.isdtime(strict=True):
         own = float(controller.dt)
         if dt not in (0, None) and not np.isclose(own, dt):
-            raise ValueError(f"closed_loop got dt={dt} for a controller with dt={own}; leave dt out, or make them equal.")
+            raise ValueError(
+                f"closed_loop got dt={dt} for a controller with dt={own}; leave dt out, or make them equal."
+            )
         dt = own
     fed_back = block.output_labels[0] if output is None else _label(block, output)
     force = block.input_labels[0]
@@ -133,7 +135,9 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
                 None, lambda t, x, u, params: np.array([float(static(u[0]))]),
                 inputs=["u"], outputs=["y"], name="nonlinearity",
             )  # fmt: skip
-        raise TypeError(f"closed_loop needs a block (ct.NonlinearIOSystem) or a static function; got {block!r}.")
+        raise TypeError(
+            f"closed_loop needs a block (ct.NonlinearIOSystem) or a static function; got {block!r}."
+        )
     if block.ninputs != 1:
         raise ValueError(f"closed_loop needs a block with one input; {block.name} has {block.ninputs}.")
     return block
@@ -141,13 +145,19 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
 
 def _as_lti(pid) -> Any:
     if isinstance(pid, ct.FrequencyResponseData):
-        raise ValueError("closed_loop cannot run measured frequency points (FRD) in time; fit a transfer function first.")
+        raise ValueError(
+            "closed_loop cannot run measured frequency points (FRD) in time; fit a transfer function first."
+        )
     if isinstance(pid, int | float):
         pid = ct.tf([float(pid)], [1.0])
     if not isinstance(pid, ct.TransferFunction | ct.StateSpace):
-        raise TypeError(f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}.")
+        raise TypeError(
+            f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}."
+        )
     if not pid.issiso():
-        raise ValueError(f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs.")
+        raise ValueError(
+            f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs."
+        )
     return pid
 
 

@@ -84,7 +84,9 @@ def _call(builder, returns, address_value, values, is_pointer):
     double = ir.DoubleType()
     kinds = [double.as_pointer() if p else double for p in is_pointer]
     function = builder.inttoptr(address_value, ir.FunctionType(returns, kinds).as_pointer())
-    args = [builder.inttoptr(v, double.as_pointer()) if p else v for v, p in zip(values, is_pointer, strict=True)]
+    args = [
+        builder.inttoptr(v, double.as_pointer()) if p else v for v, p in zip(values, is_pointer, strict=True)
+    ]
     return builder.call(function, args)
 
 
@@ -151,5 +153,3 @@ def call_input(typingctx, address, t, r):
         return context.get_dummy_value()
 
     return sig, codegen
-
-

@@ -59,7 +59,9 @@ def event_response(
     inputs : float, (nt,) or (ninputs, nt) array, list, or callable
         A constant, samples at `timepts`, or a function of time (called with t, returning a number or one for each input).
     initial_state : float or (nstates,) array
-        State at the first time, in the order of ``sys.state_labels``; a scalar fills all.
+        State at the first time, in the order of ``sys.state_labels``; a scalar fills all. A pure delay (input_delay,
+        sensor_delay) runs exactly; before the first time its input is taken to have always been what it is then (its own
+        entry here is for ordinary solvers and has no effect). To see a step arrive late, begin the times before the step.
     params : dict
         Parameters of blocks that differ from their own values.
     input_hold : {'linear', 'zoh'}
@@ -105,7 +107,9 @@ def event_response(
         n = int(np.argmin(np.isfinite(run.outputs[:n]).all(axis=1)))
         run.status = Status.DIVERGED
     if not run.status.ok:
-        warnings.warn(f"event_response ended at t = {run.state.time:.6g} s: {run.status}", RuntimeWarning, stacklevel=2)
+        warnings.warn(
+            f"event_response ended at t = {run.state.time:.6g} s: {run.status}", RuntimeWarning, stacklevel=2
+        )
     response = EventResponse(
         times[:n],
         run.outputs[:n].T,
@@ -160,7 +164,9 @@ def _with_params(system, params):
     if not params:
         return system
     if isinstance(system, ct.InterconnectedSystem):
-        raise ValueError("params of an interconnection: change the block itself with with_parameters, then interconnect.")
+        raise ValueError(
+            "params of an interconnection: change the block itself with with_parameters, then interconnect."
+        )
     if hasattr(system, "with_parameters"):
         return system.with_parameters(params)
     return ct.NonlinearIOSystem(
@@ -172,7 +178,9 @@ def _with_params(system, params):
 def _times(timepts):
     times = np.atleast_1d(np.asarray(timepts, dtype=float))
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0):
-        raise ValueError(f"timepts must be at least two finite times in ascending order [s]; got {timepts!r}.")
+        raise ValueError(
+            f"timepts must be at least two finite times in ascending order [s]; got {timepts!r}."
+        )
     return np.ascontiguousarray(times)
 
 

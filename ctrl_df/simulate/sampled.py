@@ -35,7 +35,9 @@ class Sampled(ct.NonlinearIOSystem):
 
         def update(t, x, u, params):
             held = x[n:]
-            return np.concatenate([((a - np.eye(n)) @ x[:n] + b @ u) / dt, (c @ x[:n] + d @ u - held) * 2 / dt])
+            return np.concatenate(
+                [((a - np.eye(n)) @ x[:n] + b @ u) / dt, (c @ x[:n] + d @ u - held) * 2 / dt]
+            )
 
         def output(t, x, u, params):
             return x[n:]

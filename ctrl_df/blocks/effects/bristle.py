@@ -33,7 +33,9 @@ class Bristle(Effect):
 
     role: ClassVar[str] = "presliding"
     states: ClassVar[int] = 1
-    shows: ClassVar[str] = "error around every reversal, where the real friction builds up over a small stroke"
+    shows: ClassVar[str] = (
+        "error around every reversal, where the real friction builds up over a small stroke"
+    )
     source: ClassVar[str] = "Canudas de Wit, Olsson, Astrom & Lischinsky (1995), eqs. (1)-(4)"
 
     @staticmethod

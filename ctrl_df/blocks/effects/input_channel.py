@@ -45,7 +45,9 @@ class InputDeadZone(Effect):
     threshold: float = parameter("N", meaning="half width of the dead zone")
 
     role: ClassVar[str] = "input"
-    shows: ClassVar[str] = "error when the commanded force is small, and a force short by the threshold beyond"
+    shows: ClassVar[str] = (
+        "error when the commanded force is small, and a force short by the threshold beyond"
+    )
     source: ClassVar[str] = "Tao & Kokotovic (1996), ch. 2"
 
     def channel(self):
