@@ -152,7 +152,7 @@ class FrequencyStudy:
             for c in kinds
         ]
         run = map if executor is None else executor.map
-        rough = [self._tried(*r, QUICK) for r in run(_try, jobs) if r is not None]
+        rough = [self._tried(*r, work=QUICK) for r in run(_try, jobs) if r is not None]
         self._judge(rough)
         rough.sort(key=lambda t: -t.evidence)
         # what explains next to nothing of a few points will not explain all of them

@@ -103,7 +103,7 @@ def simulate_table(model, points: Points, work=None) -> np.ndarray:
     from ..df.describing import describing_function
     from ..df.dispatch import method_for
 
-    options = (work or CAREFUL) if method_for(model).name == "orbit" else {}
+    options: dict[str, Any] = dict(work or CAREFUL) if method_for(model).name == "orbit" else {}
     return np.asarray(describing_function(model, points.A, points.omega, **options))
 
 

@@ -54,8 +54,8 @@ def refit_frequency(model, data, free=None, *, start=None, budget=600, **keyword
         )
         for k, v in zip(names, found.variables, strict=True)
     }  # fmt: skip
-    return Fit(
-        _as_given(model, found.block), MappingProxyType(parameters), comparison_of_tables(found.block, records),
+    return Fit(  # the comparison is of its own kind
+        _as_given(model, found.block), MappingProxyType(parameters), comparison_of_tables(found.block, records),  # pyright: ignore[reportArgumentType]
         covariance, tuple(doubtful.values()), found.converged, found.evaluations,
     )  # fmt: skip
 
