@@ -5,6 +5,7 @@ from __future__ import annotations
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import FuncFormatter
 
 _MEASURED, _SIMULATED, _ERROR = "0.55", "#1f4e9c", "#b3402a"
 
@@ -39,7 +40,8 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     top.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.99), fontsize=9)
     top.set_title(f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %", loc="left", fontsize=10)
     factor, small = _readable(chosen.residual, unit)
-    lines[1] = below.plot(data.t, factor * chosen.residual, color=_ERROR, lw=0.7)
+    lines[1] = below.plot(data.t, chosen.residual, color=_ERROR, lw=0.7)
+    below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
     white = chosen.white
     below.set_title(
         f"rmse {factor * chosen.rmse:.3g} {small}; {'white' if white else 'not white'} "
