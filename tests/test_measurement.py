@@ -327,3 +327,17 @@ def test_frequency_measurements(tmp_path):
             FrequencyMeasurement(*bad)
     with pytest.raises(ValueError, match="either real="):
         FrequencyMeasurement.from_csv(path, frequency="f", magnitude="mag")
+
+
+def test_it_travels_to_worker_processes():
+    import pickle
+
+    t = np.linspace(0, 1, 50)
+    m = Measurement(t, np.sin(9 * t), t**2, channels={"reference": 2 * t}, velocity=2 * t)
+    again = pickle.loads(pickle.dumps(m))
+    for name in ("t", "u", "y", "velocity"):
+        assert np.array_equal(getattr(again, name), getattr(m, name))
+        assert not getattr(again, name).flags.writeable
+    assert np.array_equal(again.channels["reference"], 2 * t)
+    with pytest.raises(TypeError):
+        again.channels["reference"] = t

@@ -265,6 +265,10 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    from .frequency_compare import compare_frequency, has_tables
+
+    if has_tables(data):
+        return compare_frequency(model, data)  # pyright: ignore[reportReturnType]
     records = as_records(data)
     lengths = window_lengths(
         model, records, "windows" if mode == "auto" and window is not None else mode, window

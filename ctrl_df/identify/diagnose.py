@@ -64,13 +64,15 @@ def diagnose(
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     began = time.perf_counter()
-    from .frequency_measurement import FrequencyMeasurement
+    from .frequency_compare import has_tables
 
-    records = as_records(data, "data")
-    if any(isinstance(r, FrequencyMeasurement) for r in records):
-        raise NotImplementedError(
-            "diagnose needs records over time (Measurement); a FrequencyMeasurement cannot be diagnosed yet."
+    if has_tables(data):
+        from .frequency_diagnosis import diagnose_frequency
+
+        return diagnose_frequency(
+            model, data, holdout=holdout, candidates=candidates, free=free, executor=executor, limits=limits
         )
+    records = as_records(data, "data")
     held = as_records(holdout, "holdout") if holdout is not None else ()
     block = block_of(model)
     free = free_names(block, free)

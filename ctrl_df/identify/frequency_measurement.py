@@ -27,12 +27,15 @@ class FrequencyMeasurement:
         Shown in tables and pictures.
     input_unit, output_unit : str
         Units of A and of the output behind N; converted to SI.
+    noise : float or array_like, shape (na, nw), or None
+        Standard error of N relative to ``|N|``, > 0, where it is known (from repeated runs, say): points weigh
+        by it. None: all points alike.
 
     Raises
     ------
     ValueError
         Wrong shape, an amplitude or frequency that is not positive and increasing, a table without any
-        measured point.
+        measured point, a noise that is not positive.
     """
 
     A: np.ndarray
@@ -41,6 +44,7 @@ class FrequencyMeasurement:
     name: str = "frequency response"
     input_unit: str = "N"
     output_unit: str = "m"
+    noise: float | np.ndarray | None = None
 
     def __post_init__(self):
         scale_u, input_unit = si_unit(self.input_unit)
@@ -65,6 +69,8 @@ class FrequencyMeasurement:
                 f"got {np.count_nonzero(np.isfinite(table))} finite of {table.size}."
             )
         values = dict(A=amplitudes * scale_u, omega=omega, N=table * (scale_y / scale_u))
+        if self.noise is not None:
+            values["noise"] = _noise(self.noise, table)
         for key, array in values.items():
             array.flags.writeable = False
             object.__setattr__(self, key, array)
@@ -129,6 +135,12 @@ class FrequencyMeasurement:
         i, k = np.nonzero(np.isfinite(self.N))
         return self.A[i], self.omega[k], self.N[i, k]
 
+    @property
+    def noise_of_points(self) -> np.ndarray:
+        """Relative standard errors of the measured points, in the order of `points`; NaN where none are stated."""
+        good = np.isfinite(self.N)
+        return np.full(np.count_nonzero(good), np.nan) if self.noise is None else np.asarray(self.noise)[good]
+
     def frd(self, amplitude: float) -> ct.FrequencyResponseData:
         """Return the measured response at the amplitude nearest to `amplitude`."""
         i = int(np.argmin(np.abs(self.A - amplitude)))
@@ -144,6 +156,22 @@ class FrequencyMeasurement:
             f"{self.input_unit}, {len(self.omega)} frequencies {self.omega[0]:g} to {self.omega[-1]:g} "
             f"rad/s, {measured} of {self.N.size} points measured)"
         )
+
+
+def _noise(noise, table):
+    try:
+        array = np.broadcast_to(np.asarray(noise, dtype=float), table.shape).copy()
+    except ValueError:
+        raise ValueError(
+            f"FrequencyMeasurement needs noise as one number or of the shape of N, {table.shape}; got shape "
+            f"{np.shape(noise)}."
+        ) from None
+    if not np.all(array[np.isfinite(table)] > 0):
+        raise ValueError(
+            "FrequencyMeasurement needs noise > 0 (standard error of N over |N|) wherever N is measured; got "
+            f"{float(np.nanmin(array)):g} at least. Leave it out where it is not known."
+        )
+    return array
 
 
 def _axis(name, values):

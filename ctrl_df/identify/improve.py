@@ -154,6 +154,14 @@ def improve(
 
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    from .frequency_compare import has_tables
+
+    if has_tables(train):
+        from .frequency_improve import improve_frequency
+
+        return improve_frequency(
+            model, train, holdout, max_effects, candidates=candidates, free=free, executor=executor
+        )
     if int(max_effects) != max_effects or max_effects < 0:
         raise ValueError(f"improve needs max_effects as an integer >= 0; got {max_effects!r}.")
     began = time.perf_counter()

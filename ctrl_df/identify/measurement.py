@@ -323,6 +323,18 @@ class Measurement:
             object.__setattr__(part, field.name, _frozen(value) if isinstance(value, np.ndarray) else value)
         return part
 
+    def __getstate__(self):
+        """Return the fields for pickling (worker processes); a mapping proxy cannot be."""
+        state = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return {**state, "channels": dict(state["channels"])}
+
+    def __setstate__(self, state):
+        """Take the fields back, read-only again."""
+        state = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in state.items()}
+        state["channels"] = MappingProxyType({k: _frozen(v) for k, v in state["channels"].items()})
+        for key, value in state.items():
+            object.__setattr__(self, key, value)
+
     def __repr__(self) -> str:
         rate = f"dt {self.dt:g} s" if self.regular else f"irregular, median dt {self.dt:g} s"
         extra = "" if self.velocity is None else ", velocity"

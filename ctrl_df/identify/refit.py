@@ -158,6 +158,12 @@ def refit(
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    from .frequency_compare import has_tables
+
+    if has_tables(data):
+        from .frequency_refit import refit_frequency
+
+        return refit_frequency(model, data, free, start=start, budget=budget)
     records = as_records(data)
     fitted = _fitted_model(model, records)
     block = Simulator(fitted, records[0]).block

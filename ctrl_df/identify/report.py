@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import math
 from pathlib import Path
 from string import Template
 
@@ -13,35 +14,56 @@ _PAGE = Template("""<!doctype html>
 <title>$title</title>
 <style>
 :root { --ink: #1b2430; --soft: #5b6675; --line: #dfe4ea; --blue: #1f4e9c; --paper: #fff; }
+* { box-sizing: border-box; }
 body { font: 16px/1.55 system-ui, "Segoe UI", Arial, sans-serif; color: var(--ink); background: #f4f6f8;
-  margin: 0; }
-main { max-width: 960px; margin: 0 auto; padding: 2.5rem 1.5rem 4rem; background: var(--paper); }
+  margin: 0; overflow-wrap: break-word; }
+main { max-width: 60rem; margin: 0 auto; padding: 2.5rem 1.5rem 4rem; background: var(--paper); }
 h1 { font-size: 1.75rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.15rem; margin: 2.4rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
+h2 { font-size: 1.2rem; margin: 2.4rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
 p.lead { font-size: 1.08rem; border-left: 4px solid var(--blue); padding: .2rem 0 .2rem 1rem; margin: 1.2rem 0; }
 .verdict { display: inline-block; background: var(--blue); color: #fff; border-radius: 3px; padding: .1rem .6rem; }
 .soft { color: var(--soft); font-size: .92rem; }
-table { border-collapse: collapse; width: 100%; font-size: .93rem; font-variant-numeric: tabular-nums; }
-th { text-align: left; color: var(--soft); font-weight: 600; border-bottom: 2px solid var(--line); padding: .35rem .6rem; }
-td { border-bottom: 1px solid var(--line); padding: .35rem .6rem; vertical-align: top; }
-td.n, th.n { text-align: right; }
 .scroll { overflow-x: auto; }
-img { max-width: 100%; height: auto; display: block; margin: .8rem auto; }
+table { border-collapse: collapse; width: 100%; font-size: .93rem; font-variant-numeric: tabular-nums; }
+th { text-align: left; color: var(--soft); font-weight: 600; border-bottom: 2px solid var(--line);
+  padding: .35rem .6rem; white-space: nowrap; }
+td { border-bottom: 1px solid var(--line); padding: .35rem .6rem; vertical-align: top; }
+td:first-child { min-width: 8.5rem; }
+td.n, th.n { text-align: right; white-space: nowrap; }
+figure { margin: 1rem 0; }
+img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
+figcaption { color: var(--soft); font-size: .92rem; text-align: center; }
+details { margin: .6rem 0; border: 1px solid var(--line); border-radius: 4px; padding: .3rem .9rem; }
+summary { cursor: pointer; font-weight: 600; padding: .3rem 0; }
+@media (max-width: 40rem) {
+  main { padding: 1.2rem .9rem 2.5rem; } h1 { font-size: 1.35rem; }
+  figure { overflow-x: auto; } img { min-width: 34rem; }
+  td, th { padding: .3rem .4rem; }
+}
 @media print { body { background: #fff; } main { padding: 0; } }
 </style></head><body><main>
 <h1>$title</h1>
 <p class="soft">$records</p>
 <p><span class="verdict">$verdict</span></p>
 <p class="lead">$lead</p>
+$next
 <h2>The ladder</h2>
+<p>$how</p>
 $ladder
 <div class="scroll">$steps</div>
-$sections
+<h2>Model and measurement</h2>
+$pictures
 <h2>The model</h2>
+<p>$model</p>
 <div class="scroll">$parameters</div>
+$doubts
+<h2>Step by step</h2>
+$sections
 <p class="soft">$closing</p>
 </main></body></html>
 """)
+
+_VERDICTS = {"none": "nothing missing", "effect": "found", "unknown": "something remains"}
 
 
 def write_report(study, path) -> str:
@@ -52,6 +74,11 @@ def write_report(study, path) -> str:
     study : Study
     path : path-like
         File to write; its folder must exist.
+
+    Raises
+    ------
+    ValueError
+        The folder does not exist.
     """
     target = Path(path)
     if not target.parent.exists():
@@ -62,22 +89,63 @@ def write_report(study, path) -> str:
 
 def render(study) -> str:
     """Return the report as HTML text."""
-    names = ", ".join(f"{r.name} ({len(r):,} samples, {r.duration:.3g} s)" for r in study.train)
-    held = ", ".join(r.name for r in study.holdout) or "every third part of the record"
+    names = ", ".join(_record(r) for r in study.train)
+    held = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
+    fit = _known(study)
+    tables = hasattr(study.train[0], "omega")
+    measure = "of |N|" if tables else "over the rms of the centred output"
+    over = "" if tables else ", over windows each of which starts from a fitted state"
     return _PAGE.substitute(
         title=html.escape(f"What the model of {study.train[0].name} was missing"),
-        records=html.escape(f"Fitted to {names}; held out: {held}."),
-        verdict={"none": "nothing missing", "effect": "found", "unknown": "something remains"}[study.verdict],
+        records=html.escape(f"Fitted to {names}. Held out: {held}."),
+        verdict=_VERDICTS[study.verdict],
         lead=html.escape(study.summary().split("\n")[0]),
-        ladder=_picture(study.plot, "Error of every step beside the noise"),
+        next=_next(study),
+        how=html.escape(
+            "Each step adds the effect that explains most of what is left, and refits everything. It stays only if the "
+            f"error on data it was not fitted to falls too. Errors are rms {measure}{over}."
+        ),
+        ladder=_picture(study.plot, "Error of every step, beside the noise"),
         steps=_steps(study),
+        pictures=_pictures(study),
+        model=html.escape(
+            "A standard error is how far the value may be off by chance alone; two of them hold 95 % of the time if "
+            "the structure is right."
+        ),
+        parameters=_parameters(study, fit),
+        doubts="".join(f"<p>{html.escape(s[0].upper() + s[1:])}</p>" for s in fit.unidentifiable)
+        if fit
+        else "",
         sections="\n".join(_section(i, s) for i, s in enumerate(study.steps)),
-        parameters=_parameters(study),
         closing=html.escape(
-            "Errors are rms over the rms of the centred output, over windows each of which starts from a fitted "
-            f"state. Evidence is in nats, less Schwarz's price of the parameters. Computed in {study.seconds:.0f} s."
+            "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's price of "
+            f"the parameters; twenty nats are half a billion to one. Computed in {study.seconds:.0f} s."
         ),
     )
+
+
+def _record(record) -> str:
+    if hasattr(record, "omega"):
+        return f"{record.name} ({len(record.A)} amplitudes, {len(record.omega)} frequencies)"
+    return f"{record.name} ({len(record):,} samples, {record.duration:.3g} s)"
+
+
+def _known(study):
+    """Refit the final model once more for its standard errors; None where that fails."""
+    from .refit import refit
+
+    names = [k for k, p in study.model.parameters.items() if p.free and k != "sensor_quantization.step"]
+    try:
+        return refit(study.model, list(study.train), names, budget=200)
+    except (ValueError, ArithmeticError):
+        return None
+
+
+def _next(study) -> str:
+    last = study.steps[-1].diagnosis
+    if last is None or study.verdict != "unknown":
+        return ""
+    return f"<p>{html.escape(last.explanation)}</p>"
 
 
 def _steps(study):
@@ -86,40 +154,69 @@ def _steps(study):
         name = "+ " + s.effect.replace("_", " ") if s.effect else "start, refitted"
         name += "".join(f"; {d.replace('_', ' ')} became idle and was dropped" for d in s.dropped)
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
-        rows.append(
-            [
-                name,
-                f"{s.nrmse:.3%}",
-                f"{s.nrmse_holdout:.3%}",
-                f"{s.evidence:,.0f}" if s.effect else "–",
-                same,
-            ]
-        )
-    rows.append(["noise floor", f"{study.noise:.3%}", "", "", ""])
+        evidence = f"{s.evidence:,.0f}" if s.effect else "–"
+        rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), evidence, same])
+    rows.append(["noise floor", _percent(study.noise), "", "", ""])
     return _table(["Step", "Error", "Held out", "Evidence", "Same on these data"], rows, numeric=(1, 2, 3))
+
+
+def _percent(value) -> str:
+    return f"{100 * value:.3g} %" if math.isfinite(value) else "–"
+
+
+def _pictures(study):
+    """Compare the first and the last model with the record held out, or the training record."""
+    from .compare import compare
+
+    record = (study.holdout or study.train)[0]
+    parts = []
+    for model, name in ((study.steps[0].model, "The start, refitted"), (study.model, "The improved model")):
+        if parts and len(study.steps) == 1:
+            break
+        comparison = compare(model, record)
+        caption = f"{name}, on {record.name}. {comparison.where.sentences[0]}"
+        parts.append(_picture(lambda c=comparison, n=name: c.plot(title=n), caption, caption=True))
+    return "\n".join(parts)
 
 
 def _section(number, step):
     d = step.diagnosis
     if d is None or not d.ranking:
         return ""
-    title = "Diagnosis of the start" if number == 0 else f"After adding {step.effect.replace('_', ' ')}"
-    body = [f"<h2>{html.escape(title)}</h2>", f"<p>{html.escape(d.explanation)}</p>"]
-    body.append(_picture(d.plot, "Held-out error of every candidate"))
+    title = (
+        "What the start is missing"
+        if number == 0
+        else f"What is missing after {step.effect.replace('_', ' ')}"
+    )
+    body = [
+        f"<details{' open' if number == 0 else ''}><summary>{html.escape(title)}</summary>",
+        f"<p>{html.escape(d.explanation)}</p>",
+        _picture(d.plot, "Held-out error of every candidate"),
+    ]
     if d.where is not None and d.where.significant:
-        body.append(
-            "<ul>" + "".join(f"<li>{html.escape(r.sentence)}</li>" for r in d.where.significant[:4]) + "</ul>"
-        )
-    return "\n".join(body)
+        lines = "".join(f"<li>{html.escape(r.sentence)}</li>" for r in d.where.significant[:4])
+        body.append(f"<p>Where the error is:</p><ul>{lines}</ul>")
+    return "\n".join([*body, "</details>"])
 
 
-def _parameters(study):
+def _parameters(study, fit):
     before = study.start.parameters
     rows = []
     for name, p in study.model.parameters.items():
-        old = f"{before[name].value:.6g}" if name in before else "–"
-        rows.append([name, old, f"{p.value:.6g}", p.unit, p.meaning])
-    return _table(["Parameter", "Start", "Fitted", "Unit", "Meaning"], rows, numeric=(1, 2))
+        old = f"{before[name].value:.5g}" if name in before else "–"
+        known = fit.parameters.get(name) if fit else None
+        error, note = "–", ""
+        if known is not None:
+            error = f"± {known.standard_error:.2g}" if math.isfinite(known.standard_error) else "–"
+            note = " (at its bound)" if known.at_bound else "" if known.identifiable else " (not determined)"
+        rows.append([_words(name), old, f"{p.value:.5g}", error, p.unit, p.meaning + note])
+    head = ["Parameter", "Start", "Fitted", "Standard error", "Unit", "Meaning"]
+    return _table(head, rows, numeric=(1, 2, 3))
+
+
+def _words(name) -> str:
+    effect, _, parameter = name.rpartition(".")
+    return f"{effect}: {parameter}".replace("_", " ") if effect else parameter.replace("_", " ")
 
 
 def _table(head, rows, numeric=()):
@@ -132,7 +229,7 @@ def _table(head, rows, numeric=()):
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def _picture(draw, text):
+def _picture(draw, text, caption=False):
     """Draw into a figure of its own and return it as an inline PNG."""
     import matplotlib.pyplot as plt
 
@@ -141,10 +238,11 @@ def _picture(draw, text):
     try:
         drawn = draw().figure
         buffer = io.BytesIO()
-        drawn.savefig(buffer, format="png", dpi=140)
+        drawn.savefig(buffer, format="png", dpi=130)
     finally:
         for number in set(plt.get_fignums()) - set(open_before):
             plt.close(number)
         plt.close(fig)
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
-    return f'<img alt="{html.escape(text)}" src="data:image/png;base64,{data}">'
+    below = f"<figcaption>{html.escape(text)}</figcaption>" if caption else ""
+    return f'<figure><img alt="{html.escape(text)}" src="data:image/png;base64,{data}">{below}</figure>'

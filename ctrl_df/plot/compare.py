@@ -5,6 +5,7 @@ from __future__ import annotations
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import FuncFormatter
 
 _MEASURED, _SIMULATED, _ERROR = "0.55", "#1f4e9c", "#b3402a"
 
@@ -38,13 +39,16 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     top.set_ylabel(f"Output [{unit}]")
     top.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.99), fontsize=9)
     top.set_title(f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %", loc="left", fontsize=10)
+    factor, small = _readable(chosen.residual, unit)
     lines[1] = below.plot(data.t, chosen.residual, color=_ERROR, lw=0.7)
+    below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
     white = chosen.white
     below.set_title(
-        f"rmse {chosen.rmse:.3g} {unit}; {'white' if white else 'not white'} (p = {white.p_value:.2g})",
+        f"rmse {factor * chosen.rmse:.3g} {small}; {'white' if white else 'not white'} "
+        f"(p {'< 1e-6' if white.p_value < 1e-6 else f'= {white.p_value:.2g}'})",
         loc="left", fontsize=10,
     )  # fmt: skip
-    below.set_ylabel(f"Measured - simulated [{unit}]")
+    below.set_ylabel(f"Measured - simulated [{small}]")
     below.set_xlabel("Time [s]")
     for edge in chosen.edges[1:-1]:
         for ax in (top, below):
@@ -56,6 +60,17 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     fig.suptitle(data.name if title is None else title, fontsize=11)
     fig.tight_layout()
     return ct.ControlPlot(lines, np.array([top, below, bars], dtype=object), fig)
+
+
+def _readable(values, unit):
+    """Return factor and unit that make numbers of order one to a thousand: micrometres rather than 1e-6 m."""
+    largest = float(np.max(np.abs(values), initial=0.0))
+    if unit not in ("m", "rad", "N", "m/s") or largest == 0 or largest >= 0.5:
+        return 1.0, unit
+    for factor, prefix in ((1e3, "m"), (1e6, "µ"), (1e9, "n")):
+        if factor * largest >= 0.5:
+            return factor, prefix + unit
+    return 1.0, unit
 
 
 def _regions(ax, regions, rows):
@@ -77,6 +92,6 @@ def _regions(ax, regions, rows):
         ax.plot([expected, expected], [i - 0.21, i + 0.21], color="black", lw=1.5)
         ax.text(0, i + 0.27, f"{region.kind.replace('_', ' ')}: {region.label}", fontsize=8, va="bottom")
     ax.set_yticks([])
-    ax.set_ylim(-0.6, len(shown) - 0.1)
+    ax.set_ylim(min(len(shown), 5) - 5.6, len(shown) - 0.1)  # few bars stay slim, at the top
     ax.set_xlabel("Share of squared error [%]\n(black: share of the samples)", fontsize=9)
     return bars

@@ -1,4 +1,4 @@
-"""The ranking of candidates, and the residual before and after the best."""
+"""The ranking of candidates: what each leaves on held-out data."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+_BEST, _OTHER, _NOTHING = "#1f4e9c", "#9db4d8", "0.75"
+
 
 def plot_diagnosis(diagnosis, *, rows=8, title=None, **keywords) -> ct.ControlPlot:
-    """Draw a `Diagnosis`: held-out error of every candidate beside that of the refitted model and the noise.
+    """Draw a `Diagnosis`: held-out error of every candidate beside that of the refitted model.
 
     Parameters
     ----------
@@ -20,26 +22,38 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, **keywords) -> ct.ControlPl
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    shown = diagnosis.ranking[:rows]
     fig = plt.gcf() if not plt.gcf().axes else plt.figure()
-    fig.set_size_inches(8, 0.9 + 0.42 * (len(shown) + 1))
+    fig.set_size_inches(8, 1.15 + 0.36 * (min(rows, len(diagnosis.ranking)) + 1))
     ax = fig.add_subplot()
-    values = [diagnosis.nrmse_holdout, *(c.nrmse_holdout for c in shown)]
-    labels = ["nothing added", *(c.id.replace("_", " ") for c in shown)]
-    shades = ["0.75"] + ["#1f4e9c" if c is diagnosis.best else "#9db4d8" for c in shown]
-    at = np.arange(len(values))[::-1]
-    bars = ax.barh(at, 100 * np.array(values), color=shades, height=0.62)
-    for y, value, c in zip(at, values, [None, *shown], strict=True):
-        text = f" {value:.2%}" + ("" if c is None or c.probability < 0.005 else f"   p = {c.probability:.0%}")
-        if c is not None and c.equivalents:
-            text += "   same as " + ", ".join(e.replace("_", " ") for e in c.equivalents)
-        ax.text(100 * value, y, text, va="center", fontsize=8)
-    ax.set_yticks(at, labels)
+    bars = draw_ranking(ax, diagnosis, rows)
     ax.set_xlabel("Held-out error, rms over rms of the output [%]")
-    ax.set_xlim(0, 100 * max(values) * 1.45)
-    ax.spines[["top", "right"]].set_visible(False)
     fig.suptitle(f"Verdict: {diagnosis.verdict}" if title is None else title, fontsize=11)
     fig.tight_layout()
     lines = np.empty(1, dtype=object)
     lines[0] = list(bars)
     return ct.ControlPlot(lines, np.array([ax], dtype=object), fig)
+
+
+def draw_ranking(ax, diagnosis, rows):
+    """Draw one bar a candidate, best on top; bars that leave the picture are cut and say their value."""
+    shown = diagnosis.ranking[:rows]
+    entries = [None, *shown]
+    values = 100 * np.array([diagnosis.nrmse_holdout, *(c.nrmse_holdout for c in shown)])
+    labels = ["nothing added", *(c.id.replace("_", " ") for c in shown)]
+    shades = [_NOTHING] + [_BEST if c is diagnosis.best else _OTHER for c in shown]
+    # A candidate far worse than the model without it must not squeeze the others.
+    end = 1.15 * max(values[np.isfinite(values) & (values <= 2 * values[0])], default=1.0)
+    at = np.arange(len(values))[::-1]
+    bars = ax.barh(at, np.minimum(np.nan_to_num(values, nan=end), end), color=shades, height=0.62)
+    for y, value, c in zip(at, values, entries, strict=True):
+        text = f" {value:.3g} %" + (" >>" if value > end else "")
+        if c is not None and c.probability >= 0.005:
+            text += f"   p = {c.probability:.0%}"
+        if c is not None and c.equivalents:
+            text += "   same as " + ", ".join(e.replace("_", " ") for e in c.equivalents)
+        ax.text(min(value, end) if np.isfinite(value) else end, y, text, va="center", fontsize=8)
+    ax.set_yticks(at, labels)
+    ax.set_xlim(0, 1.6 * end)
+    ax.set_ylim(-0.6, len(values) - 0.4)
+    ax.spines[["top", "right"]].set_visible(False)
+    return bars

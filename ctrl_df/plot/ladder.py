@@ -39,7 +39,8 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
     ax.text(
         at[0] + 0.19, held[0] * 0.8, "held out", ha="center", va="top", fontsize=8, rotation=90, color="w"
     )
-    ax.text(at[-1] + 0.45, 100 * study.noise, "noise", va="top", ha="right", fontsize=8)
+    ax.set_xlim(-0.6, len(steps) - 0.4)
+    ax.text(len(steps) - 0.38, 100 * study.noise, "noise", va="center", ha="left", fontsize=8)
     names = ["refitted", *("+ " + s.effect.replace("_", " ") for s in steps[1:])]
     ax.set_xticks(
         at,
@@ -48,7 +49,8 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
             for n, s in zip(names, steps, strict=True)
         ],
     )
-    ax.set_ylabel("Error [% of the output's rms]")
+    tables = hasattr(study.train[0], "omega")
+    ax.set_ylabel("Error [% of |N|]" if tables else "Error [% of the output's rms]")
     ax.spines[["top", "right"]].set_visible(False)
     fig.suptitle("Error of every step" if title is None else title, fontsize=11)
     fig.tight_layout()

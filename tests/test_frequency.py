@@ -1,0 +1,196 @@
+"""Measured tables N(A, omega): compared, refitted, diagnosed, climbed; played by an integrator of their own."""
+
+import functools
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import rig_physics as physics
+
+import ctrl_df as cdf
+from ctrl_df.identify.compare import compare
+from ctrl_df.identify.diagnose import diagnose
+from ctrl_df.identify.frequency_compare import FrequencyComparison, scatter
+from ctrl_df.identify.improve import improve
+from ctrl_df.identify.refit import refit
+
+TRUE = dict(MOTOR=9.0, COULOMB=5.0, VISCOUS=20.0)
+A = np.geomspace(9.0, 60.0, 5)
+OMEGA = np.geomspace(2.0, 40.0, 6)
+FEW = ("quadratic_drag", "linear_spring", "input_delay", "sensor_delay", "stribeck")
+
+
+def stepped_sine(numbers, amplitude, omega, periods=24, samples=200):
+    """Return (Y1/A) exp(j phi) of the rigs' plant under ``A cos(omega t)``, held over each of `samples` a period.
+
+    The position's fundamental is fitted together with its mean and drift over the last four periods.
+    """
+    dt = 2 * np.pi / omega / samples
+    t = dt * np.arange(periods * samples)
+    u = amplitude * np.cos(omega * (t + 0.5 * dt))
+    y = physics.run(numbers, u, dt=dt, substeps=4)["y"][-4 * samples :]
+    t = t[-4 * samples :]
+    columns = np.column_stack([np.cos(omega * t), np.sin(omega * t), np.ones(len(t)), t - t[0]])
+    (c, s, *_), *_ = np.linalg.lstsq(columns, y, rcond=None)
+    # the staircase is centred on the cosine; its fundamental is less by sinc(1/samples)
+    return (c - 1j * s) / (amplitude * np.sinc(1 / samples))
+
+
+@functools.cache
+def table(noise=0.003, seed=0, **added):
+    rng = np.random.default_rng(seed)
+    numbers = physics.numbers(**TRUE, **added)
+    clean = np.array([[stepped_sine(numbers, a, w) for w in OMEGA] for a in A])
+    scatter = rng.standard_normal(clean.shape) + 1j * rng.standard_normal(clean.shape)
+    return cdf.FrequencyMeasurement(A, OMEGA, clean * (1 + noise / np.sqrt(2) * scatter))
+
+
+def user_block():
+    """The model in use: the right structure, parameters 20 to 25 % off."""
+    return cdf.friction_mass(mass=9 * 1.2, coulomb=5 * 0.8, viscous=20 * 1.25)
+
+
+def true_block():
+    return cdf.friction_mass(mass=9, coulomb=5, viscous=20)
+
+
+def test_the_true_model_errs_by_the_scatter():
+    found = compare(true_block(), table())
+    assert isinstance(found, FrequencyComparison)
+    assert found.nrmse == pytest.approx(0.003, rel=0.35)  # 30 points; seen 0.0031
+    assert found.white and found.fit_percent > 99
+    assert found.simulated.shape == found.residual.shape == (len(A), len(OMEGA))
+    assert "scatter only" in str(found)
+
+
+def test_a_wrong_model_errs_alike_at_neighbours_and_is_told_where():
+    found = compare(true_block(), table(DRAG=60.0))
+    assert not found.white
+    worst = found.where.significant[0]
+    # drag grows with the square of speed: large amplitudes at low frequency
+    assert {r.kind for r in found.where.significant} <= {"amplitude", "frequency"}
+    assert worst.sentence in found.where.sentences and worst.share > worst.expected_share
+    low = found.where.of("frequency")[0]
+    assert low.share > low.expected_share
+
+
+def test_a_loop_is_compared_and_refitted_through_its_block():
+    loop = cdf.closed_loop(cdf.pid(2000, 0, 130), user_block())
+    assert compare(loop, table()).nrmse == compare(user_block(), table()).nrmse
+    fitted = refit(loop, table())
+    assert fitted.model.parts.block.parameters["mass"].value == pytest.approx(9, rel=0.01)
+
+
+def test_refit_finds_the_parameters_within_their_errors():
+    fit = refit(user_block(), [table(), table(seed=1)])
+    truth = {"mass": 9.0, "coulomb.level": 5.0, "viscous.coefficient": 20.0}
+    assert fit.converged and set(fit.parameters) == set(truth)
+    for name, value in truth.items():
+        p = fit.parameters[name]
+        assert p.identifiable and not p.at_bound
+        assert abs(p.value - value) < 4 * p.standard_error  # worst seen 1.6
+        assert p.standard_error < 0.02 * value
+    assert fit.nrmse == pytest.approx(0.003, rel=0.35)
+    assert "mass" in fit.report()
+
+
+def test_what_leaves_no_trace_is_named():
+    block = user_block().with_effect(cdf.SensorOffset(0.01))
+    fit = refit(block, table())
+    assert not fit.parameters["sensor_offset.offset"].identifiable
+    assert any("sensor_offset.offset" in s for s in fit.unidentifiable)
+
+
+@pytest.mark.parametrize(
+    ("name", "added"),
+    [
+        ("quadratic_drag", dict(DRAG=60.0)),
+        ("linear_spring", dict(SPRING=150.0)),
+        ("input_delay", dict(DELAY=0.012)),
+    ],
+)
+def test_a_hidden_effect_is_named_from_its_print(name, added):
+    found = diagnose(user_block(), table(**added), candidates=FEW)
+    assert found.verdict == "effect", found.explanation
+    assert name in {found.best.id, *found.best.equivalents}
+    assert found.best.nrmse_holdout < 0.006
+    assert found.best.probability > 0.3 and found.best.evidence > 20
+    value = next(iter(found.best.parameters.values()))
+    assert value == pytest.approx(next(iter(added.values())), rel=0.05)  # worst seen 1 %
+    assert name.replace("_", " ") in found.explanation
+    assert found.best.effect in found.best.model.effects
+
+
+def test_delays_are_one_class():
+    found = diagnose(user_block(), table(DELAY=0.012), candidates=FEW)
+    assert {found.best.id, *found.best.equivalents} == {"input_delay", "sensor_delay"}
+
+
+def test_nothing_hidden_is_none():
+    found = diagnose(user_block(), table(seed=3), candidates=FEW)
+    assert found.verdict == "none" and found.best is None
+    assert "Nothing is missing" in found.explanation
+    assert found.next_experiment is None
+
+
+def test_outside_the_candidates_is_unknown():
+    found = diagnose(user_block(), table(SPRING=150.0), candidates=("input_delay", "input_gain"))
+    assert found.verdict == "unknown"
+    assert "outside the library" in found.explanation and "frequencies" in found.explanation
+
+
+def test_a_table_held_out():
+    found = diagnose(user_block(), table(DRAG=60.0), holdout=table(DRAG=60.0, seed=9), candidates=FEW[:3])
+    assert found.best.id == "quadratic_drag"
+    assert found.holdout[0] is table(DRAG=60.0, seed=9)
+
+
+def test_two_effects_are_climbed():
+    study = improve(user_block(), table(DRAG=60.0, SPRING=150.0), candidates=FEW[:2])
+    assert set(study.effects) == {"quadratic_drag", "linear_spring"}
+    assert study.verdict == "effect"
+    assert study.steps[-1].nrmse_holdout < 0.006
+    assert study.steps[0].nrmse_holdout > 10 * study.steps[-1].nrmse_holdout
+
+
+def test_pictures():
+    found = diagnose(user_block(), table(DRAG=60.0), candidates=FEW[:3])
+    drawn = found.plot()
+    assert drawn.axes.size == 3 and "quadratic drag" in drawn.axes.flat[2].get_title(loc="left")
+    plt.close(drawn.figure)
+    drawn = compare(user_block(), table(DRAG=60.0)).plot()
+    assert drawn.axes.size == 3
+    assert len(drawn.lines[0]) == len(drawn.lines[1]) == len(A)
+    plt.close(drawn.figure)
+
+
+def test_scatter_test_keeps_its_level():
+    rng = np.random.default_rng(5)
+    tables = [[rng.standard_normal((5, 6)) + 1j * rng.standard_normal((5, 6))] for _ in range(400)]
+    alarms = np.mean([not scatter(e) for e in tables])
+    assert alarms < 0.03  # level 0.01; seen 0.010
+
+
+def test_stated_noise_weighs_points():
+    poor = table()
+    spoilt = np.array(poor.N)
+    spoilt[0] *= 1.3  # one amplitude measured badly, and said so
+    noise = np.full(spoilt.shape, 0.003)
+    noise[0] = 0.3
+    fit = refit(user_block(), cdf.FrequencyMeasurement(A, OMEGA, spoilt, noise=noise))
+    assert fit.parameters["mass"].value == pytest.approx(9, rel=0.005)
+    without = refit(user_block(), cdf.FrequencyMeasurement(A, OMEGA, spoilt))
+    assert abs(without.parameters["mass"].value - 9) > 0.05
+
+
+def test_errors_are_clear():
+    with pytest.raises(ValueError, match="noise > 0"):
+        cdf.FrequencyMeasurement([1.0], [1.0], [[1j]], noise=0.0)
+    with pytest.raises(ValueError, match="noise as one number"):
+        cdf.FrequencyMeasurement([1.0], [1.0, 2.0], [[1j, 1j]], noise=[1.0, 2.0, 3.0])
+    t = np.linspace(0, 1, 100)
+    mixed = [table(), cdf.Measurement(t, np.sin(t), t**2)]
+    with pytest.raises(TypeError, match="tables only"):
+        diagnose(user_block(), mixed)
+    with pytest.raises(ValueError, match="more points than parameters"):
+        diagnose(user_block(), cdf.FrequencyMeasurement([10.0], [1.0, 2.0], [[1j, 1j]]))

@@ -1,0 +1,113 @@
+"""What the measurement flow accepts: loops for blocks, executors, effects of the user's own."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+import rigs
+from scipy.integrate import solve_ivp
+
+import ctrl_df as cdf
+from ctrl_df.blocks import effect as registry
+from ctrl_df.identify.compare import compare
+from ctrl_df.identify.diagnose import diagnose
+from ctrl_df.identify.improve import improve
+from ctrl_df.identify.refit import refit
+
+FEW = ("linear_spring", "quadratic_drag")
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return rigs.draw("linear_spring", 14, snr_db=60)
+
+
+@pytest.fixture(scope="module")
+def records(rig):
+    return rig.train[0].measurement(), rig.holdout[0].measurement()
+
+
+@pytest.mark.parametrize("pool", [ThreadPoolExecutor, ProcessPoolExecutor])
+def test_an_executor_changes_nothing(rig, records, pool):
+    train, held = records
+    alone = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
+    with pool(2) as executor:
+        found = diagnose(rig.baseline, train, holdout=held, candidates=FEW, executor=executor)
+        study = improve(rig.baseline, train, held, candidates=FEW, max_effects=1, executor=executor)
+    assert found.verdict == alone.verdict == "effect"
+    assert [c.id for c in found.ranking] == [c.id for c in alone.ranking]
+    assert found.best.parameters == pytest.approx(alone.best.parameters, rel=1e-6)
+    assert study.effects == ("linear_spring",)
+
+
+@pytest.fixture
+def magnetic_brake():
+    """Register an effect of the user's own, for one test."""
+
+    @cdf.register_effect
+    @dataclass(frozen=True)
+    class MagneticBrake(cdf.Effect):
+        """Drag ``F = -2 peak (v/vc) / (1 + (v/vc)^2)``."""
+
+        peak: float = cdf.parameter("N", meaning="greatest drag")
+        velocity: float = cdf.parameter("m/s", strict=True, default=0.1, meaning="speed of the greatest drag")
+
+        role: ClassVar[str] = "force"
+        shows: ClassVar[str] = "drag that falls again at high speed"
+        source: ClassVar[str] = "Smythe (1942)"
+
+        @staticmethod
+        def law(t, x, v, z, p, dz):
+            ratio = v / p[1]
+            return -2.0 * p[0] * ratio / (1.0 + ratio * ratio)
+
+    yield MagneticBrake
+    registry._LIBRARY.pop("magnetic_brake")
+
+
+def brake_record(seed, dt=2e-3, n=4000):
+    """Return a run of mass, viscous drag and brake, integrated by SciPy, with white noise."""
+    rng = np.random.default_rng(seed)
+    t = dt * np.arange(n)
+    phases = rng.uniform(0, 2 * np.pi, 6)
+    u = 6.0 * sum(
+        np.cos(2 * np.pi * f * t + p) for f, p in zip((0.3, 0.5, 0.8, 1.3, 2.1, 3.4), phases, strict=True)
+    )
+
+    def rates(time, s):
+        ratio = s[1] / 0.12
+        force = u[min(int(time / dt + 1e-9), n - 1)]
+        return [s[1], (force - 3.0 * s[1] - 2 * 5.0 * ratio / (1 + ratio**2)) / 2.0]
+
+    x = solve_ivp(rates, (0, t[-1]), [0, 0], "RK45", t, max_step=dt, rtol=1e-7, atol=1e-10).y[0]
+    return cdf.Measurement(t, u, x + 1e-3 * np.std(x) * rng.standard_normal(n))
+
+
+def test_an_effect_of_the_users_own_is_found(magnetic_brake):
+    start = cdf.Mass(2.4, [cdf.Viscous(2.5)])
+    candidates = ("magnetic_brake", "quadratic_drag", "coulomb", "linear_spring")
+    found = diagnose(start, brake_record(1), holdout=brake_record(2), candidates=candidates)
+    assert found.verdict == "effect", found.explanation
+    assert found.best.id == "magnetic_brake"
+    assert found.best.parameters["peak"] == pytest.approx(5.0, rel=0.05)
+    assert found.best.parameters["velocity"] == pytest.approx(0.12, rel=0.05)
+    assert "magnetic brake" in found.explanation and "falls again" in found.explanation
+
+
+def test_a_loop_is_accepted_for_its_block():
+    rig = rigs.draw("linear_spring", 3, snr_db=60, closed_loop=True)
+    train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
+    loop = cdf.closed_loop(cdf.pid(*rig.controller[:4]), rig.baseline)
+    channels = {"reference": rig.train[0].r}
+    known = cdf.Measurement(train.t, train.u, train.y, channels=channels)
+    assert compare(loop, known).nrmse > 0
+    fitted = refit(loop, known)
+    assert fitted.model.parts.controller is loop.parts.controller
+    assert fitted.model.parts.block.parameters["mass"].value > 0
+    block = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
+    found = diagnose(loop, train, holdout=held, candidates=FEW)
+    assert found.best.id == block.best.id == "linear_spring"
+    assert found.best.evidence == pytest.approx(block.best.evidence, rel=1e-9)
+    assert improve(loop, train, held, candidates=FEW, max_effects=1).effects == ("linear_spring",)
