@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import control as ct
 import numpy as np
 
-from ..blocks.element import Element
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from .finder import OrbitFinder
@@ -172,7 +170,7 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
             block = translated(resp.block)
             described = resp.family.output if resp.family is not None else None
             output = described if described in getattr(block, "output_labels", ()) else None
-            loop = closed_loop(_advanced(resp.H, block), block, output=output)
+            loop = closed_loop(resp.H, block, output=output)
             finder = OrbitFinder(loop)
         except (ValueError, TypeError) as error:
             return Check(tuple(Row(c, None, None, UNTESTED) for c in cycles), [], f"not simulated: {error}")
@@ -211,26 +209,6 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         if id(orbit) not in paired:
             rows.append(Row(None, orbit, simulated(finder, orbit), MISSED))
     return Check(tuple(rows), orbits, loop=loop)
-
-
-def _advanced(H, block):
-    """Return what a sampled loop of a discrete H around a law without time must run: z H.
-
-    The sampler of `closed_loop` reads the block just before its tick, where the output of a law still answers
-    the sample before; u[k] = H y[k], y[k] = f(u[k]) needs it one sample ahead.
-    """
-    if not isinstance(H, ct.TransferFunction | ct.StateSpace) or not H.isdtime(strict=True):
-        return H
-    if isinstance(block, ct.NonlinearIOSystem) and block.nstates and not isinstance(block, Element):
-        return H
-    ss: Any = ct.ss(H)
-    a, b, c, d = (np.asarray(m, float) for m in (ss.A, ss.B, ss.C, ss.D))
-    if np.any(d):
-        raise ValueError(
-            "H and the block answer each other within one sample (an algebraic loop, D != 0), so the loop "
-            "has no order of steps; give H at least one sample of delay."
-        )
-    return ct.ss(a, b, c @ a, c @ b, ss.dt)
 
 
 def _pairs(cycles, orbits) -> dict[int, Orbit]:

@@ -99,7 +99,7 @@ def run(
             size[j] = abs(x[j])
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
-        tick(prog, drive, segment, t, x, mode, work)
+        tick(prog, drive, segment, t, x, mode, work, dx)
         if not settle(prog, drive, segment, t, x, mode, work, dx):
             reason = CHATTER
         if delays:
@@ -331,7 +331,7 @@ def run(
                 if has_tracked:
                     track(prog, drive, segment, t, x, mode, work)
                 if t == next_tick:
-                    tick(prog, drive, segment, t, x, mode, work)
+                    tick(prog, drive, segment, t, x, mode, work, dx)
                     next_tick = next_sample(prog, t)
                     jumped, generation = True, 1.0
                 continue
