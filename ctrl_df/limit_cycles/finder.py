@@ -141,7 +141,7 @@ class OrbitFinder:
         if peaks[-1] < 1e-6 * peaks.max() or not np.all(np.isfinite(states[-1])):
             return None
         if self.by_simulation:
-            return self._averaged(x0, laps) if repeats(laps) or _sustained(peaks) else None
+            return self._averaged(x0, laps) if repeats(laps, self.swings.tight) or _sustained(peaks) else None
         size = np.maximum(np.abs(states[-12:]).max(axis=0), 1e-12)
         size = np.maximum(size, 1e-6 * np.max(size))
         for laps_per_period in range(1, 5):
@@ -301,7 +301,7 @@ class OrbitFinder:
         steps of a sampled controller; a law without time sees their values alone, the sequence that the
         prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
         """
-        settled = repeats(laps)
+        settled = repeats(laps, self.swings.tight)
         begin = self.engine.run(self.swings.start(x0), laps[-1].time, rtol=1e-8, log=1).state
         later = self.swings.follow(begin, min(swings, len(laps)), until_repeated=False)
         count = len(later) - 1

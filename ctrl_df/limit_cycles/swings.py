@@ -49,6 +49,7 @@ class Swings:
         block = None if self.parts is None else self.parts.block
         by_input = isinstance(block, Element) or (block is not None and not block.nstates)
         self.row = engine.noutputs - 1 if by_input else 0
+        self.tight = engine.delayed  # no Newton follows
         self.held = by_input and bool(
             getattr(self.parts, "dt", 0)
         )  # a held input steps: no passage to locate
@@ -90,7 +91,7 @@ class Swings:
                 return []
             laps += found
             quiet = 0 if found else quiet + 1
-            if until_repeated and len(laps) > 12 and repeats(laps):
+            if until_repeated and len(laps) > 12 and repeats(laps, self.tight):
                 break
         if work > _WORK and len(laps) < _FEW:
             return []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
@@ -184,10 +185,12 @@ def _lap(time, x) -> Lap:
     return Lap(float(time), np.array(x), float(np.max(np.abs(x))))
 
 
-def repeats(laps) -> bool:
-    """Whether the last two passages met the same state."""
-    size = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0) + 1e-300
-    return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < 1e-7 * np.max(size)))
+def repeats(laps, tight=False) -> bool:
+    """Whether the last two passages met the same state; `tight`: near enough to be the answer."""
+    size = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
+    largest = float(np.max(size)) + 1e-300
+    bound = 1e-9 * np.maximum(size, 1e-6 * largest) if tight else 1e-7 * largest
+    return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
 
 
 def _corner_frequency(parts):
