@@ -17,6 +17,7 @@ from ..simulate.sampled import Sampled
 _WORK = 300_000  # integration steps of one simulation
 _FEW = 12  # swings within that work, below which it is no use
 _QUIET = 40  # strides without a passage after which a loop is called at rest
+_DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _GONE = 1e4  # times the largest kick: a loop beyond it has run away
 
@@ -80,7 +81,7 @@ class Swings:
             Empty if the loop runs away, or spends all its work within a few swings.
         """
         state = start if isinstance(start, State) else self.start(start)
-        laps, quiet, work = [], 0, 0
+        laps, quiet, work, largest = [], 0, 0, float(np.max(np.abs(state.x), initial=0.0))
         limit = np.inf if longest is None else longest
         bound = max(self._farthest, _GONE * float(np.max(np.abs(state.x), initial=0.0)))
         stride = self._by_samples if self.held else self._by_passage
@@ -91,6 +92,10 @@ class Swings:
                 return []
             laps += found
             quiet = 0 if found else quiet + 1
+            size = float(np.max(np.abs(state.x), initial=0.0))
+            largest = max(largest, size)
+            if quiet and size < _DEAD * largest:
+                break
             if until_repeated and len(laps) > 12 and repeats(laps, self.tight):
                 break
         if work > _WORK and len(laps) < _FEW:
@@ -153,7 +158,8 @@ class Swings:
         offset = self.loop.syslist[0].nstates or 0
         scale = _length_scale(core, self.parts)
         pace = _corner_frequency(self.parts) or 1.0
-        by_speed = self.loop.output_labels[0].startswith("v")  # nothing drives such a loop back to a place
+        # nothing drives a loop closed on the velocity back to a place
+        by_speed = self.loop.output_labels[0].startswith("v")
         for factor in (0.3, 1.0, 0.1, 3.0, 0.03, 10.0):
             x = np.zeros(self.engine.nstates)
             x[offset] = factor * scale
