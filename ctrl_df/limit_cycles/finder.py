@@ -8,13 +8,15 @@ import control as ct
 import numpy as np
 
 from ..df.describing import describing_function
-from ..simulate.engine import Engine, Event, State
-from ..simulate.layout import AUX, KIND, MECHANISM, MODE, NX, X
+from ..simulate.engine import Engine, Event
+from ..simulate.layout import AUX, KIND, MECHANISM, MODE
+from ..simulate.loop import answers_at_once
 from ..status import Status
 from .forced_start import harmonic_start
 from .monodromy import RTOL, Tracer
 from .orbit import Orbit
-from .swings import Swings
+from .swings import Swings, repeats
+from .symmetry import shift_directions, transverse
 
 _STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
 
@@ -44,10 +46,22 @@ def find_limit_cycle(
     -------
     Orbit or None
         None if no orbit was found at all. Otherwise look at ``status`` and ``residual``.
+
+    Raises
+    ------
+    ValueError
+        A pure delay stands in the loop: its state is a whole history, no vector that Newton could move. Its
+        motion is found by simulation: `event_response`, or `verify`, whose rows tell what it settles to.
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     finder = OrbitFinder(loop, max_iterations)
+    if finder.engine.delayed:
+        raise ValueError(
+            "find_limit_cycle needs a state of finitely many numbers; this loop has a pure delay inside, "
+            "whose state is a whole history. Find its motion by simulation (event_response, or the rows of "
+            "verify), or put a lag of the same time (input_lag) in its place."
+        )
     if guess is None:
         found = finder.search(search_time)
         orbit = next(iter(sorted(found, key=lambda o: o.stable is not True)), None)
@@ -61,7 +75,11 @@ def find_limit_cycle(
 
 
 class OrbitFinder:
-    """Shooting for the limit cycles of one loop."""
+    """The limit cycles of one loop: by shooting, or by simulation alone where there is nothing to shoot with.
+
+    A sampled loop has no period of its own, one with a pure delay no finite state: both are followed until
+    their swings repeat or the bound on work is hit, and averaged.
+    """
 
     def __init__(self, loop, max_iterations=40):
         if not isinstance(loop, ct.NonlinearIOSystem):
@@ -70,16 +88,19 @@ class OrbitFinder:
             )
         self.loop: Any = loop
         self.engine = Engine(loop)
-        self.tracer = Tracer(self.engine)
+        self.tracer: Any = None if self.engine.delayed else Tracer(self.engine)
         self.max_iterations = max_iterations
         self.parts: Any = getattr(loop, "parts", None)
         self.sampled = bool(getattr(self.parts, "dt", 0))
+        self.by_simulation = self.sampled or self.engine.delayed
         self.force_row = self.engine.noutputs - 1
         self.swings = Swings(loop, self.engine)
 
     def from_guess(self, guess) -> Orbit | None:
-        """Refine a guess; a sampled loop, not periodic to the sample, is simulated from it instead."""
+        """Refine a guess; a loop that cannot be shot for is simulated from it instead."""
         if isinstance(guess, Orbit):
+            if self.by_simulation:
+                return self._from_simulation(guess.states[:, 0])
             return self._from_state(guess.states[:, 0], guess.period)
         if isinstance(guess, np.ndarray) and guess.shape == (self.engine.nstates,):
             return self._from_simulation(guess)
@@ -89,7 +110,7 @@ class OrbitFinder:
             gain = abs(complex(describing_function(self.parts.block, amplitude, omega)))
             wanted = gain * amplitude if np.isfinite(gain) else None
         start = harmonic_start(self.loop, amplitude, omega, wanted)
-        if self.sampled:
+        if self.by_simulation:
             return self._from_simulation(start)
         orbit = self._from_state(start, 2 * np.pi / omega)
         better, waveform = getattr(guess, "corrected", None), getattr(guess, "waveform", None)
@@ -119,8 +140,8 @@ class OrbitFinder:
         times, states, peaks = (np.array(column) for column in zip(*laps, strict=True))
         if peaks[-1] < 1e-6 * peaks.max() or not np.all(np.isfinite(states[-1])):
             return None
-        if self.sampled:
-            return self._averaged(x0, times, laps)
+        if self.by_simulation:
+            return self._averaged(x0, laps) if repeats(laps, self.swings.tight) or _sustained(peaks) else None
         size = np.maximum(np.abs(states[-12:]).max(axis=0), 1e-12)
         size = np.maximum(size, 1e-6 * np.max(size))
         for laps_per_period in range(1, 5):
@@ -130,10 +151,7 @@ class OrbitFinder:
             orbit = self._from_state(states[-1], times[-1] - times[-1 - laps_per_period])
             if orbit is not None and orbit.status.ok and orbit.output_amplitude > 1e-6 * np.max(size):
                 return orbit
-        half = len(peaks) // 2
-        if len(laps) < swings or not 0.8 < np.mean(peaks[half:]) / np.mean(peaks[:half]) < 1.25:
-            return None  # on its way to rest, or away
-        return self._averaged(x0, times, laps)
+        return self._averaged(x0, laps) if len(laps) >= swings and _sustained(peaks) else None
 
     # --- refinement ---------------------------------------------------------------------------------------
 
@@ -143,13 +161,17 @@ class OrbitFinder:
         if start is None:
             return None
         status, best, grown = Status.NOT_CONVERGED, np.inf, 0
-        lap = None
+        lap = beside = None
         for _ in range(self.max_iterations):
             lap = self.tracer.lap(start, period, size=size)
             if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
                 return None
-            residual = lap.end.x - start.x
-            mismatch = float(np.max(np.abs(residual) / size))
+            if beside is None:
+                # shifts that the loop does not notice: an orbit closes up to them
+                free = shift_directions(self.tracer, lap.segments, size)
+                beside = np.eye(self.tracer.n) - free @ free.T
+            residual = beside @ ((lap.end.x - start.x) / size)
+            mismatch = float(np.max(np.abs(residual)))
             if mismatch < 3e-10:
                 status = Status.CONVERGED
                 break
@@ -167,7 +189,8 @@ class OrbitFinder:
             system[:n, n] = f_end
             system[n, :n] = f_start / size**2
             system = system * scale / np.append(size, 1.0)[:, None]
-            change = np.linalg.lstsq(system, -np.append(residual / size, 0.0), rcond=1e-12)[0]
+            system[:n] = beside @ system[:n]
+            change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=1e-12)[0]
             shorten = min(1.0, 0.3 / max(float(np.max(np.abs(change))), 1e-300))
             step = shorten * change * scale
             period += step[n]
@@ -251,12 +274,14 @@ class OrbitFinder:
         )
         if np.max(np.ptp(run.states, axis=0) / size) < _STILL:
             return None  # an equilibrium, periodic with any period
-        live = self._live_states()
-        values = np.linalg.eigvals(lap.monodromy[np.ix_(live, live)])
+        # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
+        across = transverse(shift_directions(self.tracer, lap.segments, size))
+        carried = across.T @ (lap.monodromy * size / size[:, None]) @ across
+        values = np.linalg.eigvals(carried)
         trivial = int(np.argmin(np.abs(values - 1.0)))
         floquet = np.delete(values, trivial)
         floquet = floquet[np.argsort(-np.abs(floquet))]
-        residual = float(np.max(np.abs(lap.end.x - start.x) / size))
+        residual = float(np.max(np.abs(across.T @ ((lap.end.x - start.x) / size))))
         events, t = [], 0.0
         for s in lap.segments:
             t += s.length
@@ -269,39 +294,45 @@ class OrbitFinder:
             run.outputs.T, run.states.T, self.loop,
         )  # fmt: skip
 
-    def _live_states(self) -> Any:
-        """States the engine moves; a block may carry others for ordinary solvers only."""
-        nodes = self.engine.program.nodes
-        live = np.zeros(self.engine.nstates, bool)
-        for node in nodes:
-            live[node[X] : node[X] + node[NX]] = True
-        return np.flatnonzero(live)
+    def _averaged(self, x0, laps, swings=40) -> Orbit | None:
+        """Average over the swings after a transient, for motions that are followed only.
 
-    def _averaged(self, x0, times, laps, swings=40) -> Orbit | None:
-        """Average over many swings of a motion that never quite repeats (sampled or aperiodic)."""
-        if len(times) < 8:
+        The amplitude is that of the signal the block sees. A block that acts in continuous time sees the held
+        steps of a sampled controller; a law without time sees their values alone, the sequence that the
+        prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
+        """
+        settled = repeats(laps, self.swings.tight)
+        begin = self.engine.run(self.swings.start(x0), laps[-1].time, rtol=1e-8, log=1).state
+        later = self.swings.follow(begin, min(swings, len(laps)), until_repeated=False)
+        count = len(later) - 1
+        if count < 4:
             return None
-        count = min(swings, len(times) - 1)
-        begin, end = laps[-1 - count], laps[-1]
-        period = (end[0] - begin[0]) / count
+        period = (later[-1].time - later[0].time) / count
         omega = 2 * np.pi / period
-        span = count * period
-        state: State = self.engine.start(x0)
-        state = self.engine.run(state, end[0], rtol=1e-8, log=1).state
-        t0 = state.time
+        t0, span = begin.time, count * period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         times = t0 + np.linspace(0, min(4, count) * period, 2049)
         run = self.engine.run(
-            state, t0 + span, times=times, rtol=1e-8, spectrum=spectrum, omega=omega, max_step=period / 8
+            begin, t0 + span, times=times, rtol=1e-8, spectrum=spectrum, omega=omega, max_step=period / 8
         )
         if not run.status.ok:
             return None
         amplitudes = 2 * np.abs(spectrum[:, 1]) / span
+        if self.swings.held and answers_at_once(self.parts.block):
+            amplitudes = amplitudes / np.sinc(omega * self.parts.dt / (2 * np.pi))
+        exact = settled and self.engine.delayed and not self.sampled
         return Orbit(
             omega, period, float(amplitudes[self.force_row]), float(amplitudes[0]), np.zeros(0, complex),
-            None, np.nan, tuple(self.engine.name_events(run.events))[:200], Status.NO_PERIOD, np.nan,
-            times - t0, run.outputs.T, run.states.T, self.loop,
+            True if exact else None, np.nan, tuple(self.engine.name_events(run.events))[:200],
+            Status.CONVERGED if exact else Status.NO_PERIOD, np.nan, times - t0, run.outputs.T, run.states.T,
+            self.loop,
         )  # fmt: skip
+
+
+def _sustained(peaks) -> bool:
+    """Whether swings that do not repeat keep their size, rather than being on their way to rest, or away."""
+    half = len(peaks) // 2
+    return bool(0.8 < np.mean(peaks[half:]) / np.mean(peaks[:half]) < 1.25)
 
 
 def _amplitude_omega(guess, nstates):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..df.describing import describing_function
 from ..simulate.engine import Engine, harmonic_drive
+from ..simulate.sampled import Sampled
 
 _PERIODS = 40  # of forced motion before it is measured
 
@@ -42,11 +43,13 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None) ->
     controller = loop.syslist[0]
     nc = controller.nstates or 0
     x_control = np.zeros(nc)
-    if nc and isinstance(controller, ct.StateSpace):
-        a, b = np.asarray(controller.A), np.asarray(controller.B)
+    if nc and isinstance(controller, ct.StateSpace | Sampled):
+        held = isinstance(controller, Sampled)
+        a, b = controller.sampled[:2] if held else (np.asarray(controller.A), np.asarray(controller.B))
         for k in range(1, len(Y)):
             inputs = np.array([-Y[k], 1j * k * omega * Y[k]])[: controller.ninputs]
-            x_control = x_control + np.real(np.linalg.solve(1j * k * omega * np.eye(nc) - a, b @ inputs))
+            z = np.exp(1j * k * omega * loop.parts.dt) if held else 1j * k * omega
+            x_control[: len(a)] += np.real(np.linalg.solve(z * np.eye(len(a)) - a, b @ inputs))
     return np.concatenate([x_control, x_block])
 
 

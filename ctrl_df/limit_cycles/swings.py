@@ -10,13 +10,14 @@ import numpy as np
 from ..blocks.core import level
 from ..blocks.element import Element
 from ..simulate import driver
-from ..simulate.engine import Engine
-from ..simulate.layout import H_OUT
+from ..simulate.engine import Engine, State
+from ..simulate.layout import DELAY, H_OUT, KIND, X
 from ..simulate.sampled import Sampled
 
 _WORK = 300_000  # integration steps of one simulation
 _FEW = 12  # swings within that work, below which it is no use
 _QUIET = 40  # strides without a passage after which a loop is called at rest
+_DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _GONE = 1e4  # times the largest kick: a loop beyond it has run away
 
@@ -49,6 +50,7 @@ class Swings:
         block = None if self.parts is None else self.parts.block
         by_input = isinstance(block, Element) or (block is not None and not block.nstates)
         self.row = engine.noutputs - 1 if by_input else 0
+        self.tight = engine.delayed  # no Newton follows
         self.held = by_input and bool(
             getattr(self.parts, "dt", 0)
         )  # a held input steps: no passage to locate
@@ -57,26 +59,31 @@ class Swings:
         self.kicks = list(self._kicks())
         self._farthest = _GONE * max(float(np.max(np.abs(x), initial=0.0)) for x in self.kicks)
 
-    def follow(self, x0, count: int, longest: float | None = None) -> list[Lap]:
+    def follow(
+        self, start, count: int, longest: float | None = None, until_repeated: bool = True
+    ) -> list[Lap]:
         """Upward passages from a start on, until they repeat, the loop rests, or the bound on work is hit.
 
         Parameters
         ----------
-        x0 : ndarray
-            State of the loop.
+        start : ndarray or State
+            State of the loop; a `State` goes on with the history of its delays.
         count : int
             Passages at most.
         longest : float, optional
             Simulated time at most [s].
+        until_repeated : bool
+            End as soon as the passages repeat.
 
         Returns
         -------
         list of Lap
             Empty if the loop runs away, or spends all its work within a few swings.
         """
-        state, laps, quiet, work = self.engine.start(x0), [], 0, 0
+        state = start if isinstance(start, State) else self.start(start)
+        laps, quiet, work, largest = [], 0, 0, float(np.max(np.abs(state.x), initial=0.0))
         limit = np.inf if longest is None else longest
-        bound = max(self._farthest, _GONE * float(np.max(np.abs(x0), initial=0.0)))
+        bound = max(self._farthest, _GONE * float(np.max(np.abs(state.x), initial=0.0)))
         stride = self._by_samples if self.held else self._by_passage
         while len(laps) < count and state.time < limit and quiet <= _QUIET and work <= _WORK:
             run, found = stride(state, laps, limit)
@@ -85,11 +92,23 @@ class Swings:
                 return []
             laps += found
             quiet = 0 if found else quiet + 1
-            if len(laps) > 12 and _repeats(laps):
+            size = float(np.max(np.abs(state.x), initial=0.0))
+            largest = max(largest, size)
+            if quiet and size < _DEAD * largest:
+                break
+            if until_repeated and len(laps) > 12 and repeats(laps, self.tight):
                 break
         if work > _WORK and len(laps) < _FEW:
             return []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
         return laps
+
+    def start(self, x0) -> State:
+        """Return a fresh state; what the engine does not move (the lags that stand for delays elsewhere) is zero."""
+        state = self.engine.start(x0)
+        for node in self.engine.program.nodes:
+            if node[KIND] == DELAY:
+                state.x[node[X]] = 0.0
+        return state
 
     def _by_passage(self, state, laps, limit):
         # ahead in bounded strides: a loop at rest never crosses again
@@ -138,11 +157,16 @@ class Swings:
             return
         offset = self.loop.syslist[0].nstates or 0
         scale = _length_scale(core, self.parts)
+        pace = _corner_frequency(self.parts) or 1.0
+        # nothing drives a loop closed on the velocity back to a place
+        by_speed = self.loop.output_labels[0].startswith("v")
         for factor in (0.3, 1.0, 0.1, 3.0, 0.03, 10.0):
             x = np.zeros(self.engine.nstates)
             x[offset] = factor * scale
             if core.bodies == 2:
                 x[offset + 2] = factor * scale + 0.5 * core.gap
+            if by_speed:
+                x[offset + 1 : offset + 2 * core.bodies : 2] = factor * scale * pace
             if core.stop is not None:
                 low, high = core.stop.span
                 places = slice(offset, offset + 2 * core.bodies, 2)
@@ -167,13 +191,19 @@ def _lap(time, x) -> Lap:
     return Lap(float(time), np.array(x), float(np.max(np.abs(x))))
 
 
-def _repeats(laps) -> bool:
-    size = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0) + 1e-300
-    return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < 1e-7 * np.max(size)))
+def repeats(laps, tight=False) -> bool:
+    """Whether the last two passages met the same state; `tight`: near enough to be the answer."""
+    size = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
+    largest = float(np.max(size)) + 1e-300
+    bound = 1e-9 * np.maximum(size, 1e-6 * largest) if tight else 1e-7 * largest
+    return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
 
 
 def _corner_frequency(parts):
-    """Frequency at which the controller balances the block's inertia, |H(jw)| = m w^2 [rad/s]."""
+    """Frequency at which the controller balances the block's inertia, |H(jw)| = m w^2 [rad/s].
+
+    A loop closed on the velocity has its corner elsewhere, for which this serves as well as a scale.
+    """
     core = getattr(parts.block, "core", None)
     if core is None or not callable(parts.controller):
         return None

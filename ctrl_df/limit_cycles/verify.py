@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import control as ct
 import numpy as np
 
-from ..blocks.element import Element
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from .finder import OrbitFinder
@@ -17,6 +15,8 @@ from .orbit import Orbit
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "not tested"
+
+DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simulation judges."
 
 # Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle,
 # shifted.
@@ -33,17 +33,24 @@ class Row:
     predicted : LimitCycle or None
         None for a cycle the describing function missed.
     exact : Orbit or None
-        The orbit found from the prediction, or by the search.
+        The orbit found from the prediction, or by the search; None for loops with a pure delay. Of a sampled
+        loop it holds averages (its ``stable`` is None).
     simulated : tuple of (omega, output amplitude) or None
         What a simulation started beside the orbit settles to; None where it leaves (an unstable orbit).
     verdict : str
         ``confirmed``, ``shifted``, ``no such orbit``, ``missed by the describing function``, ``not tested``.
+    why : str
+        What the verdict rests on where there is no exact orbit to rest on.
+    motion : Orbit or None
+        Where the simulation alone judges (a pure delay): the motion it settles to, averaged over its swings.
     """
 
     predicted: LimitCycle | None
     exact: Orbit | None
     simulated: tuple[float, float] | None
     verdict: str
+    why: str = ""
+    motion: Orbit | None = None
 
     @property
     def omega_error(self) -> float:
@@ -57,17 +64,19 @@ class Row:
 
     @property
     def in_band(self) -> bool | None:
-        """Whether the stated error bands hold the exact answer; None without a pair."""
-        if self.predicted is None or self.exact is None:
+        """Whether the stated error bands hold the true answer; None without a pair."""
+        truth = self.exact or self.motion
+        if self.predicted is None or truth is None:
             return None
         low_w, high_w = self.predicted.omega_band
         low_a, high_a = self.predicted.amplitude_band
-        return bool(low_w <= self.exact.omega <= high_w and low_a <= self.exact.amplitude <= high_a)
+        return bool(low_w <= truth.omega <= high_w and low_a <= truth.amplitude <= high_a)
 
     def _error(self, name):
-        if self.predicted is None or self.exact is None or self.verdict == NONE:
+        truth = self.exact or self.motion
+        if self.predicted is None or truth is None or self.verdict == NONE:
             return float("nan")
-        return getattr(self.predicted, name) / getattr(self.exact, name) - 1.0
+        return getattr(self.predicted, name) / getattr(truth, name) - 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +88,7 @@ class Check:
     rows : tuple of Row
         One a cycle, predicted ones first.
     orbits : list of Orbit
-        All exact orbits found, those the prediction missed included.
+        All exact orbits found, those the prediction missed included; none for loops with a pure delay.
     note : str
         What could not be tested, and why.
     """
@@ -100,6 +109,7 @@ class Check:
             "error w",
             "grade",
             "verdict",
+            "why",
         )
         lines: list[tuple[str, ...]] = [head]
         for row in self.rows:
@@ -117,13 +127,16 @@ class Check:
                     _percent(row.omega_error),
                     p.grade if p else "-",
                     row.verdict,
+                    row.why,
                 )
             )
         if len(lines) == 1:
             lines.append(
-                ("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found")
+                ("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found", "")
             )
-        widths = [max(len(line[i]) for line in lines) for i in range(len(head))]
+        if not any(row.why for row in self.rows):
+            lines = [line[:-1] for line in lines]
+        widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
         text = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
         text.insert(1, "  ".join("-" * w for w in widths))
         return "\n".join(text + ([self.note] if self.note else []))
@@ -157,7 +170,9 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     -------
     Check
         ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or
-        more improper than a PID) rows say ``not tested`` and ``.note`` why.
+        more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure delay,
+        whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why`` tells how.
+        An unstable cycle cannot be seen that way and stays ``not tested``.
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
@@ -172,7 +187,7 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
             block = translated(resp.block)
             described = resp.family.output if resp.family is not None else None
             output = described if described in getattr(block, "output_labels", ()) else None
-            loop = closed_loop(_advanced(resp.H, block), block, output=output)
+            loop = closed_loop(resp.H, block, output=output)
             finder = OrbitFinder(loop)
         except (ValueError, TypeError) as error:
             return Check(tuple(Row(c, None, None, UNTESTED) for c in cycles), [], f"not simulated: {error}")
@@ -190,22 +205,22 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         orbits.append(orbit)
         return orbit
 
-    for cycle in cycles:
+    # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
+    for cycle in cycles if finder.parts is not None else []:
         keep(finder.from_guess(cycle))
     if search:
         for orbit in finder.search(search_time):
             keep(orbit)
     partner = _pairs(cycles, orbits)
+    if finder.engine.delayed:
+        return Check(tuple(_by_simulation(cycles, orbits, partner)), [], DELAYED, loop)
     rows = []
     for cycle in cycles:
         match = partner.get(id(cycle))
         if match is None:
             rows.append(Row(cycle, None, None, NONE))
-            continue
-        worst = max(abs(cycle.omega / match.omega - 1), abs(cycle.amplitude / match.amplitude - 1))
-        rows.append(
-            Row(cycle, match, simulated(finder, match), CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED)
-        )
+        else:
+            rows.append(Row(cycle, match, simulated(finder, match), _verdict(cycle, match)))
     paired = {id(orbit) for orbit in partner.values()}
     for orbit in orbits:
         if id(orbit) not in paired:
@@ -213,24 +228,28 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     return Check(tuple(rows), orbits, loop=loop)
 
 
-def _advanced(H, block):
-    """Return what a sampled loop of a discrete H around a law without time must run: z H.
+def _verdict(cycle: LimitCycle, truth: Orbit) -> str:
+    worst = max(abs(cycle.omega / truth.omega - 1), abs(cycle.amplitude / truth.amplitude - 1))
+    return CONFIRMED if worst <= CONFIRMED_WITHIN else SHIFTED
 
-    The sampler of `closed_loop` reads the block just before its tick, where the output of a law still answers
-    the sample before; u[k] = H y[k], y[k] = f(u[k]) needs it one sample ahead.
-    """
-    if not isinstance(H, ct.TransferFunction | ct.StateSpace) or not H.isdtime(strict=True):
-        return H
-    if isinstance(block, ct.NonlinearIOSystem) and block.nstates and not isinstance(block, Element):
-        return H
-    ss: Any = ct.ss(H)
-    a, b, c, d = (np.asarray(m, float) for m in (ss.A, ss.B, ss.C, ss.D))
-    if np.any(d):
-        raise ValueError(
-            "H and the block answer each other within one sample (an algebraic loop, D != 0), so the loop "
-            "has no order of steps; give H at least one sample of delay."
-        )
-    return ct.ss(a, b, c @ a, c @ b, ss.dt)
+
+def _by_simulation(cycles, motions, partner):
+    """Rows of a loop whose motions can only be followed, not solved for."""
+    for cycle in cycles:
+        motion = partner.get(id(cycle))
+        if motion is not None:
+            why = "simulation settles on it" if motion.status.ok else "simulation: irregular, averages"
+            seen = (motion.omega, motion.output_amplitude)
+            yield Row(cycle, None, seen, _verdict(cycle, motion), why, motion)
+        elif cycle.stable is False:
+            yield Row(cycle, None, None, UNTESTED, "no simulation stays on an unstable cycle")
+        else:
+            yield Row(cycle, None, None, NONE, "no simulation settles near it")
+    paired = {id(motion) for motion in partner.values()}
+    for motion in motions:
+        if id(motion) not in paired:
+            why = "simulation settles on it" if motion.status.ok else "simulation: irregular, averages"
+            yield Row(None, None, (motion.omega, motion.output_amplitude), MISSED, why, motion)
 
 
 def _pairs(cycles, orbits) -> dict[int, Orbit]:

@@ -28,13 +28,17 @@ class WaveformOrbit:
     """
 
     def __init__(self, block, output, max_steps=60_000):
-        self.engine = Engine(block)
         self.row = list(block.output_labels).index(output)
         self.max_steps = max_steps
         self.core = block.core if isinstance(block, Mechanism) else None
-        laws = find_symmetries(self.engine, block)
+        block, self.delay = _undelayed(block, self.row)
+        self.engine = Engine(block)
         kinds = self.engine.program.nodes[:, layout.KIND]
-        self.suited = laws.autonomous and not np.isin(kinds, _UNSUITED).any()
+        self.suited = not np.isin(kinds, _UNSUITED).any()
+        if not self.suited:
+            return
+        laws = find_symmetries(self.engine, block)
+        self.suited = laws.autonomous
         # a free mass may be anywhere, and has no mean position of its own
         self.adrift = self.core is not None and bool(laws.shifts)
         self.transform, self.inverse, self.kept = laws.transform, laws.inverse, laws.free
@@ -43,10 +47,10 @@ class WaveformOrbit:
     def respond(self, U, omega: float):
         """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, or None."""
         U = np.asarray(U, dtype=complex)
-        self.omega, self.period, self.left = omega, 2 * np.pi / omega, self.max_steps
-        self.drive = harmonic_drive([U], omega)
         if not self.suited:
             return None
+        self.omega, self.period, self.left = omega, 2 * np.pi / omega, self.max_steps
+        self.drive = harmonic_drive([U], omega)
         for state in self._starts(float(abs(U[1]))):
             orbit = None if state is None else self._close(state)
             if orbit is not None:
@@ -182,4 +186,16 @@ class WaveformOrbit:
         travel = run.outputs[-1, self.row] - run.outputs[0, self.row]
         Y[1:] -= 1j * travel / (np.pi * np.arange(1, count))  # coefficients of the ramp travel t / period
         Y[0] = 0.0 if self.adrift else Y[0] / 2
-        return Y
+        return Y * np.exp(-1j * self.omega * self.delay * np.arange(count))
+
+
+def _undelayed(block, row):
+    """Take the pure delays out of a mechanism's channels: all they do to a periodic answer is to shift it."""
+    if not isinstance(block, Mechanism):
+        return block, 0.0
+    late = [e for e in block.effects if e.id == "input_delay" or (e.id == "sensor_delay" and row == 0)]
+    kept = [e for e in block.effects if e.id not in ("input_delay", "sensor_delay")]
+    if len(kept) == len(block.effects):
+        return block, 0.0
+    # of the x of a mechanism alone the sensor's delay is felt; its v is measured apart
+    return type(block)._make(block._values, kept, block.measured), sum(e.values[0] for e in late)

@@ -86,6 +86,7 @@ def run(
     # a run that goes on after a full event log goes on counting events without progress
     zero_events = int(memo[0]) if memo[2] == 1.0 else 0
     last_event_t = memo[1] if memo[2] == 1.0 else t
+    armed = False  # the run has been before the section: beyond it is a passage, at an event too
     known = False  # k[0] holds the rates at (t, x)
     jumped = False  # something outside the states jumped just now: modes may be out of line
     generation = 1.0  # of the record that a delay opens next
@@ -99,7 +100,7 @@ def run(
             size[j] = abs(x[j])
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
-        tick(prog, drive, segment, t, x, mode, work)
+        tick(prog, drive, segment, t, x, mode, work, dx)
         if not settle(prog, drive, segment, t, x, mode, work, dx):
             reason = CHATTER
         if delays:
@@ -154,6 +155,7 @@ def run(
                 if g0[i] < math.inf:
                     scale[i] = max(scale[i], abs(g0[i]))
             tolerances(prog, x, mode, scale, atol, gtol)
+            armed = armed or (blocked != ng - 1 and gtol[ng - 1] < g0[ng - 1] < math.inf)
             # margins already crossed at the start (simultaneous events)
             value, at = worst(g0, gtol, scale, blocked)
             if value < 0.0 and jumped:
@@ -162,8 +164,8 @@ def run(
                 continue
             jumped = False
             if at >= 0 and value < 0.0:
-                if at == ng - 1:
-                    blocked = at
+                if at == ng - 1 and not armed:
+                    blocked = at  # begun beyond the section
                     continue
                 theta = 0.0
             else:
@@ -331,7 +333,7 @@ def run(
                 if has_tracked:
                     track(prog, drive, segment, t, x, mode, work)
                 if t == next_tick:
-                    tick(prog, drive, segment, t, x, mode, work)
+                    tick(prog, drive, segment, t, x, mode, work, dx)
                     next_tick = next_sample(prog, t)
                     jumped, generation = True, 1.0
                 continue

@@ -8,7 +8,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..blocks.element import Element
 from ..blocks.mechanism import Mechanism
+from ..blocks.primitives import RateLimiter
 from .sampled import Sampled
 
 
@@ -34,7 +36,9 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     dt : float
         Sample time of a digital controller with zero-order hold [s]; 0: continuous. The continuous `pid` is then run as
         ``kp e + I - kd v`` with I summed by the backward rule (any other proper controller: Tustin's rule). A discrete
-        `pid` brings its own dt.
+        `pid` brings its own dt. One with a direct path (D != 0) reads the plant just before its tick; one without puts
+        out ``u[k] = C x[k]`` first and reads what a plant without time answers to it, so that the loop is the recursion
+        u = H e, y = f(u).
     output : str or int
         The output that is fed back, the first by default.
     name : str
@@ -67,6 +71,11 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
             f"an improper controller needs a block with a velocity output v for its derivative; {block.name} has "
             f"{', '.join(block.output_labels)}. Filter the derivative: pid(..., tf=...)."
         )
+    if controller.isdtime(strict=True) and answers_at_once(block) and np.any(np.asarray(proper.D)):
+        raise ValueError(
+            f"{block.name} and the discrete controller answer each other within one sample (an algebraic loop, D != 0), "
+            "so the loop has no order of steps; give the controller at least one sample of delay."
+        )
     control = _controller(proper, kd, dt, force, name="controller")
     plant = block._named("plant") if isinstance(block, Mechanism) else block.copy(name="plant")
     connections = [["controller.e", f"-plant.{fed_back}"], [f"plant.{force}", f"controller.{force}"]]
@@ -85,6 +94,13 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     )
     loop.parts = LoopParts(pid, block, float(dt or 0))
     return loop
+
+
+def answers_at_once(block) -> bool:
+    """Whether a block is a law without time: its output follows a jump of its input (all but rate limiters, here)."""
+    if isinstance(block, Element):
+        return not isinstance(block.primitive, RateLimiter)
+    return not block.nstates
 
 
 def split_improper(controller) -> tuple[float, ct.StateSpace]:

@@ -116,10 +116,22 @@ def track(prog, drive, segment, t, x, mode, work):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def sample(prog, node, x, w):
-    """One step of a sampled controller: hold its new output, then update its state."""
-    nodes, par = prog.nodes, prog.par
-    ou, scratch = prog.ints[H_U], prog.ints[H_SCRATCH]
+def answers_at_once(prog, node):
+    """Whether a sampled controller has a direct path: its new output depends on what it reads (D != 0)."""
+    nodes = prog.nodes
+    ni, no = nodes[node, NIN], nodes[node, NOUT]
+    nd = nodes[node, NX] - no
+    first = nodes[node, PAR] + nd * (nd + ni + no)
+    for i in range(first, first + no * ni):
+        if prog.par[i] != 0.0:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def hold(prog, node, x, w):
+    """Put out the new output of a sampled controller and hold it."""
+    nodes, par, ou = prog.nodes, prog.par, prog.ints[H_U]
     ni, no, xo, po = nodes[node, NIN], nodes[node, NOUT], nodes[node, X], nodes[node, PAR]
     nd = nodes[node, NX] - no
     for k in range(ni):
@@ -127,6 +139,17 @@ def sample(prog, node, x, w):
     for i in range(no):
         from_state = product(par, po + nd * (nd + ni) + i * nd, nd, x, xo)
         x[xo + nd + i] = from_state + product(par, po + nd * (nd + ni + no) + i * ni, ni, w, ou)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def advance_state(prog, node, x, w):
+    """Take the state of a sampled controller to the next sample, by what it reads now."""
+    nodes, par = prog.nodes, prog.par
+    ou, scratch = prog.ints[H_U], prog.ints[H_SCRATCH]
+    ni, xo, po = nodes[node, NIN], nodes[node, X], nodes[node, PAR]
+    nd = nodes[node, NX] - nodes[node, NOUT]
+    for k in range(ni):
+        w[ou + k] = node_input(prog, node, k, w)
     for i in range(nd):
         from_state = product(par, po + i * nd, nd, x, xo)
         w[scratch + i] = from_state + product(par, po + nd * nd + i * ni, ni, w, ou)

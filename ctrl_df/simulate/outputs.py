@@ -12,7 +12,7 @@ from numba import njit
 from . import history
 from .flow import combine, external, node_input, refresh, signals
 from .layout import DELAY, H_DELAYS, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
-from .modes import sample
+from .modes import advance_state, answers_at_once, hold, settle
 from .stepper import inside
 
 NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
@@ -39,15 +39,38 @@ def _sampled_size(prog, n):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def tick(prog, drive, segment, t, x, mode, work):
-    """Run the sampled controllers whose tick falls on `t`."""
+def tick(prog, drive, segment, t, x, mode, work, dx):
+    """Run the sampled controllers whose tick falls on `t`.
+
+    One without a direct path (D = 0) knows its output before it reads: it puts it out first, and what answers at once
+    (a law without time, the direct path of a plant) is read afterwards, as u[k] = C x[k], y[k] = f(u[k]),
+    x[k+1] = A x[k] + B y[k] have it. One with a direct path reads what stands there just before its tick.
+    """
     w = work[0]
+    late = False
     for n in range(prog.nodes.shape[0]):
-        if prog.nodes[n, KIND] == SAMPLED:
-            dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
-            if abs(t / dt - round(t / dt)) < 1e-6:
+        if prog.nodes[n, KIND] == SAMPLED and _ticks(prog, n, t) and not answers_at_once(prog, n):
+            hold(prog, n, x, w)
+            late = True
+    if late:
+        settle(prog, drive, segment, t, x, mode, work, dx)
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == SAMPLED and _ticks(prog, n, t) and answers_at_once(prog, n):
+            refresh(prog, drive, segment, t, x, mode, w)
+            hold(prog, n, x, w)
+            advance_state(prog, n, x, w)
+    if late:
+        for n in range(prog.nodes.shape[0]):
+            if prog.nodes[n, KIND] == SAMPLED and _ticks(prog, n, t) and not answers_at_once(prog, n):
                 refresh(prog, drive, segment, t, x, mode, w)
-                sample(prog, n, x, w)
+                advance_state(prog, n, x, w)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _ticks(prog, n, t):
+    """Whether a tick of this sampled node falls on `t`."""
+    dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
+    return abs(t / dt - round(t / dt)) < 1e-6
 
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)

@@ -1,0 +1,90 @@
+"""Directions in which a loop can be shifted without its noticing: a free position, a state nothing reads.
+
+An axis whose position is not fed back (a pure velocity loop) moves alike wherever it stands. Every orbit of
+such a loop has a second multiplier 1 beside that of a shift in time, and need only close up to the drift of its
+position. Neither says anything about stability; both are taken out here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_SAMPLES = 4  # of each mode an orbit visits
+_NUDGE = 1e-4  # of the difference quotients, relative to the size of a state
+_NULL = 1e-8  # singular values below, relative to the largest, make candidates
+_SAME = 1e-11  # relative change of rates and margins by a shift of half the size; rounding leaves 1e-15
+
+
+def shift_directions(tracer, segments, size) -> np.ndarray:
+    """Shifts of the state that change neither rates nor event margins anywhere on an orbit.
+
+    Parameters
+    ----------
+    tracer : Tracer
+        Of the loop.
+    segments : sequence of Segment
+        One lap.
+    size : (n,) array
+        Scale of each state.
+
+    Returns
+    -------
+    (n, k) array
+        Orthonormal columns in states divided by `size`; no columns, as a rule.
+    """
+    points = _points(segments)
+    if not points:
+        return np.zeros((tracer.n, 0))
+    here = [_answer(tracer, p, p.x) for p in points]
+    scale = np.max([np.where(np.isfinite(a), np.abs(a), 0.0) for a in here], axis=0)
+    # rates may all vanish where segments begin (a reversal): no smaller than once through the size in a lap
+    scale[: tracer.n] = np.maximum(scale[: tracer.n], size / sum(s.length for s in segments))
+    scale[scale == 0.0] = 1.0
+    slopes = []
+    for p in points:
+        columns = []
+        for j in range(tracer.n):
+            step = np.zeros(tracer.n)
+            step[j] = _NUDGE * size[j]
+            columns.append(_change(_answer(tracer, p, p.x + step), _answer(tracer, p, p.x - step)) / scale)
+        slopes.append(np.array(columns).T / (2 * _NUDGE))
+    _, values, rows = np.linalg.svd(np.vstack(slopes), full_matrices=True)
+    values = np.append(values, np.zeros(tracer.n - len(values)))
+    candidates = rows[values <= _NULL * max(values[0], 1e-300)]
+    kept = [d for d in candidates if _unnoticed(tracer, points, here, scale, 0.5 * d * size)]
+    return np.array(kept).T if kept else np.zeros((tracer.n, 0))
+
+
+def transverse(directions) -> np.ndarray:
+    """Orthonormal columns that span what is left of the state beside `directions`."""
+    n, k = directions.shape
+    if k == 0:
+        return np.eye(n)
+    return np.linalg.svd(directions, full_matrices=True)[0][:, k:]
+
+
+def _points(segments):
+    """Take the starts of segments, a few of every mode."""
+    taken: dict[bytes, list] = {}
+    for s in segments:
+        if s.length > 0:
+            taken.setdefault(s.start.mode.tobytes(), []).append(s.start)
+    return [p for starts in taken.values() for p in starts[:: max(1, len(starts) // _SAMPLES)][:_SAMPLES]]
+
+
+def _answer(tracer, point, x) -> np.ndarray:
+    dx, g = tracer.rate(point.time, x, point.mode, margins=True)
+    return np.append(dx, g)
+
+
+def _change(a, b) -> np.ndarray:
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isfinite(a) & np.isfinite(b), a - b, 0.0)
+
+
+def _unnoticed(tracer, points, here, scale, shift) -> bool:
+    for p, answer in zip(points, here, strict=True):
+        for moved in (p.x + shift, p.x - shift):
+            if np.max(np.abs(_change(_answer(tracer, p, moved), answer)) / scale) > _SAME:
+                return False
+    return True
