@@ -193,8 +193,9 @@ def fit_windows(
     tolerance: float = 1e-3,
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
+    errors: bool = False,
 ) -> Candidate:
-    """Fit the named parameters over given windows in one stage, without the price of standard errors.
+    """Fit the named parameters over given windows in one stage.
 
     Parameters
     ----------
@@ -211,17 +212,22 @@ def fit_windows(
         As for `fit_candidate`.
     limits : mapping or None
         Least and largest values of some parameters, within their ranges.
+    errors : bool
+        Whether to work out the covariance, from the derivatives of the last step; else it is empty.
 
     Returns
     -------
     Candidate
-        With an empty covariance.
     """
     problem = Problem(model, records, names, 100_000, limits)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)
-    return _outcome(problem, theta, np.zeros((0, 0)), [])
+    if not errors or problem.slopes is None or not names:
+        return _outcome(problem, theta, np.zeros((0, 0)), [])
+    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
+    return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
 def _cut(records, lengths) -> list[Windows]:

@@ -22,6 +22,9 @@ from .windows import facts
 SIGNIFICANT = 20.0
 """Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
 
+HELD = 5.0
+"""Evidence [nats] it needs on held-out data alone, to which nothing but initial states is fitted."""
+
 _LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
 _NOISIER = 1.4  # error on held-out windows over that on fitted ones that may be chance
 
@@ -149,9 +152,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         ranking.append(_entry(t, study, float(weight), same))
     ranking += [_entry(t, study, 0.0, ()) for t in found if t.key not in keys]
     first = ranking[0] if ranking else None
-    significant = (
-        first is not None and first.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * base_errors[1]
-    )
+    significant = first is not None and first.evidence > SIGNIFICANT and first.evidence_holdout > HELD
     noise, structure, share = _left(best, base, missed, study)
     if rounds:
         share = 1.0 if missed and missed[0].evidence > SIGNIFICANT else 0.0
@@ -204,6 +205,10 @@ def _errors(tried: Trial, study: Study) -> tuple[float, float]:
 def _entry(t: Trial, study: Study, probability, same) -> CandidateEffect:
     effect = t.block.effects[-1]
     values = {k: p.value for k, p in effect.parameters.items()}
+    key = list(t.block._keys)[-1]
+    known = t.train.standard_errors if len(t.train.covariance) else {}
     return CandidateEffect(
         effect, effect.id, *_errors(t, study), t.evidence, probability, values, same, t.block, t.confirmed,
+        errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
+        evidence_holdout=t.evidence_held,
     )  # fmt: skip

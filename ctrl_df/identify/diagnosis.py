@@ -34,8 +34,12 @@ class CandidateEffect:
         Ids that make the same of these data, within noise.
     model : block
         The refitted block with the effect.
+    evidence_holdout : float
+        Log likelihood ratio [nats] on the held-out data alone.
     confirmed : bool
         Whether it was refitted at the full rate and tried on held-out data (the best few are).
+    errors : dict
+        Standard errors of `parameters`, for residuals of any colour; only of confirmed candidates.
     """
 
     effect: Effect
@@ -50,6 +54,7 @@ class CandidateEffect:
     confirmed: bool = False
     outputs: tuple = field(default=(), repr=False)
     errors: Mapping[str, float] = field(default_factory=dict)
+    evidence_holdout: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .diagnose import SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
+from .diagnose import HELD, SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
 from .diagnosis import NONE, UNKNOWN, Diagnosis
 from .study import Study as Fits
 from .study import ranked
 from .trial import Trial
-
-_LESS = 0.98  # the held-out error a step must reach, relative to the one before
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,11 +190,7 @@ def improve(
             )
         )
         best = diagnosis.ranking[0] if diagnosis.ranking else None
-        if (
-            best is None
-            or best.evidence < SIGNIFICANT
-            or best.nrmse_holdout > _LESS * diagnosis.nrmse_holdout
-        ):
+        if best is None or best.evidence < SIGNIFICANT or best.evidence_holdout < HELD:
             break
         effect, evidence, same = best.id, best.evidence, best.equivalents
         block, dropped = _without_idle(best.model, start, fits, names)

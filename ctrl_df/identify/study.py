@@ -135,6 +135,15 @@ def _periodic_enough(tried: Trial, span) -> bool:
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
 
 
+def _held_gain(base: Trial, tried: Trial, noise: NoiseModel) -> float:
+    """Return the log likelihood ratio of the windows to be judged by: nothing was fitted to them but their starts."""
+    if base.held is None or tried.held is None:
+        return 0.0
+    before, count = whitened_power(base.held.residual, noise)
+    after, _ = whitened_power(tried.held.residual, noise)
+    return 0.5 * count * math.log(before / after)
+
+
 def _promising(found) -> list[Trial]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by plain error."""
     close = sorted(found, key=lambda t: t.train.rmse)[:3]
@@ -171,7 +180,7 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
     for t in trials:
         power, _ = whitened_power(t.residuals, noise)
         gain = 0.5 * count * math.log(base_power / power) - 0.5 * t.extra * math.log(count)
-        judged.append(replace(t, evidence=gain))
+        judged.append(replace(t, evidence=gain, evidence_held=_held_gain(base, t, noise)))
     return sorted(judged, key=lambda t: -t.evidence), noise
 
 

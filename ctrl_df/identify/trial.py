@@ -93,6 +93,7 @@ class Trial:
     held: Candidate | None = None
     extra: int = 0  # parameters beyond the baseline's
     evidence: float = 0.0
+    evidence_held: float = 0.0  # of the windows to be judged by alone
     confirmed: bool = False
 
     @property
@@ -154,7 +155,7 @@ class Data:
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits,
+            tolerance=tolerance, limits=self.limits, errors=self.step > 0,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
