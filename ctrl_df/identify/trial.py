@@ -11,7 +11,7 @@ import numpy as np
 from .candidate import Candidate, fit_windows
 from .measurement import Measurement
 from .simulator import Simulator
-from .windows import Windows, cut, facts
+from .windows import Windows, cut, facts, split
 
 SAMPLES = 2500
 """Steps of the input a record is thinned to while candidates are screened."""
@@ -21,6 +21,9 @@ SHORTEST = 16
 
 FAR = 12.0
 """Factor by which the model's own parameters may be off: beyond it a fit explains with them what they are not."""
+
+LEAST = 50
+"""Samples of the shortest window."""
 
 PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
@@ -53,15 +56,9 @@ class View:
     windows: tuple[Windows, ...]
 
     def shorter(self, factor: int) -> View:
-        """Return windows up to `factor` times as many, over the same samples; none is shorter than 50 samples."""
-        finer = []
-        for record, old in zip(self.records, self.windows, strict=True):
-            new = cut(record, min(factor * _count(record), max(len(record) // 50, 4)))
-            inside = np.zeros(len(record), bool)
-            inside[old.samples] = True
-            middle = (new.begins + new.ends - 1) // 2
-            finer.append(new.only(inside[middle]))
-        return View(self.records, tuple(finer))
+        """Return windows up to `factor` times as many, over the same samples; none is shorter than `LEAST` samples."""
+        pairs = zip(self.records, self.windows, strict=True)
+        return View(self.records, tuple(split(r, w, factor, LEAST) for r, w in pairs))
 
     def every(self, step: int) -> View:
         """Return every `step`-th window."""

@@ -128,9 +128,23 @@ def cut(record: Measurement, count: int) -> Windows:
     edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
     edges[0], edges[-1] = 0, n
     edges = np.unique(edges)
+    return _between(record, edges[:-1], edges[1:])
+
+
+def split(record: Measurement, windows: Windows, factor: int, least: int) -> Windows:
+    """Split each window into up to `factor` equal parts, none shorter than `least` samples."""
+    begins, ends = [], []
+    for i, j in zip(windows.begins, windows.ends, strict=True):
+        edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
+        begins.append(edges[:-1])
+        ends.append(edges[1:])
+    return _between(record, np.concatenate(begins), np.concatenate(ends))
+
+
+def _between(record, begins, ends) -> Windows:
     known = facts(record)
-    rows = np.array([_local(record, int(i), known) for i in edges[:-1]])
-    return Windows(edges[:-1], edges[1:], *rows.T)
+    rows = np.array([_local(record, int(i), known) for i in begins])
+    return Windows(begins, ends, *rows.T)
 
 
 def _local(record, i, known) -> tuple[float, float, float, float, float]:
