@@ -152,7 +152,9 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         ranking.append(_entry(t, study, float(weight), same))
     ranking += [_entry(t, study, 0.0, ()) for t in found if t.key not in keys]
     first = ranking[0] if ranking else None
-    significant = first is not None and first.evidence > SIGNIFICANT and first.evidence_holdout > HELD
+    # On records held out the errors of all parameters show, and an idle effect may make up for them by chance:
+    # those fitted have to speak for themselves.
+    significant = first is not None and first.evidence_fitted > SIGNIFICANT and first.evidence_holdout > HELD
     noise, structure, share = _left(best, base, missed, study)
     if rounds:
         share = 1.0 if missed and missed[0].evidence > SIGNIFICANT else 0.0

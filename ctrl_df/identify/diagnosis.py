@@ -56,6 +56,11 @@ class CandidateEffect:
     errors: Mapping[str, float] = field(default_factory=dict)
     evidence_holdout: float = 0.0
 
+    @property
+    def evidence_fitted(self) -> float:
+        """Evidence of the records fitted alone [nats]."""
+        return self.evidence - self.evidence_holdout
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:

@@ -190,7 +190,7 @@ def improve(
             )
         )
         best = diagnosis.ranking[0] if diagnosis.ranking else None
-        if best is None or best.evidence < SIGNIFICANT or best.evidence_holdout < HELD:
+        if best is None or best.evidence_fitted < SIGNIFICANT or best.evidence_holdout < HELD:
             break
         effect, evidence, same = best.id, best.evidence, best.equivalents
         block, dropped = _without_idle(best.model, start, fits, names)
