@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from .diagnose import HELD, SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
@@ -194,6 +194,10 @@ def improve(
             break
         effect, evidence, same = best.id, best.evidence, best.equivalents
         block, dropped = _without_idle(best.model, start, fits, names)
+    # The windows of a diagnosis are as long as its best model bears: steps are compared over those of the last.
+    common = fits.data.fine
+    errors = [common.errors(step.model) for step in steps]
+    steps = [replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True)]
     spread = math.sqrt(
         sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records))
     )

@@ -165,14 +165,19 @@ class Data:
 
     def judged(self, tried: Trial) -> Trial:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
-        # Those of short windows are found without fail; the others begin at the same places.
-        rough, short = replace(self, thin=self.step or self.thin), self.level(SHORTEST).held
-        near = rough.fit(tried.block, (), view=short, iterations=4, tolerance=2e-2)
-        near = rough.fit(
-            tried.block, (), view=self.held, starts=same_begins(near, self.held.windows), iterations=3
-        )
-        held = self.fit(tried.block, (), view=self.held, starts=near.starts, iterations=1)
-        return replace(tried, held=held)
+        return replace(tried, held=self._ran(tried.block, "held"))
+
+    def errors(self, model) -> tuple[float, float]:
+        """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
+        ran = {name: self._ran(model, name).rmse for name in ("train", "held")}
+        return ran["train"] / self.train.spread, ran["held"] / self.held.spread
+
+    def _ran(self, model, name) -> Candidate:
+        """Fit the initial states alone: those of short windows are found without fail, the others begin there too."""
+        rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
+        near = rough.fit(model, (), view=getattr(self.level(SHORTEST), name), iterations=4, tolerance=2e-2)
+        near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
+        return self.fit(model, (), view=view, starts=near.starts, iterations=1)
 
 
 def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] = ()) -> Data:
