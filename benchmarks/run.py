@@ -1,7 +1,7 @@
 """How good: every figure that issue and README state, measured here and now, peers in the same run.
 
-``python benchmarks/run.py`` prints a Markdown table (measured | demanded | ok?), medians of several repeats after
-one warm-up call, one core.
+``python benchmarks/run.py`` prints a Markdown table (measured | demanded | ok?), medians of several repeats
+after one warm-up call, one core.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def row(what: str, measured: str, demanded: str, ok: bool) -> None:
 
 
 def quadrature_n(a, omega, mass=9.0, coulomb=5.0, viscous=0.5):
-    """N of the friction mass apart from the library: DOP853 between located reversals, a period after settling."""
+    """N of the friction mass apart from the library: DOP853 between located reversals, once settled."""
     from scipy.integrate import solve_ivp
 
     period = 2 * np.pi / omega
@@ -189,7 +189,7 @@ def family_times() -> None:
 
 
 def peers(block, per_point: float) -> None:
-    """python-control by simulation: LSODA, rtol 1e-6, 200 samples a period, 30 periods, the last one projected."""
+    """python-control by simulation: LSODA, rtol 1e-6, 200 samples a period, the last of 30 projected."""
     places = [(9.0, 15.0), (14.0, 15.0), (30.0, 8.0)]
     times, mine_error, peer_error = [], [], []
     for a, omega in places:
@@ -284,7 +284,8 @@ def main() -> int:
         except Exception as error:  # one broken row must not hide the others
             row(part.__name__, f"failed: {type(error).__name__}: {error}", "-", False)
     print(
-        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, ",
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, "
+        f"Python {platform.python_version()}, ",
         end="",
     )
     print(f"numpy {np.__version__}, control {ct.__version__}; one core used\n")

@@ -2,9 +2,9 @@
 
 Two flows run through the package::
 
-    physics block --> describing function family --> predicted limit cycles --> exact orbit, simulation --> verdict
-       Mass             describing_function_            describing_function_        find_limit_cycle         verify
-       TwoMass          family                          response, ..._plot          event_response
+    physics block --> describing function family --> predicted limit cycles --> exact orbit --> verdict
+       Mass             describing_function_            describing_function_       find_limit_    verify
+       TwoMass          family                          response, ..._plot         cycle
 
     measurement --> compare --> diagnose --> add the effect --> refit --> compare again
     Measurement     compare     diagnose     block.with_effect   refit    improve (the whole ladder)

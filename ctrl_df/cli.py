@@ -108,6 +108,8 @@ def _row(row) -> dict[str, Any]:
     if row.exact is not None:
         names = ("amplitude", "output_amplitude", "omega", "period", "stable", "residual", "multiplier")
         out["exact"] = {n: getattr(row.exact, n) for n in names} | {"status": row.exact.status.value}
+    if row.why:
+        out["why"] = row.why
     if row.simulated is not None:
         out["simulated"] = {"omega": row.simulated[0], "output_amplitude": row.simulated[1]}
     return out

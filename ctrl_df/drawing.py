@@ -11,7 +11,7 @@ from typing import Any
 
 PICTURES = {
     "family": "family.plot_family",
-    "harmonics": "family.plot_harmonics",
+    "harmonics": "harmonics.plot_harmonics",
     "analysis": "describing.describing_function_plot",
     "orbit": "orbit.orbit_plot",
 }

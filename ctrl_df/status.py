@@ -8,7 +8,10 @@ class Status(Enum):
 
     CONVERGED = "converged"
     NO_SOLUTION = "the whole box was scanned and holds no solution"
-    WORK_LIMIT = "stopped at the bound on work (steps or events); raise max_steps, loosen rtol, or shorten the time span"
+    WORK_LIMIT = (
+        "stopped at the bound on work (steps or events); "
+        "raise max_steps, loosen rtol, or shorten the time span"
+    )
     DIVERGED = (
         "the state left every bound (overflow or NaN): the loop is unstable from here; "
         "lower the gains or start nearer to rest"

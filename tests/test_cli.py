@@ -45,6 +45,21 @@ def test_limit_cycles_as_text_and_json(model, capsys):
     assert exact[0]["stable"] is False
 
 
+def test_limit_cycles_of_a_loop_with_a_delay(tmp_path, capsys):
+    path = tmp_path / "late.toml"
+    path.write_text(
+        '[plant]\nkind = "mass"\nmass = 1.5\n[effects.viscous]\ncoefficient = 0.8\n'
+        "[effects.input_saturation]\nlevel = 4.0\n[effects.input_delay]\ndelay = 0.06\n"
+        "[controller]\nkp = 60.0\nkd = 3.0\ntf = 0.02\n[box]\namplitude = [4.1, 100.0]\nomega = [1.0, 30.0]\n"
+    )
+    assert main(["limit-cycles", str(path), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    (cycle,) = answer["cycles"]
+    assert cycle["exact"] is None and cycle["verdict"] == "confirmed"
+    assert cycle["simulated"]["omega"] == pytest.approx(6.09831, rel=1e-6)  # tests/test_special_loops.py
+    assert "simulation" in cycle["why"] and "delay" in answer["note"]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

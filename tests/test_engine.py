@@ -100,7 +100,7 @@ def test_impacts_against_dop853():
 
 
 def test_chatter_ends_in_contact_with_finite_work():
-    """A motor pressed on its load: rebounds shrink geometrically and must end; momentum then tells the speed."""
+    """A motor pressed on its load: rebounds shrink geometrically and end; momentum then tells the speed."""
     drive = cdf.backlash_masses(1, 8, 0.018, 0.5)
     response = cdf.event_response(drive, np.linspace(0, 0.5, 51), 20.0, [0, 0, 0.009, 0])
     kinds = [e.kind for e in response.events]

@@ -8,7 +8,7 @@ import ctrl_df as cdf
 
 
 def reference(mass, coulomb, static, velocity, viscous, force, t_end):
-    """DOP853 from reversal to reversal, each bump resolved by its step bound; no stick as the force is large there."""
+    """DOP853 from reversal to reversal, each bump resolved by its step bound; too large a force to stick."""
     t, y, s = 0.0, np.array([0.0, 0.0]), 1.0
     while t < t_end:
 
@@ -20,8 +20,9 @@ def reference(mass, coulomb, static, velocity, viscous, force, t_end):
         stop.terminal, stop.direction = True, -1
         acceleration = abs(flow(t, y)[1]) + 1e-9
         # out of the bump in small steps, then on
-        first = solve_ivp(flow, (t, min(t + 8 * velocity / acceleration, t_end)), y, "DOP853", rtol=1e-12, atol=1e-15,
-                          max_step=velocity / acceleration / 4)  # fmt: skip
+        time = velocity / acceleration
+        span = (t, min(t + 8 * time, t_end))
+        first = solve_ivp(flow, span, y, "DOP853", rtol=1e-12, atol=1e-15, max_step=time / 4)
         t, y = first.t[-1], first.y[:, -1]
         sol = solve_ivp(flow, (t, t_end), y, "DOP853", events=stop, rtol=1e-12, atol=1e-15, max_step=2e-3)
         t, y = sol.t[-1], sol.y[:, -1].copy()

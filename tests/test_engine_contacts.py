@@ -1,4 +1,4 @@
-"""Contacts as properties: over random loops nothing passes through a wall, momentum is kept, energy never made."""
+"""Contacts as properties: over random loops no wall is passed, momentum kept, energy never made."""
 
 import numpy as np
 import pytest
@@ -107,7 +107,7 @@ def test_impacts_far_from_zero_are_met_once():
 
 
 def test_a_full_event_log_hides_no_chatter():
-    """A relay that pushes its own input back switches for ever; the bound on events without progress must hold."""
+    """A relay that pushes its own input back switches for ever; the bound on such events must hold."""
     import control as ct
 
     relay, lag = (

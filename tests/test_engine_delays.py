@@ -16,8 +16,8 @@ def method_of_steps(flow, history, delay, t_end):
     while len(pieces) * delay < t_end:
         past = pieces[-1] if pieces else (lambda t: np.array(history, float))
         span = len(pieces) * delay, (len(pieces) + 1) * delay
-        sol = solve_ivp(lambda t, y, past=past: flow(y, past(t - delay)), span, x, "DOP853", rtol=1e-12, atol=1e-14,
-                        dense_output=True)  # fmt: skip
+        late = lambda t, y, past=past: flow(y, past(t - delay))  # noqa: E731
+        sol = solve_ivp(late, span, x, "DOP853", rtol=1e-12, atol=1e-14, dense_output=True)
         pieces.append(sol.sol)
         x = sol.y[:, -1]
     return lambda t: np.array([pieces[min(int(s / delay), len(pieces) - 1)](s) for s in t])
@@ -54,8 +54,9 @@ def delayed_integrator(gain, delay):
     """An integrator fed back through a delay: s + gain exp(-s delay) = 0."""
     block = cdf.Mass(1.0).with_effect(cdf.SensorDelay(delay)).with_effect(cdf.Viscous(0.0))
     late = ct.NonlinearIOSystem(
-        lambda t, x, u, params: (u - x) * 2 / delay, lambda t, x, u, params: 2 * x - u, inputs="u", outputs="y", states=1,
-        name="late",
+        lambda t, x, u, params: (u - x) * 2 / delay,
+        lambda t, x, u, params: 2 * x - u,
+        inputs="u", outputs="y", states=1, name="late",
     )  # fmt: skip
     late.primitive = block.core.output_channel[0][0]
     integrator = ct.ss([[0]], [[1]], [[1]], [[0]], inputs="u", outputs="y", name="integrator")

@@ -64,7 +64,7 @@ def test_floquet_multiplier_is_the_rate_of_simulation():
 
 
 def test_relay_cycle_of_tsypkin():
-    """G = 1/((s + 1)(0.2 s + 1)), relay 1 with hysteresis 0.1: the period solves y(T/2) = 0.1 on the exact response."""
+    """G = 1/((s + 1)(0.2 s + 1)), relay 1 with hysteresis 0.1: y(T/2) = 0.1 on the exact response."""
     from scipy.optimize import brentq
 
     def switching(half):
@@ -105,7 +105,7 @@ def test_verify_says_when_it_cannot_simulate():
 
 
 def test_sampled_loop_is_answered_by_averages():
-    """At 2 ms the irregular 14.1 rad/s motion of the elastic gap is sustained; it has no period of its own."""
+    """At 2 ms the irregular 14.1 rad/s motion of the elastic gap is sustained, without a period."""
     loop = cdf.closed_loop(BACKLASH, cdf.backlash_masses(1, 8, 0.018, 0.8), dt=2e-3)
     orbit = cdf.find_limit_cycle(loop)
     assert orbit is not None and orbit.stable is None

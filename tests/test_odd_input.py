@@ -1,4 +1,4 @@
-"""Odd but legal input, and what earlier versions got wrong with it; bad input gets one clear error at once."""
+"""Odd but legal input, and what earlier versions got wrong with it; bad input gets one clear error."""
 
 import warnings
 

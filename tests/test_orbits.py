@@ -100,8 +100,8 @@ def friction_period(mass, force, kinetic, static, x0, A, omega, stop=None, resti
             if stop is not None:
                 events.append(event(lambda t, z, way=way: way * z[0] - stop, 1))
         run = solve_ivp(
-            rates, (t, period), z, method="DOP853", rtol=1e-12, atol=1e-14, events=events, max_step=period / 60,
-            first_step=min(tiny, period - t),
+            rates, (t, period), z, method="DOP853", rtol=1e-12, atol=1e-14, events=events,
+            max_step=period / 60, first_step=min(tiny, period - t),
         )  # fmt: skip
         t, z = run.t[-1], run.y[:, -1].copy()
         if run.status == 1 and way == 0:  # over the threshold by a step of constant jerk
@@ -276,7 +276,8 @@ def test_dry_compositions_repeat_and_agree(seed):
          block(Mass(m), coulomb, viscous, cdf.Stiction(Ks), cdf.LinearSpring(k))),
         (lambda x, v: -B * v + push, stribeck, Ks, None,
          block(Mass(m), coulomb, viscous, cdf.Stribeck(Ks, speed), cdf.ConstantForce(push))),
-        (lambda x, v: -B * v, lambda v: K, K, limit, block(Mass(m), coulomb, viscous, cdf.HardStop(limit, 0.4))),
+        (lambda x, v: -B * v, lambda v: K, K, limit,
+         block(Mass(m), coulomb, viscous, cdf.HardStop(limit, 0.4))),
     )  # fmt: skip
     for force, kinetic, static, stop, b in cases:
         y, regime, x0 = solved(b, A, omega)

@@ -111,7 +111,7 @@ def test_what_a_simulation_cannot_settle_is_said():
     assert "unstable" in check.rows[0].why
 
 
-# --- free position --------------------------------------------------------------------------------------------
+# --- free position ------------------------------------------------------------
 
 
 @pytest.mark.parametrize("push", [0.0, 0.8])
@@ -150,7 +150,7 @@ def test_a_position_that_is_felt_counts():
     assert 0.9 < orbit.multiplier < 1
 
 
-# --- sampled --------------------------------------------------------------------------------------------------
+# --- sampled ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -3,10 +3,11 @@
 An ODE right-hand side cannot hold a body still against an unknown force, nor reverse a velocity in no time.
 Here sticking becomes creep and impact a short spring contact:
 
-- dry friction rises linearly up to the speed ``ctrl_df.stick_velocity`` (default 1e-4 m/s): a stuck body creeps
-  at up to that speed; the static level holds only below it;
-- contacts are springs and dampers whose stiffness makes a contact last ``ctrl_df.contact_time`` (default 1 ms)
-  and whose damping gives the stated restitution: a body pressed on by a steady force F sinks in by F/stiffness;
+- dry friction rises linearly up to the speed ``ctrl_df.stick_velocity`` (default 1e-4 m/s): a stuck body
+  creeps at up to that speed; the static level holds only below it;
+- contacts are springs and dampers whose stiffness makes a contact last ``ctrl_df.contact_time`` (default
+  1 ms) and whose damping gives the stated restitution: a body pressed on by a steady force F sinks in by
+  F/stiffness;
 - delays become first-order Pade elements: right up to about 0.5/delay rad/s.
 
 Both settings live in ``control.config.defaults``. The exact laws are what `ctrl_df.event_response` runs.
@@ -54,7 +55,7 @@ def rates(core: Core, t: float, x, u: float) -> list[float]:
 
 
 def outputs(core: Core, t: float, x) -> list[float]:
-    """Return x, v (of the measured body; x through the sensor channel) and, with two bodies, x_motor, v_motor."""
+    """Return x, v (of the measured body; x through the sensor channel), x_motor, v_motor (of two bodies)."""
     m = core.measured
     y = [run_channel(core.output_channel, t, x, x[2 * m], [0.0] * core.nstates), x[2 * m + 1]]
     return y + [x[2], x[3]] if core.bodies == 2 else y

@@ -138,6 +138,7 @@ def effect_class(effect_id: str) -> type[Effect]:
         return _LIBRARY[effect_id]
     except KeyError:
         raise ValueError(
-            f"an effect id must be one of the library's; got {effect_id!r}. Known: {', '.join(sorted(_LIBRARY))}. "
+            f"an effect id must be one of the library's; got {effect_id!r}. "
+            f"Known: {', '.join(sorted(_LIBRARY))}. "
             "Register your own with ctrl_df.register_effect."
         ) from None

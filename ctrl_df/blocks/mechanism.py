@@ -169,8 +169,8 @@ class Mechanism(ct.NonlinearIOSystem):
 class Mass(Mechanism):
     """A mass on a line, driven by a force; add physics with `with_effect`.
 
-    ``mass dv/dt = F + effects``; input ``F`` [N]; outputs ``x`` [m], ``v`` [m/s]. With `Backlash` or `Compliance`
-    the mass divides into motor and load, and ``x_motor``, ``v_motor`` are outputs too.
+    ``mass dv/dt = F + effects``; input ``F`` [N]; outputs ``x`` [m], ``v`` [m/s]. With `Backlash` or
+    `Compliance` the mass divides into motor and load, and ``x_motor``, ``v_motor`` are outputs too.
 
     Parameters
     ----------
@@ -203,8 +203,8 @@ class Mass(Mechanism):
 class TwoMass(Mechanism):
     """A motor and a load on a line, rigidly joined until `Backlash` or `Compliance` loosens the joint.
 
-    Input ``F`` [N] on the motor; outputs ``x`` (load position), ``v``, ``x_motor``, ``v_motor``. Friction and springs
-    act on the motor, `LoadFriction` on the load.
+    Input ``F`` [N] on the motor; outputs ``x`` (load position), ``v``, ``x_motor``, ``v_motor``. Friction and
+    springs act on the motor, `LoadFriction` on the load.
 
     Parameters
     ----------
@@ -309,6 +309,7 @@ def _check_levels(effects) -> None:
     for effect in effects:
         if isinstance(effect, Stiction | Stribeck) and effect.level < kinetic:
             raise ValueError(
-                f"a static level must be >= the Coulomb level of the block; got {effect.id} level {effect.level:g} "
+                "a static level must be >= the Coulomb level of the block; "
+                f"got {effect.id} level {effect.level:g} "
                 f"below {kinetic:g}. Without stiction leave it out (static=None)."
             )

@@ -15,8 +15,8 @@ def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
     kp, ki, kd : float
         Proportional [N/m], integral [N/(m s)], derivative [N s/m] gain, finite.
     tf : float
-        Time constant of the derivative filter [s], >= 0; 0 is the ideal (improper) PID of the paper, fit for frequency
-        response and for `closed_loop`, which lets the derivative act on the measured velocity.
+        Time constant of the derivative filter [s], >= 0; 0 is the ideal (improper) PID of the paper, fit for
+        frequency response and for `closed_loop`, which lets the derivative act on the measured velocity.
 
     Raises
     ------

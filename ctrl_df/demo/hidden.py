@@ -42,7 +42,7 @@ def embedded_data():
 
 
 def study_text(folder: Path) -> str:
-    """Improve the model with the embedded data; return the summary and write the report beside the pictures."""
+    """Improve the model with the embedded data; return the summary, write the report beside the pictures."""
     if importlib.util.find_spec("ctrl_df.identify.improve") is None:
         return _WHY
     from ..identify.improve import improve
@@ -54,6 +54,7 @@ def study_text(folder: Path) -> str:
         study.report(path)
         where = f"\nreport: {path}"
     return (
-        "Hidden effect: a drive is measured (5 s at 200 Hz, 60 dB); its model knows dry and viscous friction only.\n"
+        "Hidden effect: a drive is measured (5 s at 200 Hz, 60 dB); its model knows dry and viscous friction "
+        "only.\n"
         f"The drive also has a force ripple of 20 mm period.\n{study.summary()}{where}"
     )

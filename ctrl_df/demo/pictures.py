@@ -10,7 +10,8 @@ import numpy as np
 
 from ..df.describing import describing_function_family
 from ..plot.describing import describing_function_plot
-from ..plot.family import plot_family, plot_harmonics
+from ..plot.family import plot_family
+from ..plot.harmonics import plot_harmonics
 from ..plot.response import loop_response_plot
 from .findings import Finding, Settled, settled, simulate
 from .systems import backlash_plant, friction_plant

@@ -22,15 +22,17 @@ class Orbit:
     omega, period : float
         Fundamental frequency [rad/s] and period [s].
     amplitude : float
-        Fundamental amplitude at the block's input (peak).
+        Fundamental amplitude at the block's input (peak), of the signal the block sees: under a sampled
+        controller that of the held steps, or, for a law without time, of the sequence of their values.
     output_amplitude : float
         Fundamental amplitude of the loop's first output.
     floquet : ndarray of complex
-        Multipliers without the trivial one, largest first; zeros where sticking or contact lose a direction.
+        Multipliers without the trivial ones (a shift in time, and of a position that nothing feels), largest
+        first; zeros where sticking or contact lose a direction.
     stable : bool or None
         All multipliers inside the unit circle; None where they are not known (sampled loops).
     residual : float
-        Mismatch after one period relative to the size of the orbit.
+        Mismatch after one period relative to the size of the orbit, a drift of free positions left out.
     events : tuple of Event
         Those of one period, times from its start.
     status : Status

@@ -103,7 +103,7 @@ class Swings:
         return laps
 
     def start(self, x0) -> State:
-        """Return a fresh state; what the engine does not move (the lags that stand for delays elsewhere) is zero."""
+        """Return a fresh state; what the engine does not move (lags that stand for delays elsewhere) is 0."""
         state = self.engine.start(x0)
         for node in self.engine.program.nodes:
             if node[KIND] == DELAY:

@@ -1,8 +1,8 @@
 """Directions in which a loop can be shifted without its noticing: a free position, a state nothing reads.
 
 An axis whose position is not fed back (a pure velocity loop) moves alike wherever it stands. Every orbit of
-such a loop has a second multiplier 1 beside that of a shift in time, and need only close up to the drift of its
-position. Neither says anything about stability; both are taken out here.
+such a loop has a second multiplier 1 beside that of a shift in time, and need only close up to the drift of
+its position. Neither says anything about stability; both are taken out here.
 """
 
 from __future__ import annotations

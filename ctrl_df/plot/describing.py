@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ..limit_cycles.predict import DescribingFunctionResponse, describing_function_response
-from .family import (
+from .curves import (
     CROSSING_COLOR,
     NYQUIST_COLOR,
     axes_for,

@@ -2,11 +2,12 @@
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Exact flow of modes that are affine: dx/dt = A x + B r(t) + c + d t, and margins that are affine too.
 
-A mass with Coulomb and viscous friction, a joint with clearance, springs, a PID, a saturation: between events all of it is
-linear with constant or known forcing. The Taylor series of such a flow costs one small matrix product a term, converges
-everywhere, and is its own interpolant; the margins become polynomials whose first root is found without another call of
-the laws. Which laws qualify `ctrl_df.simulate.pack` knows; A, B, d and the margins' rows of a mode are learnt by evaluating
-its rates at unit states, once, and kept for the modes met last.
+A mass with Coulomb and viscous friction, a joint with clearance, springs, a PID, a saturation: between events
+all of it is linear with constant or known forcing. The Taylor series of such a flow costs one small matrix
+product a term, converges everywhere, and is its own interpolant; the margins become polynomials whose first
+root is found without another call of the laws. Which laws qualify `ctrl_df.simulate.pack` knows; A, B, d and
+the margins' rows of a mode are learnt by evaluating its rates at unit states, once, and kept for the modes
+met last.
 """
 
 from __future__ import annotations
@@ -68,15 +69,15 @@ def memory(prog) -> Memory:
     n, nr, ng, nm = (int(prog.ints[i]) for i in (H_NX, H_NR, H_NG, L.H_NM))
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
-        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros((used, n, n)), np.zeros((used, n, nr)),
-        np.zeros((used, n)), np.zeros((used, ng + 2, n + nr + 1)), np.zeros(ng + 3), np.zeros(ng + 3),
-        np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
+        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros((used, n, n)),
+        np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, ng + 2, n + nr + 1)),
+        np.zeros(ng + 3), np.zeros(ng + 3), np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
     )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def recall(prog, store, mode, work, x, dx0, dx, g):
-    """Slot of the present mode among those learnt; learns it if it is new. `x`, `dx0`, `dx`, `g` are scratch."""
+    """Slot of the present mode, learnt if it is new. `x`, `dx0`, `dx`, `g` are scratch."""
     known = int(store.order[0])
     for slot in range(known):
         same = True
@@ -168,7 +169,7 @@ def extend(prog, mode, work, g, out):
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def forced(prog, drive, segment, t, length, rtol, store):
-    """Write the external inputs over a step as powers: r(t + theta length) = sum of forcing[k] theta^k, k from 1.
+    """Write the external inputs over a step as powers: r(t + theta length) = sum forcing[k] theta^k, k > 0.
 
     Returns the terms their own series needs; 0 where they are constant.
     """
@@ -208,8 +209,8 @@ def forced(prog, drive, segment, t, length, rtol, store):
 def series(store, slot, length, least, k0, size, rtol, atol, poly):
     """Power series of the flow over `length` seconds from a state with rates k0, into poly.
 
-    `least` is the least number of terms. Returns (terms, share): the series holds to tolerance over that share of the
-    length (1: all of it).
+    `least` is the least number of terms. Returns (terms, share): the series holds to tolerance over that
+    share of the length (1: all of it).
     """
     n, nr = size.shape[0], store.b.shape[2]
     a = store.a[slot]

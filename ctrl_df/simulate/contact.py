@@ -180,9 +180,10 @@ def _separate(prog, node, body, d, wall):
 def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     """Newton's impact in the joint; the end of chatter becomes sustained contact.
 
-    Chatter: with restitution e < 1 and a steady pressing acceleration p the flights shrink geometrically and end after
-    2 w / (p (1 - e)), w the rebound speed. Once a flight is lower than `height` of the gap (or of the position's own
-    size) the rest of the chatter is passed over at once, momentum kept: an error of position of that order.
+    Chatter: with restitution e < 1 and a steady pressing acceleration p the flights shrink geometrically and
+    end after 2 w / (p (1 - e)), w the rebound speed. Once a flight is lower than `height` of the gap (or of
+    the position's own size) the rest of the chatter is passed over at once, momentum kept: an error of
+    position of that order.
     """
     w, f, trial = work
     nodes, par = prog.nodes, prog.par

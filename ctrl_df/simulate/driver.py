@@ -19,8 +19,8 @@ from .outputs import accumulate, next_sample, record, record_inside, remember, s
 from .stepper import inside, prepare, prepare8, roughness, step
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
-"""Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN, sliding, step
-below the resolution of time, more steps within a delay than its history holds."""
+"""Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
+sliding, step below the resolution of time, more steps within a delay than its history holds."""
 
 PATIENCE = 40  # steps of order 5 after one of order 3 that failed
 
@@ -28,15 +28,16 @@ PATIENCE = 40  # steps of order 5 after one of order 3 that failed
 def workspace(prog, delays: bool = False):
     """Scratch arrays of a run, made once: compiled code that counts no references needs memory from outside.
 
-    With `delays` the work vector also holds the history of pure delays, part of the state of the program. Who moves states
-    about without it cannot treat such a program.
+    With `delays` the work vector also holds the history of pure delays, part of the state of the program. Who
+    moves states about without it cannot treat such a program.
     """
     n, ng = int(prog.ints[H_NX]), int(prog.ints[H_NG])
     past = int(prog.ints[H_DELAYS]) * history.SIZE
     if past and not delays:
         raise ValueError(
-            "exact orbits need a state of finitely many numbers; this system has a pure delay inside, whose state is a whole "
-            "history. Find its motion by simulation (event_response), or put a lag of the same time (input_lag) in its place."
+            "exact orbits need a state of finitely many numbers; this system has a pure delay inside, whose "
+            "state is a whole history. Find its motion by simulation (event_response), or put a lag of the "
+            "same time (input_lag) in its place."
         )
     work = (np.zeros(int(prog.ints[H_HISTORY]) + past), np.zeros(2), np.zeros(max(n, 4) + 2))
     owner = np.zeros(ng + 1, np.int64)
@@ -55,18 +56,18 @@ def copy(source, target):
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def run(
-    prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event, watch,
-    watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
+    prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
+    watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
     spectrum, omega,
 ):  # fmt: skip
     """Run from clock[0] to t_end; see `ctrl_df.simulate.engine.Engine.run` for the arguments.
 
-    ``clock``: [time, next output index, last step size, steps used, events so far, events in this log, segment,
-    on section, margin of the last event]. ``before``: state just before the event that stopped the run.
-    ``scale``: running scale of each margin. ``fresh``: 1 to settle modes first (a new state), 0 to go on.
-    ``space``: scratch arrays of `workspace`.
-    ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are added; no
-    columns, no integrals. Returns the reason (module constants).
+    ``clock``: [time, next output index, last step size, steps used, events so far, events in this log,
+    segment, on section, margin of the last event].
+    ``before``: state just before the event that stopped the run. ``scale``: running scale of each margin.
+    ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
+    ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
+    added; no columns, no integrals. Returns the reason (module constants).
     """
     work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner, memo, store = space
     n, ng = x.shape[0], scale.shape[0]
@@ -268,8 +269,8 @@ def run(
                 else:
                     if affine or watch >= 0 or has_tracked:
                         margins(
-                            prog, drive, segment, t + length, x1, mode, work, dx, g, 1e-4 * length, watch, watch_level,
-                            watch_sign,
+                            prog, drive, segment, t + length, x1, mode, work, dx, g, 1e-4 * length, watch,
+                            watch_level, watch_sign,
                         )  # fmt: skip
                         suspect = True
                     for i in range(ng):
@@ -292,8 +293,8 @@ def run(
                     terms = prepare(rank, length, k, poly)
             if suspect:
                 theta, at = locate_event(
-                    prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, norm, blocked, watch,
-                    watch_level, watch_sign,
+                    prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, norm,
+                    blocked, watch, watch_level, watch_sign,
                 )  # fmt: skip
             if blocked >= 0 and locate and g[blocked] > gtol[blocked]:
                 blocked = -1
@@ -301,13 +302,14 @@ def run(
             # --- outputs inside the step
             while index < tout.shape[0] and tout[index] < reached:
                 record_inside(
-                    prog, drive, segment, t, (tout[index] - t) / length, length, x, mode, work, terms, poly, xout[index],
-                    yout[index],
+                    prog, drive, segment, t, (tout[index] - t) / length, length, x, mode, work, terms, poly,
+                    xout[index], yout[index],
                 )  # fmt: skip
                 index += 1
             if spectrum.shape[1] > 0:
                 accumulate(
-                    prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, terms, poly, xi, spectrum, omega
+                    prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, terms, poly, xi,
+                    spectrum, omega
                 )  # fmt: skip
             if delays and not remember(
                 prog, drive, segment, t, length, min(theta, 1.0), generation, x, mode, work, terms, poly, xi

@@ -40,7 +40,7 @@ class Event:
 
 @dataclass
 class State:
-    """Everything needed to go on: time, continuous state, discrete modes, step size, what pure delays remember."""
+    """Everything needed to go on: time, state, discrete modes, step size, what pure delays remember."""
 
     time: float
     x: np.ndarray
@@ -222,16 +222,17 @@ class Engine:
         if self.delayed and not fresh:
             if now.history is None:
                 raise ValueError(
-                    "a state of a system with pure delays is its history as well; go on from the state that a run returned."
+                    "a state of a system with pure delays is its history as well; "
+                    "go on from the state that a run returned."
                 )
             past[:] = now.history
         while True:
             room = max_steps - int(clock[3])
             chunk = min(room, 1_000_000)
             reason = driver.run(
-                self.program, drive, clock, now.x, now.mode, t_end, times, xout, yout, order, rtol, atol, max_step, locate,
-                stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k, before, scale, fresh,
-                self._space, spectrum, omega,
+                self.program, drive, clock, now.x, now.mode, t_end, times, xout, yout, order, rtol, atol,
+                max_step, locate, stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k,
+                before, scale, fresh, self._space, spectrum, omega,
             )  # fmt: skip
             fresh = 0
             used = min(int(clock[5]), len(log_t))

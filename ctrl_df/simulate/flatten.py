@@ -1,4 +1,4 @@
-"""From python-control systems to a list of nodes: nested interconnections and the channels of a block become one."""
+"""From python-control systems to a list of nodes: interconnections and channels of blocks become one."""
 
 from __future__ import annotations
 
@@ -51,7 +51,8 @@ def _flatten(system, x0: int) -> Flat:
         flat.keep.append(keep)
         return flat
     raise TypeError(
-        f"event_response needs a block, an LTI system or an interconnection of them; got {type(system).__name__}. "
+        "event_response needs a block, an LTI system or an interconnection of them; "
+        f"got {type(system).__name__}. "
         "Wrap a frequency response in a fitted transfer function first."
     )
 
@@ -93,7 +94,7 @@ def _interconnection(system: ct.InterconnectedSystem, x0: int) -> Flat:
 
 
 def _fold_gains(flat: Flat) -> Flat:
-    """Take pure gains (summing junctions, LTI systems without states) out of the list into the maps around them."""
+    """Take pure gains (summing junctions, LTI systems without states) out of the list into the maps."""
     gain = [n.kind == L.LTI and n.nx == 0 for n in flat.nodes]
     if not any(gain) or all(gain):
         return flat

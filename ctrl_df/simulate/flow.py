@@ -226,7 +226,7 @@ def rates(prog, drive, segment, t, x, mode, work, dx, g, want_g):
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g):
-    """Margins that need the rate of an input: a play lets go when its input turns, a limiter limits when it is fast.
+    """Margins that need the rate of an input: a play lets go when it turns, a limiter limits when it is fast.
 
     Rates are central differences along the flow over +-`reach` seconds.
     """

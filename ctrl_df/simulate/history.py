@@ -2,11 +2,12 @@
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """What a pure delay remembers: its input over the last `delay` seconds, as polynomials in a ring.
 
-The history of each delay stands in the work vector: serial of the oldest record, of the next one, of the record in use,
-then `RING` records. A record is one accepted step, or its part before an event: start [s], length [s], generation, and the
-input at eight Chebyshev points, which keep all of a step's interpolant. A record of generation g > 0 begins with a jump or
-kink that has passed a delay g - 1 times. Its arrival ends a step, so that none runs across a kink; after `LAST_GENERATION`
-passages, each of which the plant smooths, error control alone does.
+The history of each delay stands in the work vector: serial of the oldest record, of the next one, of the
+record in use, then `RING` records. A record is one accepted step, or its part before an event: start [s],
+length [s], generation, and the input at eight Chebyshev points, which keep all of a step's interpolant. A
+record of generation g > 0 begins with a jump or kink that has passed a delay g - 1 times. Its arrival ends a
+step, so that none runs across a kink; after `LAST_GENERATION` passages, each of which the plant smooths,
+error control alone does.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def _record(base, serial):
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def delayed(prog, node, t, w):
-    """Input of a delay node one delay before `t`, read from the side of a jump that the present step lies on."""
+    """Input of a delay node one delay before `t`, read from that side of a jump the present step lies on."""
     base = prog.ints[prog.nodes[node, AUX]]
     past = t - prog.par[prog.nodes[node, PAR]]
     serial = int(w[base + NOW])
@@ -76,8 +77,8 @@ def begin(prog, node, t, value, w):
 def advance(prog, t, h, limit, w):
     """Move every delay on to the record that leaves it at `t`.
 
-    Returns the end of a step of about `h` from `t` that crosses no kink on its way out of a delay, and the generation
-    (1 more) of the kink that leaves one right now (0: none).
+    Returns the end of a step of about `h` from `t` that crosses no kink on its way out of a delay, and the
+    generation (1 more) of the kink that leaves one right now (0: none).
     """
     arrived = 0.0
     limit_here = limit

@@ -1,8 +1,8 @@
 """The engine's view of a system: plain arrays, and what their columns mean.
 
 A *node* is an elementary part (a mechanism, a linear system, a piecewise-affine element, ...). Its inputs are
-linear combinations of node outputs (signals `s`) and external inputs `r`. Nodes stand in an order in which every
-node with direct feedthrough follows those it depends on.
+linear combinations of node outputs (signals `s`) and external inputs `r`. Nodes stand in an order in which
+every node with direct feedthrough follows those it depends on.
 """
 
 from __future__ import annotations
@@ -65,10 +65,10 @@ EVENT_KINDS = (
 ) = range(13)
 
 
-# header of the integer table: sizes of state, signals, inputs, outputs, modes, margins; widest node input; whether
-# margins need input rates; position of the output rows; offsets of node inputs and of scratch in the work vector;
-# whether a friction law has a narrow feature over speed; whether the flow of every mode is affine; number of delays, and
-# where their history begins in the work vector
+# header of the integer table: sizes of state, signals, inputs, outputs, modes, margins; widest node input;
+# whether margins need input rates; position of the output rows; offsets of node inputs and of scratch in the
+# work vector; whether a friction law has a narrow feature over speed; whether the flow of every mode is
+# affine; number of delays, and where their history begins in the work vector
 H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_BUMP = range(12)
 H_AFFINE, H_DELAYS, H_HISTORY = 12, 13, 14
 
@@ -79,9 +79,10 @@ R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SIZE = range(5)
 class Program(NamedTuple):
     """A system as arrays; everything a compiled function needs to run it.
 
-    Few arrays, since each is passed from function to function by value. ``ints`` holds the header, aux tables, law
-    records and, for every input or output, a row: its length, then pairs (index in the work vector, index of its
-    weight in ``par``). The work vector is signals, external inputs, inputs of the node at hand, scratch.
+    Few arrays, since each is passed from function to function by value. ``ints`` holds the header, aux
+    tables, law records and, for every input or output, a row: its length, then pairs (index in the work
+    vector, index of its weight in ``par``). The work vector is signals, external inputs, inputs of the node
+    at hand, scratch.
     """
 
     nodes: np.ndarray  # (n, 13) int64
@@ -90,7 +91,7 @@ class Program(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """External inputs: per channel value + slope (t - t0) + Re sum_k c_k exp(j k w t), or a function called back."""
+    """External inputs: value + slope (t - t0) + Re sum_k c_k exp(j k w t) each, or a function called back."""
 
     time: np.ndarray  # sample times (may be empty), segments of `samples`
     samples: np.ndarray  # (nr, nt)

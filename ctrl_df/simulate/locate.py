@@ -74,8 +74,8 @@ def worst(g, gtol, scale, blocked):
 def tolerances(prog, x, mode, scale, atol, gtol):
     """Write how far below zero each margin may be before it counts as crossed.
 
-    A margin compares numbers that are rounded: positions far from zero, a corner of a saturation. What their last
-    digits make of it is no crossing.
+    A margin compares numbers that are rounded: positions far from zero, a corner of a saturation. What their
+    last digits make of it is no crossing.
     """
     for i in range(gtol.shape[0]):
         gtol[i] = 1e-12 * scale[i] + 1e-2 * atol
@@ -103,8 +103,8 @@ def tolerances(prog, x, mode, scale, atol, gtol):
 def bump_share(prog, x, x1):
     """Share of the way from x to x1 that a step may take near a narrow feature of friction over speed.
 
-    A Stribeck bump lies within about six of its speeds vs (exp(-36) is below rounding). There a step may change the
-    speed by vs, or by half: no stage of it can then miss the bump, and the error estimate sees it.
+    A Stribeck bump lies within about six of its speeds vs (exp(-36) is below rounding). There a step may
+    change the speed by vs, or by half: no stage of it can then miss the bump, and the error estimate sees it.
     """
     share = 1.0
     for n in range(prog.nodes.shape[0]):
@@ -124,7 +124,8 @@ def bump_share(prog, x, x1):
 def may_touch(prog, x, x1, mode, length):
     """Whether a gap or a stop may be touched inside a step at whose ends it is open.
 
-    Where a distance falls at the start and rises at the end it lies above both its tangents, if it bends one way only.
+    Where a distance falls at the start and rises at the end it lies above both its tangents, if it bends one
+    way only.
     """
     for n in range(prog.nodes.shape[0]):
         if prog.nodes[n, KIND] != MECHANISM:
@@ -160,8 +161,8 @@ def locate_event(
 ):  # fmt: skip
     """Fraction of the step at which the first margin crosses zero, and its index (1.0, -1: none).
 
-    The inner stages of a step are crude; what they suspect is confirmed on the interpolant. `g` holds the margins at the end
-    of the step, before and after.
+    The inner stages of a step are crude; what they suspect is confirmed on the interpolant. `g` holds the
+    margins at the end of the step, before and after.
     """
     reach = 1e-4 * length
     left, right = 0.0, -1.0
@@ -178,7 +179,8 @@ def locate_event(
         else:
             inside(terms, theta, x, poly, xi)
             margins(
-                prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign
+                prog, drive, segment, t + theta * length, xi, mode, work, dx, g, reach, watch, watch_level,
+                watch_sign
             )  # fmt: skip
             value, at = worst(g, gtol, scale, blocked)
         if 0.0 <= value and 0.0 <= value_left < before and value_left < value and p > 1:
@@ -192,7 +194,8 @@ def locate_event(
                 vertex = middle + 0.5 * step * (one - three) / bend
                 inside(terms, vertex, x, poly, xi)
                 margins(
-                    prog, drive, segment, t + vertex * length, xi, mode, work, dx, g, reach, watch, watch_level, watch_sign
+                    prog, drive, segment, t + vertex * length, xi, mode, work, dx, g, reach, watch,
+                    watch_level, watch_sign
                 )  # fmt: skip
                 touch, index = worst(g, gtol, scale, blocked)
                 if touch < 0.0:

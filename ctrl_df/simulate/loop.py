@@ -29,16 +29,16 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     Parameters
     ----------
     pid : ct.TransferFunction or ct.StateSpace
-        The controller. One degree of the numerator above the denominator (the ideal PID) is allowed where the block has
-        a velocity output ``v``: the derivative then acts on ``-v``, not on the reference.
+        The controller. One degree of the numerator above the denominator (the ideal PID) is allowed where the
+        block has a velocity output ``v``: the derivative then acts on ``-v``, not on the reference.
     block : ct.NonlinearIOSystem
         The plant: one input; a mechanism, a memoryless element, or a block of the user's own.
     dt : float
-        Sample time of a digital controller with zero-order hold [s]; 0: continuous. The continuous `pid` is then run as
-        ``kp e + I - kd v`` with I summed by the backward rule (any other proper controller: Tustin's rule). A discrete
-        `pid` brings its own dt. One with a direct path (D != 0) reads the plant just before its tick; one without puts
-        out ``u[k] = C x[k]`` first and reads what a plant without time answers to it, so that the loop is the recursion
-        u = H e, y = f(u).
+        Sample time of a digital controller with zero-order hold [s]; 0: continuous. The continuous `pid` is
+        then run as ``kp e + I - kd v`` with I summed by the backward rule (any other proper controller:
+        Tustin's rule). A discrete `pid` brings its own dt. One with a direct path (D != 0) reads the plant
+        just before its tick; one without puts out ``u[k] = C x[k]`` first and reads what a plant without time
+        answers to it, so that the loop is the recursion u = H e, y = f(u).
     output : str or int
         The output that is fed back, the first by default.
     name : str
@@ -52,7 +52,8 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     Raises
     ------
     ValueError
-        MIMO controller, improper controller without a velocity to act on, sample times that differ, algebraic loop.
+        MIMO controller, improper controller without a velocity to act on, sample times that differ, algebraic
+        loop.
     """
     block = _as_block(block)
     controller = _as_lti(pid)
@@ -68,13 +69,13 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     kd, proper = split_improper(controller)
     if kd != 0 and "v" not in block.output_labels:
         raise ValueError(
-            f"an improper controller needs a block with a velocity output v for its derivative; {block.name} has "
-            f"{', '.join(block.output_labels)}. Filter the derivative: pid(..., tf=...)."
+            "an improper controller needs a block with a velocity output v for its derivative; "
+            f"{block.name} has {', '.join(block.output_labels)}. Filter the derivative: pid(..., tf=...)."
         )
     if controller.isdtime(strict=True) and answers_at_once(block) and np.any(np.asarray(proper.D)):
         raise ValueError(
-            f"{block.name} and the discrete controller answer each other within one sample (an algebraic loop, D != 0), "
-            "so the loop has no order of steps; give the controller at least one sample of delay."
+            f"{block.name} and the discrete controller answer each other within one sample (an algebraic "
+            "loop, D != 0), so the loop has no order of steps; give the controller one sample of delay."
         )
     control = _controller(proper, kd, dt, force, name="controller")
     plant = block._named("plant") if isinstance(block, Mechanism) else block.copy(name="plant")
@@ -97,7 +98,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
 
 
 def answers_at_once(block) -> bool:
-    """Whether a block is a law without time: its output follows a jump of its input (all but rate limiters, here)."""
+    """Whether a block is a law without time: its output follows a jump of its input."""
     if isinstance(block, Element):
         return not isinstance(block.primitive, RateLimiter)
     return not block.nstates
@@ -112,8 +113,8 @@ def split_improper(controller) -> tuple[float, ct.StateSpace]:
         return 0.0, ct.ss(controller)  # pyright: ignore[reportReturnType]
     if len(num) > len(den) + 1 or controller.isdtime(strict=True):
         raise ValueError(
-            f"a controller may exceed its denominator by one degree (an ideal derivative), in continuous time; got "
-            f"numerator degree {len(num) - 1} over {len(den) - 1}. Filter it: pid(..., tf=...)."
+            "a controller may exceed its denominator by one degree (an ideal derivative) in continuous time; "
+            f"got numerator degree {len(num) - 1} over {len(den) - 1}. Filter it: pid(..., tf=...)."
         )
     quotient, rest = np.polydiv(num, den)
     kd, kp = quotient[0], quotient[1] if len(quotient) > 1 else 0.0

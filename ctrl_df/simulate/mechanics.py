@@ -67,7 +67,7 @@ def level(prog, first, count, moving, direction, speed):
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def smooth_forces(prog, node, t, x, mode, force, f, dx):
-    """Fill f[0:2] with the forces on the bodies other than dry friction and contact; writes internal rates to dx."""
+    """Fill f[0:2] with the forces on the bodies but dry friction and contact; writes internal rates to dx."""
     nodes, par, aux = prog.nodes, prog.par, prog.ints
     xo, po, ao = nodes[node, X], nodes[node, PAR], nodes[node, AUX]
     driven = aux[ao + A_BODIES] - 1

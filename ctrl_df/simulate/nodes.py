@@ -95,7 +95,8 @@ def primitive_node(primitive, x0) -> Node:
     if isinstance(primitive, Delay):
         if primitive.delay == 0:
             return Node(L.LTI, 1, 1, x0, 1, [0.0, 0.0, 0.0, 1.0], feed=1, affine=True)
-        # its state stands for the lag of the compliant form and does not move; aux: place of its history, when packed
+        # its state stands for the lag of the compliant form and does not move; aux: place of its history,
+        # when packed
         return Node(L.DELAY, 1, 1, x0, 1, [primitive.delay], aux=[0])
     raise TypeError(f"unknown element {primitive!r}.")
 
@@ -198,6 +199,6 @@ def core_node(core: Core, x0: int) -> Node:
 
 
 def _narrowest(chain) -> float:
-    """Return the smallest speed a chain of friction laws names among its parameters [m/s]; inf if none does."""
+    """Return the smallest speed among the parameters of a chain of friction laws [m/s]; inf if none."""
     speeds = [p.value for effect in chain for p in effect.parameters.values() if p.unit == "m/s"]
     return min((v for v in speeds if v > 0), default=np.inf)

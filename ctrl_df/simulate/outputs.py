@@ -1,6 +1,6 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""What a run does at given instants: sampled controllers tick, outputs are recorded, integrated, remembered by delays."""
+"""What a run does at given instants: controllers tick, outputs are recorded, integrated, remembered."""
 
 from __future__ import annotations
 
@@ -42,9 +42,10 @@ def _sampled_size(prog, n):
 def tick(prog, drive, segment, t, x, mode, work, dx):
     """Run the sampled controllers whose tick falls on `t`.
 
-    One without a direct path (D = 0) knows its output before it reads: it puts it out first, and what answers at once
-    (a law without time, the direct path of a plant) is read afterwards, as u[k] = C x[k], y[k] = f(u[k]),
-    x[k+1] = A x[k] + B y[k] have it. One with a direct path reads what stands there just before its tick.
+    One without a direct path (D = 0) knows its output before it reads: it puts it out first, and what answers
+    at once (a law without time, the direct path of a plant) is read afterwards, as u[k] = C x[k], y[k] =
+    f(u[k]), x[k+1] = A x[k] + B y[k] have it. One with a direct path reads what stands there just before its
+    tick.
     """
     w = work[0]
     late = False
@@ -92,7 +93,7 @@ def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, poly, xi, spectrum, omega):
-    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss-Legendre quadrature."""
+    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss' quadrature."""
     w = work[0]
     for i in range(NODES.shape[0]):
         at = theta * NODES[i]
@@ -126,7 +127,7 @@ def start_delays(prog, drive, segment, t, x, mode, work):
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def remember(prog, drive, segment, t, length, theta, generation, x, mode, work, terms, poly, xi):
-    """Keep the inputs of all delays over the fraction `theta` of a step; returns False where the history is full."""
+    """Keep the inputs of all delays over the fraction `theta` of a step; False if there is no room."""
     w = work[0]
     span = theta * length
     if span <= 0.0:

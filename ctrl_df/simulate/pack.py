@@ -18,7 +18,7 @@ WIDEST_AFFINE = 24
 
 
 def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
-    """Order the nodes by feedthrough and lay everything out in arrays; returns program, initial modes, node names."""
+    """Order the nodes by feedthrough, lay all out in arrays; returns program, initial modes, node names."""
     nodes = flat.nodes
     s_at = np.cumsum([0] + [n.nout for n in nodes])
     u_at = np.cumsum([0] + [n.nin for n in nodes])
@@ -75,8 +75,8 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
             aux[0] = header[L.H_HISTORY] + ints[L.H_DELAYS] * history.SIZE
             ints[L.H_DELAYS] += 1
         table[row] = [
-            node.kind, node.nin, node.nout, inputs, s_at[i], node.x, node.nx, len(par), len(modes), ng, node.ng,
-            len(ints) if aux else laws, node.feed,
+            node.kind, node.nin, node.nout, inputs, s_at[i], node.x, node.nx, len(par), len(modes), ng,
+            node.ng, len(ints) if aux else laws, node.feed,
         ]  # fmt: skip
         ints.extend(aux)
         par.extend(node.par)
@@ -97,7 +97,7 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
 
 
 def _feed_order(nodes, us, s_at, u_at, names) -> list[int]:
-    """Order nodes so that each with direct feedthrough follows those it reads; an algebraic loop is an error."""
+    """Order nodes so that each with feedthrough follows those it reads; an algebraic loop is an error."""
     pending, done = list(range(len(nodes))), []
     settled = np.zeros(s_at[-1], bool)
     while pending:

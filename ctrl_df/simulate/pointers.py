@@ -1,8 +1,8 @@
 """Laws as machine addresses: how one compiled engine runs any effect.
 
-A law is a plain Python function. `address` compiles it (cached beside its file where possible) and returns the
-address of the machine code; the engine, compiled once, calls through that address. What numba cannot compile is
-called back in Python, slower but with the same result.
+A law is a plain Python function. `address` compiles it (cached beside its file where possible) and returns
+the address of the machine code; the engine, compiled once, calls through that address. What numba cannot
+compile is called back in Python, slower but with the same result.
 """
 
 from __future__ import annotations

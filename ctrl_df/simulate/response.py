@@ -19,11 +19,13 @@ class EventResponse(ct.TimeResponseData):
     Attributes
     ----------
     events : list of Event
-        Time, subsystem and kind (``stick``, ``breakaway``, ``reversal``, ``impact``, ``contact``, ``release``, ...).
+        Time, subsystem and kind (``stick``, ``breakaway``, ``reversal``, ``impact``, ``contact``,
+        ``release``, ...).
     event_count : int
         Number of events, those not kept included.
     status : Status
-        How the simulation ended; anything but CONVERGED means that `time` ends early, at the last state that is right.
+        How the simulation ended; anything but CONVERGED means that `time` ends early, at the last state that
+        is right.
     """
 
     events: list[Event]
@@ -57,17 +59,20 @@ def event_response(
     timepts : (nt,) array
         Times of the answer [s], ascending; the simulation runs from the first to the last.
     inputs : float, (nt,) or (ninputs, nt) array, list, or callable
-        A constant, samples at `timepts`, or a function of time (called with t, returning a number or one for each input).
+        A constant, samples at `timepts`, or a function of time (called with t, returning a number or one for
+        each input).
     initial_state : float or (nstates,) array
-        State at the first time, in the order of ``sys.state_labels``; a scalar fills all. A pure delay (input_delay,
-        sensor_delay) runs exactly; before the first time its input is taken to have always been what it is then (its own
-        entry here is for ordinary solvers and has no effect). To see a step arrive late, begin the times before the step.
+        State at the first time, in the order of ``sys.state_labels``; a scalar fills all. A pure delay
+        (input_delay, sensor_delay) runs exactly; before the first time its input is taken to have always been
+        what it is then (its own entry here is for ordinary solvers and has no effect). To see a step arrive
+        late, begin the times before the step.
     params : dict
         Parameters of blocks that differ from their own values.
     input_hold : {'linear', 'zoh'}
         How samples are read between the times.
     rtol, atol : float
-        Tolerances of the integration, relative to the running size of each state; `atol` defaults to rtol/1000.
+        Tolerances of the integration, relative to the running size of each state; `atol` defaults to
+        rtol/1000.
     max_step : float
         Longest step [s]. Needed only where a callable input has features shorter than five time points.
     max_steps : int
@@ -78,12 +83,14 @@ def event_response(
     Returns
     -------
     EventResponse
-        Ends early, with a RuntimeWarning and its `status` telling why, if the loop diverges, chatters or exhausts its steps.
+        Ends early, with a RuntimeWarning and its `status` telling why, if the loop diverges, chatters or
+        exhausts its steps.
 
     Raises
     ------
     ValueError
-        Times not ascending, wrong shapes, NaN, an initial state inside a stop or outside a gap, algebraic loops.
+        Times not ascending, wrong shapes, NaN, an initial state inside a stop or outside a gap, algebraic
+        loops.
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
@@ -139,15 +146,16 @@ def check_positions(system, x0) -> None:
             delta = x[2] - x[0]
             if not -1e-12 <= delta <= gap * (1 + 1e-12) + 1e-12:
                 raise ValueError(
-                    f"the initial state of {name} needs 0 <= x_motor - x <= {gap:g} m (the clearance of its joint); got "
-                    f"{delta:g}. Start with x_motor = x."
+                    f"the initial state of {name} needs 0 <= x_motor - x <= {gap:g} m (the clearance of its "
+                    f"joint); got {delta:g}. Start with x_motor = x."
                 )
         if core.stop is not None:
             low, high = core.stop.span
             at = x[2 * core.driven]
             if not low <= at <= high:
                 raise ValueError(
-                    f"the initial position of {name} must lie between its stops {low:g} and {high:g} m; got {at:g}."
+                    f"the initial position of {name} must lie between its stops {low:g} and {high:g} m; "
+                    f"got {at:g}."
                 )
 
 

@@ -36,7 +36,8 @@ def first_root(curve, terms, upto, scale):
                 right, value_right = lowest, value_lowest
         if value_right < 0.0:
             if p == 1:
-                # a flight or slip that begins here: the margin rises from zero, or from its last digits, before it falls
+                # a flight or slip that begins here: the margin rises from zero, or from its last digits,
+                # before it falls
                 for _halving in range(50):
                     middle = 0.5 * right
                     value_middle, _slope = value_slope(curve, terms, middle)
@@ -71,7 +72,7 @@ def _bottom(curve, terms, left, right):
 
 @njit(cache=True, error_model="numpy", _nrt=False)
 def _refine(curve, terms, left, value, right, value_right, scale):
-    """Root between a value >= 0 on the left and one < 0 on the right: Newton's steps kept inside; returns its right end."""
+    """Right end of the root between a value >= 0 on the left and one < 0 on the right: Newton kept inside."""
     theta = left + (right - left) * value / (value - value_right)
     for iteration in range(100):
         now, slope = value_slope(curve, terms, theta)

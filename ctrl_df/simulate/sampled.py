@@ -11,10 +11,10 @@ import numpy as np
 class Sampled(ct.NonlinearIOSystem):
     """A discrete-time system run at its sample times inside a continuous loop, its output held in between.
 
-    The state is that of the difference equation followed by the held outputs. The event engine runs it exactly, every
-    multiple of dt. The plain ``updfcn`` for ordinary ODE solvers replaces sampling and hold by their mean delay: the
-    difference equation becomes ``dx/dt = ((A - I) x + B u)/dt`` and the hold a lag of dt/2, right well below the
-    Nyquist frequency.
+    The state is that of the difference equation followed by the held outputs. The event engine runs it
+    exactly, every multiple of dt. The plain ``updfcn`` for ordinary ODE solvers replaces sampling and hold by
+    their mean delay: the difference equation becomes ``dx/dt = ((A - I) x + B u)/dt`` and the hold a lag of
+    dt/2, right well below the Nyquist frequency.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ class Sampled(ct.NonlinearIOSystem):
             return x[n:]
 
         states = [f"d[{i}]" for i in range(n)] + [f"held[{i}]" for i in range(ny)]
-        super().__init__(update, output, inputs=keywords.pop("inputs", d.shape[1]), outputs=keywords.pop("outputs", ny),
-                         states=states, dt=0, **keywords)  # fmt: skip
+        keywords = {"inputs": d.shape[1], "outputs": ny, **keywords}
+        super().__init__(update, output, states=states, dt=0, **keywords)
 
 
 def sampled(system, **keywords) -> Sampled:

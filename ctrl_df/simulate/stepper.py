@@ -2,8 +2,9 @@
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """One Runge-Kutta step with its error, and the state anywhere inside it.
 
-Three tableaux, all from SciPy's public solver classes: Dormand-Prince 8(5,3) for long steps, 5(4) for the short steps
-between the samples of a measurement, Bogacki-Shampine 3(2) where samples are so dense that even that is too much.
+Three tableaux, all from SciPy's public solver classes: Dormand-Prince 8(5,3) for long steps, 5(4) for the
+short steps between the samples of a measurement, Bogacki-Shampine 3(2) where samples are so dense that even
+that is too much.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ ROUGH = 0.1
 def stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, a, c, first, last, track, end):
     """Fill the rates k[first:last] of a step from x, each at x + h a[i] k; x1 is left at the last of them.
 
-    With `end` the margins g are those at the last stage. With `track` every stage takes margins, and `lowest` receives the
-    smallest met before the last.
+    With `end` the margins g are those at the last stage. With `track` every stage takes margins, and `lowest`
+    receives the smallest met before the last.
     """
     n = x.shape[0]
     for i in range(first, last):
@@ -52,8 +53,9 @@ def stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, a, c, fi
 def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rtol, atol, want_g):
     """One step from x to x1 with k[0] known; fills the other rates, g (at the end); returns the scaled error.
 
-    `size` is the running size of each state, what the relative tolerance refers to: not the end of the step, which may
-    lie far behind a wall the step has yet to find. The last row of each tableau is the new state itself.
+    `size` is the running size of each state, what the relative tolerance refers to: not the end of the step,
+    which may lie far behind a wall the step has yet to find. The last row of each tableau is the new state
+    itself.
     """
     n = x.shape[0]
     error = 0.0
@@ -138,7 +140,7 @@ def prepare(order, h, k, poly):
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
 def inside(terms, theta, x, poly, out):
-    """State at the fraction `theta` of a finished step: a power series of so many terms, or DOP853's form (0)."""
+    """State at the fraction `theta` of a step: a power series of so many terms, or DOP853's form (0)."""
     n = x.shape[0]
     if terms == 0:
         for j in range(n):

@@ -11,7 +11,7 @@ from ..parameter import parameter
 @register_effect
 @dataclass(frozen=True)
 class AsymmetricViscous(Effect):
-    """Viscous friction with unequal slopes: ``F = -(difference/2) |v|``, added to the mean slope of `Viscous`.
+    """Viscous friction with unequal slopes: ``F = -(difference/2) |v|`` beside the mean slope of `Viscous`.
 
     Parameters
     ----------

@@ -11,11 +11,11 @@ from ..parameter import parameter
 @register_effect
 @dataclass(frozen=True)
 class Bristle(Effect):
-    """LuGre bristles: the block's dry friction, and `level` more, is carried by bristles that bend before they slip.
+    """LuGre bristles carry the block's dry friction, and `level` more: they bend before they slip.
 
-    ``dz/dt = v - stiffness |v| z / g(v)``, ``F = -(stiffness z + damping dz/dt)``, with g(v) the kinetic level of
-    all the block's dry friction (Coulomb, Stribeck, ...) plus `level`. The set-valued sticking is replaced by the
-    bristle's own spring. Where g = 0 the bristle never slips: a plain spring and damper.
+    ``dz/dt = v - stiffness |v| z / g(v)``, ``F = -(stiffness z + damping dz/dt)``, with g(v) the kinetic
+    level of all the block's dry friction (Coulomb, Stribeck, ...) plus `level`. The set-valued sticking is
+    replaced by the bristle's own spring. Where g = 0 the bristle never slips: a plain spring and damper.
 
     Parameters
     ----------

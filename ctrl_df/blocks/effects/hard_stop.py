@@ -36,7 +36,8 @@ class HardStop(Effect):
         low = self.span[0]
         if not (math.isfinite(low) and low < self.limit):
             raise ValueError(
-                f"HardStop needs lower < limit (a stroke of some length); got lower={low:g}, limit={self.limit:g}. "
+                "HardStop needs lower < limit (a stroke of some length); "
+                f"got lower={low:g}, limit={self.limit:g}. "
                 "Give lower= when the stroke does not contain x = 0."
             )
 

@@ -11,7 +11,7 @@ from ..parameter import parameter
 @register_effect
 @dataclass(frozen=True)
 class PositionRipple(Effect):
-    """A force periodic in position: cogging, a screw or gear turn, ``F = A sin(2 pi x / wavelength + phase)``.
+    """A force periodic in position (cogging, screw, gear): ``F = A sin(2 pi x / wavelength + phase)``.
 
     Parameters
     ----------
