@@ -27,7 +27,7 @@ from diagnosis_peers import PEERS
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.improve import improve
 from ctrl_df.identify.refit import refit
-from ctrl_df.identify.trial import Trial, prepare
+from ctrl_df.identify.trial import prepare
 from ctrl_df.identify.variables import default_free
 
 PAIRS = (
@@ -74,24 +74,22 @@ def single(effect, seed, peers):
     seconds = time.perf_counter() - began
     right = right_names(rig, effect)
     named = [{c.id, *c.equivalents} & right for c in found.ranking]
-    best = found.best.nrmse_holdout if found.best else found.nrmse_holdout
+    model = found.best.model if found.best else found.model
     row = dict(
         top1=bool(found.verdict in ("effect", "ambiguous") and named[0]), top3=any(named[:3]), verdict=found.verdict,
-        over=best / true_structure(rig, train, held), seconds=seconds, named=found.ranking[0].id,
+        over=over_the_truth(rig, train, held, model), seconds=seconds, named=found.ranking[0].id,
     )  # fmt: skip
     row["peers"] = {k: bool(right & set(peer(train))) for k, peer in PEERS.items()} if peers else {}
     return row
 
 
-def true_structure(rig, train, held):
-    """Return the held-out nrmse of the true structure, refitted from its true values over the usual windows."""
+def over_the_truth(rig, train, held, model):
+    """Return the held-out error of a model over that of the true structure refitted, over the same windows."""
     data = prepare(rig.baseline, [train], [held])
     free = [k for k in default_free(rig.true_block) if k not in rig.known]
-    short = data.level(16).fit(rig.true_block, free)
-    fits = [data.level(4).moved(short)]
-    fits.append(data.moved(fits[0]))
-    trials = [d.fine.judged(Trial("", f)) for d, f in zip((data.level(4), data), fits, strict=True)]
-    return min(t.held.rmse for t in trials) / data.held.spread
+    true = data.level(4).moved(data.level(16).fit(rig.true_block, free))
+    same = data.level(4).fine
+    return same.errors(model)[1] / same.errors(same.moved(true, 3).model)[1]
 
 
 def nothing(kind, seed, peers):
