@@ -18,7 +18,8 @@ def terms(record):
     v, a = record.velocity_estimate(), record.acceleration_estimate()
     x, u = record.y, record.u
     columns = {
-        "mass": a, "coulomb": np.sign(v), "viscous": v, "quadratic_drag": v * np.abs(v), "asymmetric_viscous": np.abs(v),
+        "mass": a, "coulomb": np.sign(v), "viscous": v, "quadratic_drag": v * np.abs(v),
+        "asymmetric_viscous": np.abs(v),
         "constant_force": np.ones_like(v), "linear_spring": x, "cubic_spring": x**3,
         "stribeck": np.sign(v) * np.exp(-np.square(v / (0.1 * np.std(v) + 1e-12))),
         "input_delay": np.gradient(u, record.t),
@@ -46,7 +47,7 @@ def lasso(record):
 
 
 def sindy(record):
-    """Sparse identification of the acceleration by sequentially thresholded least squares (pysindy's STLSQ)."""
+    """Sparse identification of the acceleration, sequentially thresholded (pysindy's STLSQ)."""
     import pysindy
 
     force, columns, good = terms(record)

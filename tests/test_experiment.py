@@ -1,4 +1,4 @@
-"""The next experiment: played on the true plant it separates what the records left open, within its limits."""
+"""The next experiment: played on the true plant it separates what the records left open, within limits."""
 
 import dataclasses
 
@@ -22,7 +22,7 @@ def left_open(found):
 
 
 def play(rig, plan, seed):
-    """Return what the rig's own integrator records when the plan is played: force or reference, noise included."""
+    """Return what the rig's integrator records when the plan is played: force or reference, with noise."""
     rng = np.random.default_rng(seed)
     noise = rig.train[0].noise * rng.standard_normal(len(plan.t))
     dt = float(plan.t[1] - plan.t[0])

@@ -1,4 +1,4 @@
-"""Measured tables N(A, omega): compared, refitted, diagnosed, climbed; played by an integrator of their own."""
+"""Measured tables N(A, omega): compared, refitted, diagnosed, climbed; from their own integrator."""
 
 import functools
 
@@ -21,7 +21,7 @@ FEW = ("quadratic_drag", "linear_spring", "input_delay", "sensor_delay", "stribe
 
 
 def stepped_sine(numbers, amplitude, omega, periods=24, samples=200):
-    """Return (Y1/A) exp(j phi) of the rigs' plant under ``A cos(omega t)``, held over each of `samples` a period.
+    """Return (Y1/A) exp(j phi) of the rigs' plant under ``A cos(omega t)``, held, `samples` a period.
 
     The position's fundamental is fitted together with its mean and drift over the last four periods.
     """

@@ -15,7 +15,7 @@ _WHY = "The hidden-effect study needs ctrl_df.identify.improve, which this versi
 
 def rig() -> Mechanism:
     """Return the drive that is measured: unknown to the model, a ripple over position."""
-    ripple = effect_class("position_ripple")(amplitude=1.5, wavelength=0.02)  # type: ignore[call-arg]
+    ripple = effect_class("position_ripple")(amplitude=1.5, wavelength=0.12)  # type: ignore[call-arg]
     return friction_mass(2.2, 3.0, 6.0).with_effect(ripple)
 
 
@@ -56,5 +56,5 @@ def study_text(folder: Path) -> str:
     return (
         "Hidden effect: a drive is measured (5 s at 200 Hz, 60 dB); its model knows dry and viscous friction "
         "only.\n"
-        f"The drive also has a force ripple of 20 mm period.\n{study.summary()}{where}"
+        f"The drive also has a force ripple of 120 mm period.\n{study.summary()}{where}"
     )
