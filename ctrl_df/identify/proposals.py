@@ -161,7 +161,10 @@ def _ripple(screen):
     """Try wavelengths over the stroke: sine and cosine are two small changes, fitted together."""
     s = screen.scales
     span = float(np.ptp(screen.motion.x))
-    turns = [*np.geomspace(0.6, 12.0, 30), *ripple_turns(screen.full_motion, screen.scales)]
+    # as many turns as pass slowly enough to be sampled five times each
+    most = min(0.2 * span / (s.speed * screen.motion.dt * screen.data.thin), 90.0)
+    turns = [*np.geomspace(0.6, 6.0, 20), *np.arange(6.5, most, 0.5)]
+    turns += ripple_turns(screen.full_motion, s)
     amplitude = 0.01 * s.force
     total = float(screen.residual @ screen.residual)
     scored = []
