@@ -219,7 +219,9 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
     rough = "sensor_quantization" in key
     names = (*free, *(() if rough else own))
     if start.effect.id in _CURVED:
-        fitted = data.moved(shortest.fit(block, names, iterations=6, tolerance=1e-2), 4, 1e-2)
+        # a joint changes everything at once: its valley is long and bent
+        steps, tolerance = (14, 3e-3) if start.effect.role in ("contact", "coupling") else (6, 1e-2)
+        fitted = data.moved(shortest.fit(block, names, iterations=steps, tolerance=tolerance), 4, 1e-2)
     else:
         begin = None if start.values else screen.starts(block)
         fitted = data.fit(block, names, starts=begin, iterations=6, tolerance=1e-2)
