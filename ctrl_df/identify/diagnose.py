@@ -17,6 +17,7 @@ from .lack_of_fit import lacks
 from .measurement import Measurement
 from .study import Study
 from .trial import Trial
+from .variables import default_free
 from .windows import facts
 
 SIGNIFICANT = 20.0
@@ -113,9 +114,9 @@ def block_of(model) -> Mechanism:
 
 def free_names(block, free=None) -> tuple[str, ...]:
     """Return the parameters that a refit moves."""
-    table = block.parameters
     if free is None:
-        return tuple(k for k, p in table.items() if p.free and not k.endswith("quantization.step"))
+        return default_free(block)
+    table = block.parameters
     for name in free:
         if name not in table:
             raise ValueError(f"a free parameter must be one of {', '.join(table)}; got {name!r}.")

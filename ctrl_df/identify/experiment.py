@@ -194,7 +194,8 @@ class _Loop:
                 found = event_response(loop, self.t, (u - self.centre)[:: self.thin])
             except (ValueError, RuntimeError):
                 return [np.full(2, np.inf)], math.inf, [0.0]
-            outputs = dict(zip(found.output_labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
+            labels = list(found.output_labels or ())
+            outputs = dict(zip(labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
             ys.append(self.centre + outputs["x"])
             forces.append(outputs["F"])
         gaps = []

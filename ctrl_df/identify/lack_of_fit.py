@@ -143,7 +143,7 @@ class _Scene:
         lengths = [f * self.scale for f in (0.03, 0.1, 0.3, 1.0)]
         yield "after_reversal", [_since(n) for n in lengths], [(0.0, n) for n in lengths]
         line = self._line()
-        yield "frequency", [_wave(line, math.cos), _wave(line, math.sin)], [(line, line)]
+        yield "frequency", [_wave(line, np.cos), _wave(line, np.sin)], [(line, line)]
 
     def _line(self) -> float:
         """Return the frequency [Hz] at which the residual's acceleration stands out most from its neighbours."""
@@ -213,5 +213,4 @@ def _since(length):
 
 
 def _wave(frequency, function):
-    phase = np.vectorize(function, otypes=[float])
-    return lambda m: phase(2 * math.pi * frequency * m["t"])
+    return lambda m: function(2 * math.pi * frequency * m["t"])

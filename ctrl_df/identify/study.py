@@ -135,15 +135,6 @@ def _periodic_enough(tried: Trial, span) -> bool:
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
 
 
-def _held_gain(base: Trial, tried: Trial, noise: NoiseModel) -> float:
-    """Return the log likelihood ratio of the windows to be judged by: nothing was fitted to them but their starts."""
-    if base.held is None or tried.held is None:
-        return 0.0
-    before, count = whitened_power(base.held.residual, noise)
-    after, _ = whitened_power(tried.held.residual, noise)
-    return 0.5 * count * math.log(before / after)
-
-
 def _promising(found) -> list[Trial]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by plain error."""
     close = sorted(found, key=lambda t: t.train.rmse)[:3]
@@ -175,13 +166,22 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
     """
     best = min([base, *trials], key=lambda t: t.size)
     noise = whitener(best.residuals)
-    base_power, count = whitened_power(base.residuals, noise)
+    (fitted, n), (held, n_held) = _powers(base, noise)
     judged = []
     for t in trials:
-        power, _ = whitened_power(t.residuals, noise)
-        gain = 0.5 * count * math.log(base_power / power) - 0.5 * t.extra * math.log(count)
-        judged.append(replace(t, evidence=gain, evidence_held=_held_gain(base, t, noise)))
+        # nothing was fitted to the windows to be judged by but their starts: their gain also stands alone
+        (fitted_t, _), (held_t, _) = _powers(t, noise)
+        gain_held = 0.5 * n_held * math.log(held / held_t) if n_held else 0.0
+        gain = 0.5 * (n + n_held) * math.log((fitted + held) / (fitted_t + held_t))
+        price = 0.5 * t.extra * math.log(n + n_held)
+        judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
     return sorted(judged, key=lambda t: -t.evidence), noise
+
+
+def _powers(tried: Trial, noise: NoiseModel):
+    """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
+    held = tried.held.residual if tried.held is not None else []
+    return whitened_power(tried.train.residual, noise), whitened_power(held, noise)
 
 
 def _try(job) -> Trial | None:

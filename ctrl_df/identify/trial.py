@@ -70,11 +70,6 @@ class View:
         return [r.y[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
 
     @property
-    def velocities(self) -> list[np.ndarray]:
-        """Smoothed velocities within the windows."""
-        return [facts(r).velocity[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
-
-    @property
     def spread(self) -> float:
         """Root mean square of the centred outputs."""
         ys = self.outputs
@@ -112,11 +107,6 @@ class Trial:
     def size(self) -> float:
         """Sum of squared residuals."""
         return float(sum(np.sum(r * r) for r in self.residuals))
-
-    @property
-    def rms(self) -> float:
-        """Root mean square residual of all windows."""
-        return math.sqrt(self.size / sum(map(len, self.residuals)))
 
 
 @dataclass(frozen=True, eq=False)
