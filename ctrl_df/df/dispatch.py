@@ -15,6 +15,7 @@ from ..blocks.hysteresis import play, relay_with_hysteresis
 from ..blocks.mechanism import Mass, Mechanism, TwoMass
 from ..blocks.memoryless import saturation
 from ..status import Status
+from .branch import Branch
 from .memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
 
 # python-control's own classes, held at import: someone may put ours in their place.
@@ -83,6 +84,25 @@ class Method:
         if self.order:
             y = y * (1j * np.arange(orders + 1) * omega[:, None]) ** self.order
         return y, regime, residual
+
+    def branches(self, A, omega, near_A, near_omega) -> list[Branch]:
+        """Return known motions besides those that `harmonics` names, each a branch of N of its own.
+
+        A method without such knowledge has none; one that knows more adds its branches here.
+
+        Parameters
+        ----------
+        A, omega : ndarray
+            The box of interest: from the least to the greatest of each.
+        near_A, near_omega : ndarray, equally long
+            Points at which motions that attract beside each other matter.
+        """
+        if self.name != "backlash":
+            return []
+        from .backlash_branches import backlash_branches
+
+        found = backlash_branches(self.subject, A, omega, near_A, near_omega)
+        return [b.differentiated(self.order) for b in found] if self.order else found
 
     def _static(self, A, orders):
         if self.name == "element":
