@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import control as ct
@@ -85,6 +85,10 @@ class Method:
             y = y * (1j * np.arange(orders + 1) * omega[:, None]) ** self.order
         return y, regime, residual
 
+    def brief(self) -> Method:
+        """Return the method for a caller that has no use for averages over irregular motion: they are short."""
+        return replace(self, options={"periods": 8}) if self.name == "backlash" else self
+
     def branches(self, A, omega, near_A, near_omega) -> list[Branch]:
         """Return known motions besides those that `harmonics` names, each a branch of N of its own.
 
@@ -149,7 +153,7 @@ class Method:
 
             joint = block.effects[0]
             y, code, residual = backlash.backlash_family(
-                block.motor_mass, block.load_mass, joint.gap, joint.restitution, A, omega, orders
+                block.motor_mass, block.load_mass, joint.gap, joint.restitution, A, omega, orders, **self.options
             )
             return y, named(code, backlash.BACKLASH_REGIMES), residual
         from . import orbits

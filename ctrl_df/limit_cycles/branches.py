@@ -6,7 +6,7 @@ smooth also at folds; what is found is carried back to (ln a, ln omega).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,7 +40,9 @@ class BranchCrossing:
     named : bool
         Whether the describing function names this motion there.
     defect : float
-        |1 + N H| for the N that the describing function names there; NaN without one.
+        |1 + N H| for the N of the motion that the describing function names there; NaN without one.
+    rivals : tuple of str
+        Other branches that attract under the same force.
     """
 
     crossing: Crossing
@@ -49,6 +51,7 @@ class BranchCrossing:
     multiplier: float
     named: bool
     defect: float
+    rivals: tuple[str, ...] = ()
 
     @property
     def attracts(self) -> bool:
@@ -88,8 +91,22 @@ def branch_crossings(method, linear, family, grid, values, known, refine=True) -
         for one in _on_branch(branch, method, linear, omega, box, refine):
             others = [*known, *(f.crossing for f in found)] if one.named else [f.crossing for f in found]
             if not any(_at_one_place(one.crossing, other) for other in others):
-                found.append(one)
+                found.append(replace(one, rivals=_rivals(one, branches)))
     return found
+
+
+def _rivals(one, branches):
+    """Names of the other branches that attract at a solution."""
+    names = []
+    for branch in branches:
+        if branch is one.branch:
+            continue
+        at = branch.motions(branch.grid, np.full(branch.grid.size, one.crossing.omega), 1)
+        above = at.amplitude > one.crossing.amplitude
+        passed = np.nonzero(above[1:] != above[:-1])[0]
+        if (at.exists & (at.multiplier < 1))[passed].any():
+            names.append(branch.name)
+    return tuple(names)
 
 
 def _filled(omega):
