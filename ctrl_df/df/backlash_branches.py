@@ -34,10 +34,10 @@ _STEP = 0.02  # of s, in the grids
 _LEAST_A0 = 1e-9  # without dissipation (eps = 1) the fold lies at A = 0
 _SPACING = 0.01  # of ln A: how densely coexisting motions are looked for
 _AROUND = 5  # steps of that spacing on either side of the places of interest
-_MOST_PLACES = 500
+_MOST_PLACES = 800
 _FOLLOWED = 0.004  # of ln A: steps along a motion that attracts
 _FINEST = 1e-4
-_TRANSIENT = 50  # periods; coexisting motions that attract any slower are left to the family
+_TRANSIENT = 100  # periods; coexisting motions that attract any slower are left to the family
 _SAME = 1e-3  # relative distance of n between a motion found and a curve known: one curve
 
 
@@ -158,7 +158,7 @@ def coexisting_branches(motor_mass, load_mass, gap, restitution, A) -> list[Bran
     motor_mass, load_mass, gap, restitution : float
         As in `backlash_family`.
     A : ndarray
-        Where to look: within 5 % of these, every 1 %, at 500 places at most.
+        Where to look: within 5 % of these, every 1 %, at 800 places at most.
     """
     places = _sampled(np.asarray(A, dtype=float))
     eps = float(restitution)
@@ -193,7 +193,9 @@ class _Followed:
         parts = []
         for step in (-_FOLLOWED, _FOLLOWED):
             nodes = np.zeros((2000, 5))
-            kept = _follow(motion[0], eps, motion[4], motion[5], self.count, self.lap, self.contact, step, nodes)
+            kept = _follow(
+                motion[0], eps, motion[4], motion[5], self.count, self.lap, self.contact, step, nodes
+            )
             parts.append(nodes[:kept])
         self.nodes = np.concatenate([parts[0][:0:-1], parts[1]])  # ln A, phi, w, n
         self.nodes[:, 1] = np.unwrap(self.nodes[:, 1])
@@ -235,8 +237,8 @@ def _periodic(places, eps, starts, transient, met):
     for A in places:
         first = kept
         for k in range(starts.shape[0]):
-            if k == 2 and kept == first:
-                break  # irregular from both: what hides beside that has a small basin
+            if k == 3 and kept == first:
+                break  # irregular from all: what hides beside that has a small basin
             w = starts[k, 1] * (1.0 + A)
             status, lap, count, phi, w, contact, _, _ = settle(A, eps, starts[k, 0], w, transient)
             if status != 1 or (lap == 1 and count == 1 and not contact):

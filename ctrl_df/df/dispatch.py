@@ -153,7 +153,14 @@ class Method:
 
             joint = block.effects[0]
             y, code, residual = backlash.backlash_family(
-                block.motor_mass, block.load_mass, joint.gap, joint.restitution, A, omega, orders, **self.options
+                block.motor_mass,
+                block.load_mass,
+                joint.gap,
+                joint.restitution,
+                A,
+                omega,
+                orders,
+                **self.options,
             )
             return y, named(code, backlash.BACKLASH_REGIMES), residual
         from . import orbits

@@ -15,7 +15,9 @@ from ..df.points import points
 from .crossings import Crossing, find_crossings
 from .scan_grid import refined_omega
 
-NEAR = 0.3  # |1 + N H| on the grid up to which coexisting motions are looked for
+# |1 + N H| on the grid up to which coexisting motions are looked for: their N differ by some 15 %, and from one
+# point to the next N H changes like a^-1 omega^-2, H aside.
+NEAR = 0.2
 _SAME = 1e-4  # of ln a, ln omega: two crossings at one place
 _AGREES = 1e-6  # relative difference of N between branch and block: the block names this motion itself
 _STEP = 1e-5  # of s and ln omega, for the slope of ln a
@@ -79,8 +81,9 @@ def branch_crossings(method, linear, family, grid, values, known, refine=True) -
     """
     if not method.needs_omega or min(values.shape) < 2:
         return []
+    step = max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega)))
     with np.errstate(invalid="ignore"):
-        i, k = np.nonzero(np.abs(values) < NEAR)
+        i, k = np.nonzero(np.abs(values) < NEAR + step)
     branches = method.branches(family.amplitudes, family.omega, np.exp(grid[0][i]), np.exp(grid[1][k]))
     if not branches:
         return []

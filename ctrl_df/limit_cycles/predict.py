@@ -174,9 +174,7 @@ def describing_function_response(
     with progress_bar(None, progress, "refining crossings", "point") as bar:
         D = defect(method, linear, bar)
         scan = find_crossings(D, log_a, log_w, values, refine)
-        branched = branch_crossings(
-            method, linear, family, (log_a, log_w), values, scan.crossings, refine
-        )
+        branched = branch_crossings(method, linear, family, (log_a, log_w), values, scan.crossings, refine)
     cycles = Assessor(method, linear, F, D, (log_a, log_w), scan, family, orders, branched).cycles()
     return DescribingFunctionResponse(
         nyquist,
