@@ -23,8 +23,8 @@ class Motions(NamedTuple):
     amplitude : ndarray, shape (n,)
         Of the input, > 0.
     harmonics : ndarray of complex, shape (n, orders + 1)
-        Y_k / amplitude as in a `Family`; index 1 is N on this branch. Smooth in s, also beyond the ends of the
-        branch as far as its formula goes; NaN where that ends too.
+        Y_k / amplitude as in a `Family`; index 1 is N on this branch. Smooth in s, also beyond the ends of
+        the branch as far as its formula goes; NaN where that ends too.
     exists : ndarray of bool, shape (n,)
         Whether the motion is possible there, not only its formula.
     multiplier : ndarray, shape (n,)

@@ -86,7 +86,7 @@ class Method:
         return y, regime, residual
 
     def brief(self) -> Method:
-        """Return the method for a caller that has no use for averages over irregular motion: they are short."""
+        """Return the method with short averages over irregular motion, for who has no use for them."""
         return replace(self, options={"periods": 8}) if self.name == "backlash" else self
 
     def branches(self, A, omega, near_A, near_omega) -> list[Branch]:

@@ -46,7 +46,7 @@ class Assessor:
     def _irregular(self) -> list[LimitCycle]:
         """Crossings among averages over irregular motion: the interpolant's zeros, one a neighbourhood."""
         irregular = noisy(self.family.regime, self.family.residual)
-        if self.method.name in FAST or not irregular.any():
+        if self.method.name in FAST or not irregular.any() or min(irregular.shape) < 2:
             return []
         log_a, log_w = np.log(self.family.amplitudes), np.log(self.family.omega)
         with np.errstate(all="ignore"):
@@ -88,8 +88,8 @@ class Assessor:
             note = (
                 1,
                 f"it stands on the {found.branch.name}, which attracts under this force beside the motion "
-                f"that the describing function names (|1 + N H| there: {found.defect:.2g}); the start decides "
-                f"which one comes",
+                f"that the describing function names (|1 + N H| there: {found.defect:.2g}); the start "
+                f"decides which one comes",
             )
         else:
             note = (

@@ -15,9 +15,9 @@ from ..df.points import points
 from .crossings import Crossing, find_crossings
 from .scan_grid import refined_omega
 
-# |1 + N H| on the grid up to which coexisting motions are looked for: their N differ by some 15 %, and from one
-# point to the next N H changes like a^-1 omega^-2, H aside.
-NEAR = 0.2
+# |1 + N H| on the grid up to which coexisting motions are looked for: their N differ by some 15 %. To it
+# comes what a grid step changes, as a^-1 omega^-2.
+NEAR, _FAR = 0.2, 0.5
 _SAME = 1e-4  # of ln a, ln omega: two crossings at one place
 _AGREES = 1e-6  # relative difference of N between branch and block: the block names this motion itself
 _STEP = 1e-5  # of s and ln omega, for the slope of ln a
@@ -77,23 +77,24 @@ def branch_crossings(method, linear, family, grid, values, known, refine=True) -
     known : list of Crossing
         What the scan found.
     refine : bool
-        As in `find_crossings`.
+        Whether those are converged; on branches solutions always are.
     """
     if not method.needs_omega or min(values.shape) < 2:
         return []
-    step = max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega)))
+    step = min(max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega))), _FAR)
     with np.errstate(invalid="ignore"):
         i, k = np.nonzero(np.abs(values) < NEAR + step)
     branches = method.branches(family.amplitudes, family.omega, np.exp(grid[0][i]), np.exp(grid[1][k]))
     if not branches:
         return []
     omega = refined_omega(linear, _filled(family.omega))
+    rough = _SAME if refine else step
     box = (family.amplitudes.min(), family.amplitudes.max())
     found: list[BranchCrossing] = []
     for branch in branches:
-        for one in _on_branch(branch, method, linear, omega, box, refine):
-            others = [*known, *(f.crossing for f in found)] if one.named else [f.crossing for f in found]
-            if not any(_at_one_place(one.crossing, other) for other in others):
+        for one in _on_branch(branch, method, linear, omega, box):
+            listed = one.named and any(_at_one_place(one.crossing, k, rough) for k in known)
+            if not listed and not any(_at_one_place(one.crossing, f.crossing) for f in found):
                 found.append(replace(one, rivals=_rivals(one, branches)))
     return found
 
@@ -119,7 +120,7 @@ def _filled(omega):
     return np.unique(np.concatenate([omega, np.geomspace(omega[0], omega[-1], _POINTS)]))
 
 
-def _on_branch(branch, method, linear, omega, box, refine):
+def _on_branch(branch, method, linear, omega, box):
     log_w = np.log(omega)
 
     def D(s, q):
@@ -128,7 +129,7 @@ def _on_branch(branch, method, linear, omega, box, refine):
             return 1 + branch.motions(s, w, 1).harmonics[:, 1] * linear.clamped(w)[0]
 
     s, q = (g.ravel() for g in np.meshgrid(branch.grid, log_w, indexing="ij"))
-    scan = find_crossings(D, branch.grid, log_w, D(s, q).reshape(branch.grid.size, log_w.size), refine)
+    scan = find_crossings(D, branch.grid, log_w, D(s, q).reshape(branch.grid.size, log_w.size))
     for crossing in scan.crossings:
         one = _solution(branch, method, linear, crossing, box)
         if one is not None:
@@ -136,7 +137,7 @@ def _on_branch(branch, method, linear, omega, box, refine):
 
 
 def _solution(branch, method, linear, crossing, box):
-    """A zero over (s, ln omega) as a solution over (ln a, ln omega); None where the motion is not there."""
+    """Carry a zero over (s, ln omega) back to (ln a, ln omega); None where the motion is not possible."""
     s, w = np.log([crossing.amplitude]), np.array([crossing.omega])  # it took s for a logarithm
     at = branch.motions(s, w, 1)
     a = at.amplitude
@@ -161,7 +162,5 @@ def _solution(branch, method, linear, crossing, box):
     )
 
 
-def _at_one_place(one, other):
-    return (
-        abs(np.log(one.amplitude / other.amplitude)) < _SAME and abs(np.log(one.omega / other.omega)) < _SAME
-    )
+def _at_one_place(one, other, near=_SAME):
+    return abs(np.log(one.amplitude / other.amplitude)) < near and abs(np.log(one.omega / other.omega)) < near

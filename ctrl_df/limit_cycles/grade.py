@@ -27,7 +27,7 @@ class Sensitivity(NamedTuple):
 
 
 class ForcedMotion(NamedTuple):
-    """The block's motion under ``a cos(omega t)``: its state at t = 0 and Y_k, k = 0, 1, ... of its output."""
+    """Motion of the block under ``a cos(omega t)``: its state at t = 0, and Y_k of the output from k = 0."""
 
     state: np.ndarray
     harmonics: np.ndarray
@@ -37,8 +37,8 @@ class ForcedMotion(NamedTuple):
 class LimitCycle:
     """One solution of 1 + N(a, omega) H(j omega) = 0, and how far to trust it.
 
-    N is the describing function or, where `branch` names a motion, that of this motion: under the same force a
-    block may have several, and each balances a loop.
+    N is the describing function or, where `branch` names a motion, that of this motion: under the same force
+    a block may have several, and each may balance the loop.
 
     Attributes
     ----------

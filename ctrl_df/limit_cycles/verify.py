@@ -42,8 +42,8 @@ class Row:
     verdict : str
         ``confirmed``, ``shifted``, ``no such orbit``, ``missed by the describing function``, ``not tested``.
     why : str
-        What the verdict rests on where there is no exact orbit to rest on: of a prediction on a further motion
-        of the block (``predicted.branch``) the search from that motion.
+        What the verdict rests on where there is no exact orbit to rest on: of a prediction on a further
+        motion of the block (``predicted.branch``) the search from that motion.
     motion : Orbit or None
         Where the simulation alone judges (a pure delay): the motion it settles to, averaged over its swings.
     """
