@@ -13,7 +13,16 @@ from .simulator import feasible
 
 _ROUGH = ("backlash.", "hard_stop.", "stiction.", "stribeck.")
 _HOPS = (0.6, 0.8, 1.25, 1.6)
-_SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: thresholds that single samples pass
+_SMALL = (
+    0.8,
+    0.95,
+    0.985,
+    0.995,
+    1.005,
+    1.015,
+    1.05,
+    1.25,
+)  # static levels: thresholds that single samples pass
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
 _REACH = (0.0025, 0.005, 0.01, 0.02, 0.04)  # how far the floor about a threshold is sought
@@ -38,7 +47,9 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
     for name in rough(found):
         at, best = found.parameters[name], found
         for factor in _SMALL if name.endswith(".level") else _HOPS:
-            moved = found.model.with_parameters(feasible(found.model, {name: _within(found, name, factor * at)}))
+            moved = found.model.with_parameters(
+                feasible(found.model, {name: _within(found, name, factor * at)})
+            )
             near = fit(moved, (), starts=found.starts, iterations=iterations)
             if near.rmse > 3 * found.rmse:
                 continue
