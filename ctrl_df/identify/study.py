@@ -26,6 +26,9 @@ _LEVELS = (SHORTEST, 4, 1)
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
 _CLOSE = 60.0
+# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain;
+# error over the best candidate's beyond which it is not worth another try.
+_FLOOR, _HOPELESS = 1.03, 4.0
 
 ROUNDED = "sensor_quantization"
 
@@ -112,8 +115,12 @@ class Study:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
         shortest, middle, longest = self.levels
         found = _promising(found)
-        fits = [hopped(middle.moved(t.train), middle.fit) for t in (self.base, *found)]
-        stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
+        fits = [middle.moved(t.train) for t in (self.base, *found)]
+        short = [shortest.moved(f) for f in fits]
+        # Over short windows nearly every model follows the data: how far a fit can come at best.
+        floor, least = _FLOOR * min(f.rmse for f in short), min(f.rmse for f in fits)
+        fits = [hopped(f, middle.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
+        stages = [short, fits, [longest.moved(f) for f in fits]]
         # An error of whole steps of the sensor is averaged out by long windows, and followed by short ones.
         rounds = bool(found) and found[0].key == ROUNDED
         at = 2 if rounds else _longest_coherent([[f.rmse for f in stage] for stage in stages])
@@ -127,14 +134,22 @@ class Study:
         chosen, _ = ranked(self.base, best[1:])
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right valley.
-        near = [t for t in chosen if t is chosen[0] or t.evidence > chosen[0].evidence - _CLOSE]
-        close = [t for t in chosen if t in near or (rough(t.train) and t.evidence > 0.5 * chosen[0].evidence)]
-        if len(near) > 1:
-            close = [replace(t, train=fine.moved(t.train, 8, 1e-6)) if t in near else t for t in close]
-        close = [fine.judged(replace(t, train=hopped(t.train, fine.fit))) for t in close]
-        chosen = self._again([*close, *(t for t in chosen if t.key not in {c.key for c in close})], close)
+        near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
+        close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
+        ended = [self._ended(t, t in near and len(near) > 1, floor) for t in close]
+        if any(a is not b for a, b in zip(ended, close, strict=True)):
+            chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
         chosen, self.noise = ranked(self.base, chosen)
         return chosen
+
+    def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
+        """Return a candidate fitted to the end: exactly, and in the best valley unless nothing better is possible."""
+        fine, fit = self.data.fine, tried.train
+        if exactly:
+            fit = fine.moved(fit, 8, 1e-6)
+        if rough(fit):
+            fit = hopped(fit, fine.fit) if fit.rmse > floor else centred(fit, fine.fit)
+        return tried if fit is tried.train else fine.judged(replace(tried, train=fit))
 
     def _again(self, chosen, those) -> list[Trial]:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
@@ -159,7 +174,8 @@ def _begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
         name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
         if name in table and table[name].unit == p.unit:
             values[name] = p.value
-    if not any(name.startswith(f"{mine}.") for name in values):
+    alike = tried.block.effects[-1].role == best.block.effects[-1].role
+    if not alike or not any(name.startswith(f"{mine}.") for name in values):
         return None
     block = tried.block.with_parameters(feasible(tried.block, values))
     near = data.fit(block, (), starts=best.train.starts, iterations=4)
