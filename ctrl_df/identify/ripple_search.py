@@ -30,6 +30,8 @@ STEP = 0.3
 COARSEST = 6.0
 """Shortest wavelength over the error of the smoothed position."""
 
+_PLAIN = ("dry", "viscous", "constant")
+
 SAMPLES = 25_000
 """Longer records are looked at in means over more samples."""
 
@@ -106,7 +108,9 @@ class WaveSearch:
         """Return the ripple of wave number `k` [rad/m], fitted; None where the mass would be negative."""
         waves = [np.exp(1j * k * x) for x in self.places]
         pair = self._response(waves)
-        w = self._regressed([*self._base, [p.imag for p in pair], [p.real for p in pair]])
+        # what a drive may have besides blurs the parameters of what it does have
+        plain = self._base[: len(_PLAIN) + 1]
+        w = self._regressed([*plain, [p.imag for p in pair], [p.real for p in pair]])
         if w[0] <= 0:
             return None
         mass, size, phase = 1 / w[0], math.hypot(w[-2], w[-1]), math.atan2(w[-1], w[-2])
@@ -164,9 +168,9 @@ class WaveSearch:
 
 
 def _forces(record, place) -> list[np.ndarray]:
-    """Return forces that any drive may have: dry, viscous, unequal to both sides, constant, elastic, drag."""
+    """Return forces that a drive may have: those of `_PLAIN`, then unequal to both sides, elastic, drag."""
     v = facts(record).velocity
-    return [-np.sign(v), -v, -np.abs(v), np.ones(len(v)), place, v * np.abs(v)]
+    return [-np.sign(v), -v, np.ones(len(v)), -np.abs(v), place, v * np.abs(v)]
 
 
 def _held(record) -> np.ndarray:

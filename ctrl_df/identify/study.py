@@ -148,15 +148,22 @@ def _longest_coherent(errors) -> int:
 
     `errors`: rms errors per level, short windows first, the baseline's and then the candidates'. Where the best
     grows with the length (motion that is sensitive to its start, force noise in a real machine, an effect
-    outside the library) short windows are clearer, provided that they show what is missing at all.
+    outside the library) short windows are clearer, provided that they show what is missing as well as long ones do.
     """
     base, best = [e[0] for e in errors], [min(e) for e in errors]
     at = 0
     while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:
         at += 1
-    if at + 1 < len(errors) and best[at] > 0.8 * base[at]:
+    if at + 1 < len(errors) and best[at] > 0.8 * base[at] and _left(base, best, at) > _left(base, best, -1):
         return len(errors) - 1
     return at
+
+
+def _left(base, best, at) -> float:
+    """Return the share of the baseline's error beyond noise that the best model leaves; 1 where there is hardly any."""
+    noise = best[0] ** 2
+    there = base[at] ** 2 - noise
+    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > 0.1 * noise else 1.0
 
 
 def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
