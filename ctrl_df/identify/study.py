@@ -14,12 +14,11 @@ from .regression import Start, force_regression, motion_of
 from .residual_tests import NoiseModel
 from .screen import Screen, starts_for
 from .simulator import feasible
-from .trial import SHORTEST, Data, Trial, prepare
+from .trial import FORCED, Data, Trial, prepare
 
 CONFIRMED = 6
 """Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
 
-_LEVELS = (SHORTEST, 4, 1)
 # Best error over windows four times as long that still counts as the same.
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
@@ -46,9 +45,17 @@ class Study:
         self.free = free
         data = prepare(block, records, held)
         self.nominal = {k: p.value for k, p in block.parameters.items()}
-        self.levels = [data.level(f) for f in _LEVELS]
-        self.data = self.levels[1]
+        self._look_at(data, 1)
         self.base = self._baseline(block)
+        # friction that wanders drowns all else over longer windows
+        self.forced = self.levels[0].moved(self.base.train).rmse > FORCED * data.noise
+        if self.forced:
+            self._look_at(data.shorter, 0)
+            self.base = self._baseline(self.base.block)
+
+    def _look_at(self, data: Data, which: int):
+        self.levels = data.levels
+        self.data = self.levels[which]
 
     def _baseline(self, block) -> Trial:
         """Fit the baseline from its own values and from a regression of the force on motion; keep the better."""
@@ -72,7 +79,7 @@ class Study:
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
         plain = not found or found[0].train.rmse > 0.97 * base.rmse
-        if plain and longest.moved(base).rmse > _GROWTH * base.rmse:
+        if plain and not self.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
             base, found = self._look(classes, executor, longest)
         if found:
@@ -104,10 +111,8 @@ class Study:
 
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
-        shortest, middle, longest = self.levels
         found = _promising(found)
-        fits = [middle.moved(t.train) for t in (self.base, *found)]
-        stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
+        stages = self._stages([self.base.train, *(t.train for t in found)])
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
         self.data = self.levels[at]
         fine = self.data.fine
@@ -117,6 +122,9 @@ class Study:
         ]
         self.base = best[0]
         chosen, _ = ranked(self.base, best[1:])
+        if self.forced:
+            chosen, self.noise = self._also_longer(chosen)
+            return chosen
         # Near equals are told apart by fits that have come to an end.
         close = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
         if len(close) > 1:
@@ -124,6 +132,30 @@ class Study:
             chosen = [*close, *chosen[len(close) :]]
         chosen, self.noise = ranked(self.base, chosen)
         return chosen
+
+    def _stages(self, fits):
+        """Return the fits in windows of every length that may be judged by, the shortest first."""
+        shortest, middle, longest = self.levels
+        if self.forced:
+            return [[shortest.moved(f) for f in fits]]
+        fits = [middle.moved(f) for f in fits]
+        return [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
+
+    def _also_longer(self, chosen):
+        """Add to the evidence what longer windows say of the same models: slow effects show there, quick ones here."""
+        longer = self.levels[1].fine
+        runs = [longer.judged(replace(t, train=longer.run(t.block))) for t in (self.base, *chosen)]
+        more = {t.key: t for t in ranked(runs[0], runs[1:])[0]}
+        _, noise = ranked(self.base, chosen)
+        total = [
+            replace(
+                t,
+                evidence=t.evidence + more[t.key].evidence,
+                evidence_held=t.evidence_held + more[t.key].evidence_held,
+            )
+            for t in chosen
+        ]
+        return sorted(total, key=lambda t: -t.evidence), noise
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise."""
