@@ -78,12 +78,14 @@ def _stribeck(screen, names):
 
 def _ripple(screen, names):
     view, _ = screen.data.whole or (screen.view, None)
+    if not all(r.regular for r in view.records):
+        return
     ripples = [e for e in screen.block.effects if e.id == "position_ripple"]
     search = WaveSearch(view.records, view.windows, [2 * math.pi / e.wavelength for e in ripples])
     plain = all(e.id in ("coulomb", "viscous", "constant_force") for e in screen.block.effects)
     for wave in search.best(3):
         weights = (wave.mass, wave.coulomb, wave.viscous)
-        values = _values(weights, names, screen.scales) if plain else {}
+        values = (_values(weights, names, screen.scales) if plain else None) or {}
         effect = library.PositionRipple(wave.amplitude, wave.wavelength, wave.phase)
         yield Start(effect, 0.0, tuple(values.items()))
 

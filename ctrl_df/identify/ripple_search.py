@@ -58,7 +58,7 @@ class WaveSearch:
     Parameters
     ----------
     records, windows : sequences
-        Records and the parts of each that count.
+        Records, evenly sampled, and the parts of each that count (one of 20 samples at least).
     known : sequence of float
         Wave numbers [rad/m] of ripples that the model has already.
     """
@@ -68,20 +68,25 @@ class WaveSearch:
         self.places = [_smoothed(r) for r in records]
         self.span = max(float(np.ptp(x)) for x in self.places)
         # the band of the motion and some of the noise above it
-        self._size = max(min(facts(r).half for r in records) // 4, math.ceil(max(map(len, records)) / SAMPLES), 1)
+        band = min(facts(r).half for r in records) // 4
+        longest = max(j - i for w in windows for i, j in _runs(w, 1))
+        self._size = max(band, math.ceil(max(map(len, records)) / SAMPLES), 1)
+        self._size = max(min(self._size, longest // 32), 1)
         self._runs = [_runs(w, self._size) for w in windows]
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
         for k in known:
             pair = self._response([np.exp(1j * k * x) for x in self.places])
-            base += [[p.real for p in pair], [p.imag for p in pair]]
+            base += [[np.real(p) for p in pair], [np.imag(p) for p in pair]]
         given = [_integral(_held(r), r.t) for r in records]
         self._base = [self._parts(given), *base]
         self._y = self._parts([np.asarray(r.y) for r in records])
         self._weights = [np.ones(_length(y) // 2 + 1) for y in self._y]
         for _ in range(3):
             w = self._regressed(self._base)
-            left = [y - sum(c * b[i] for c, b in zip(w, self._base, strict=True)) for i, y in enumerate(self._y)]
+            left = [
+                y - sum(c * b[i] for c, b in zip(w, self._base, strict=True)) for i, y in enumerate(self._y)
+            ]
             self._weights = [_weights(e) for e in left]
         self._basis, _ = np.linalg.qr(np.array([self._white(b) for b in self._base]).T)
         self._left = self._without(self._white(self._y))
@@ -110,12 +115,18 @@ class WaveSearch:
         pair = self._response(waves)
         # what a drive may have besides blurs the parameters of what it does have
         plain = self._base[: len(_PLAIN) + 1]
-        w = self._regressed([*plain, [p.imag for p in pair], [p.real for p in pair]])
+        w = self._regressed([*plain, [np.imag(p) for p in pair], [np.real(p) for p in pair]])
         if w[0] <= 0:
             return None
         mass, size, phase = 1 / w[0], math.hypot(w[-2], w[-1]), math.atan2(w[-1], w[-2])
         return Wave(
-            self._gain(waves), mass * size, 2 * math.pi / k, phase, mass, float(mass * w[1]), float(mass * w[2])
+            self._gain(waves),
+            mass * size,
+            2 * math.pi / k,
+            phase,
+            mass,
+            float(mass * w[1]),
+            float(mass * w[2]),
         )
 
     def _scan(self, turns) -> np.ndarray:
@@ -132,7 +143,7 @@ class WaveSearch:
     def _gain(self, waves) -> float:
         """Return what forces in phase and in quadrature with the waves explain together [nats]."""
         pair = self._response(waves)
-        columns = [self._white([p.real for p in pair]), self._white([p.imag for p in pair])]
+        columns = [self._white([np.real(p) for p in pair]), self._white([np.imag(p) for p in pair])]
         a = self._without(np.array(columns).T).T
         g, h = a @ self._left, a @ a.T
         h[np.diag_indices(2)] += 1e-9 * np.trace(h) + 1e-300
@@ -149,7 +160,9 @@ class WaveSearch:
 
     def _response(self, forces) -> list[np.ndarray]:
         """Return what forces, one array a record, do to a free mass of 1 kg, as `_parts` does."""
-        return self._parts([_integral(_integral(f, r.t), r.t) for f, r in zip(forces, self.records, strict=True)])
+        return self._parts(
+            [_integral(_integral(f, r.t), r.t) for f, r in zip(forces, self.records, strict=True)]
+        )
 
     def _parts(self, signals) -> list[np.ndarray]:
         """Return second differences of means over samples, one array for each part without holes."""
@@ -212,7 +225,7 @@ def _length(signal) -> int:
     """Return a length for the Fourier transform that is quick."""
     from scipy.fft import next_fast_len
 
-    return next_fast_len(len(signal), real=True)
+    return next_fast_len(len(signal), real=True) or len(signal)
 
 
 def _weights(left) -> np.ndarray:

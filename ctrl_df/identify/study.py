@@ -94,8 +94,7 @@ class Study:
         kinds = [c for c in classes if applicable(c, screen.block)]
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
         jobs = [(cls, screen, self.levels[0].sampled, self.free, nominal) for cls in kinds]
-        span = float(np.ptp(screen.motion.x))
-        found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
+        found = [t for t in run(_try, jobs) if t is not None]
         return base, ranked(Trial("", base), found)[0]
 
     def _rebase(self, found):
@@ -143,19 +142,16 @@ class Study:
 
     def _also_longer(self, chosen):
         """Add to the evidence what longer windows say of the same models: slow effects show there, quick ones here."""
-        longer = self.levels[1].fine
-        runs = [longer.judged(replace(t, train=longer.run(t.block))) for t in (self.base, *chosen)]
-        more = {t.key: t for t in ranked(runs[0], runs[1:])[0]}
+        trials = [self.base, *chosen]
         _, noise = ranked(self.base, chosen)
-        total = [
-            replace(
-                t,
-                evidence=t.evidence + more[t.key].evidence,
-                evidence_held=t.evidence_held + more[t.key].evidence_held,
-            )
-            for t in chosen
-        ]
-        return sorted(total, key=lambda t: -t.evidence), noise
+        for longer in (level.fine for level in self.levels[1:]):
+            runs = [longer.judged(replace(t, train=longer.run(t.block))) for t in trials]
+            more = {t.key: t for t in ranked(runs[0], runs[1:])[0]}
+            for i, t in enumerate(chosen):
+                m = more[t.key]
+                both = t.evidence + m.evidence, t.evidence_held + m.evidence_held
+                chosen[i] = replace(t, evidence=both[0], evidence_held=both[1])
+        return sorted(chosen, key=lambda t: -t.evidence), noise
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise."""
@@ -236,7 +232,8 @@ def _try(job) -> Trial | None:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user does.
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
-    return min(found, key=lambda t: t.train.rmse) if found else None
+    span = float(np.ptp(screen.motion.x))
+    return min((t for t in found if _periodic_enough(t, span)), key=lambda t: t.train.rmse, default=None)
 
 
 def _spread(effects, count):

@@ -130,7 +130,11 @@ class Data:
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
-    factors: tuple[int, int, int] = (SHORTEST, 4, 1)  # windows to the longest, of the three lengths to look at
+    factors: tuple[int, int, int] = (
+        SHORTEST,
+        4,
+        1,
+    )  # windows to the longest, of the three lengths to look at
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
