@@ -82,7 +82,9 @@ def _ripple(screen, names):
         return
     ripples = [e for e in screen.block.effects if e.id == "position_ripple"]
     search = WaveSearch(view.records, view.windows, [2 * math.pi / e.wavelength for e in ripples])
+    # where friction wanders the fit over windows knows the mass better than whitened forces do
     plain = all(e.id in ("coulomb", "viscous", "constant_force") for e in screen.block.effects)
+    plain = plain and not screen.data.forced
     for wave in search.best(3):
         weights = (wave.mass, wave.coulomb, wave.viscous)
         values = (_values(weights, names, screen.scales) if plain else None) or {}

@@ -48,8 +48,7 @@ class Study:
         self._look_at(data, 1)
         self.base = self._baseline(block)
         # friction that wanders drowns all else over longer windows
-        self.forced = self.levels[0].moved(self.base.train).rmse > FORCED * data.noise
-        if self.forced:
+        if self.levels[0].moved(self.base.train).rmse > FORCED * data.noise:
             self._look_at(data.shorter, 0)
             self.base = self._baseline(self.base.block)
 
@@ -79,7 +78,7 @@ class Study:
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
         plain = not found or found[0].train.rmse > 0.97 * base.rmse
-        if plain and not self.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
+        if plain and not self.data.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
             base, found = self._look(classes, executor, longest)
         if found:
@@ -121,7 +120,7 @@ class Study:
         ]
         self.base = best[0]
         chosen, _ = ranked(self.base, best[1:])
-        if self.forced:
+        if self.data.forced:
             chosen, self.noise = self._also_longer(chosen)
             return chosen
         # Near equals are told apart by fits that have come to an end.
@@ -135,7 +134,7 @@ class Study:
     def _stages(self, fits):
         """Return the fits in windows of every length that may be judged by, the shortest first."""
         shortest, middle, longest = self.levels
-        if self.forced:
+        if self.data.forced:
             return [[shortest.moved(f) for f in fits]]
         fits = [middle.moved(f) for f in fits]
         return [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
@@ -233,7 +232,12 @@ def _try(job) -> Trial | None:
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     span = float(np.ptp(screen.motion.x))
-    return min((t for t in found if _periodic_enough(t, span)), key=lambda t: t.train.rmse, default=None)
+    found = [t for t in found if _periodic_enough(t, span)]
+    if screen.data.forced:
+        # what a few reversals leave would outweigh what goes on all the time
+        noise = whitener(screen.base.residual)
+        return min(found, key=lambda t: whitened_power(t.train.residual, noise)[0], default=None)
+    return min(found, key=lambda t: t.train.rmse, default=None)
 
 
 def _spread(effects, count):

@@ -152,6 +152,11 @@ class Data:
         return [self.level(f) for f in self.factors]
 
     @property
+    def forced(self) -> bool:
+        """Whether forces that no model has outweigh the noise of the sensor."""
+        return self.factors[0] > SHORTEST
+
+    @property
     def shorter(self) -> Data:
         """The same to be looked at in windows of a quarter, the input in finer steps."""
         factors = tuple(SHORTER * f for f in self.factors)
@@ -161,7 +166,7 @@ class Data:
     @property
     def sampled(self) -> Data:
         """The same with every second window to learn from, or every fourth of many: enough for a first look."""
-        return replace(self, train=self.train.every(2 if self.factors[0] == SHORTEST else SHORTER))
+        return replace(self, train=self.train.every(SHORTER if self.forced else 2))
 
     @property
     def fine(self) -> Data:
