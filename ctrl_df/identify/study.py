@@ -140,7 +140,7 @@ class Study:
         return [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
 
     def _also_longer(self, chosen):
-        """Add to the evidence what longer windows say of the same models: slow effects show there, quick ones here."""
+        """Take the evidence where each shows most: slow effects in long windows, quick ones in short ones."""
         trials = [self.base, *chosen]
         _, noise = ranked(self.base, chosen)
         for longer in (level.fine for level in self.levels[1:]):
@@ -148,8 +148,8 @@ class Study:
             more = {t.key: t for t in ranked(runs[0], runs[1:])[0]}
             for i, t in enumerate(chosen):
                 m = more[t.key]
-                both = t.evidence + m.evidence, t.evidence_held + m.evidence_held
-                chosen[i] = replace(t, evidence=both[0], evidence_held=both[1])
+                if m.evidence > t.evidence:
+                    chosen[i] = replace(t, evidence=m.evidence, evidence_held=m.evidence_held)
         return sorted(chosen, key=lambda t: -t.evidence), noise
 
     def alike(self, a: Trial, b: Trial) -> bool:
