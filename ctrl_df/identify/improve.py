@@ -9,8 +9,8 @@ from typing import Any
 
 from .diagnose import HELD, SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
 from .diagnosis import NONE, UNKNOWN, Diagnosis
+from .evidence import ranked
 from .study import Study as Fits
-from .study import ranked
 from .trial import Trial
 
 
