@@ -42,6 +42,7 @@ class _Parts:
     delay: float = 0.0  # of the output
     output: list = field(default_factory=list)  # (primitive, delay still to come)
     lags: list = field(default_factory=list)  # (state, samples)
+    hold: str = ""  # between the values of the drive; as recorded if not said
 
 
 class Simulator:
@@ -210,8 +211,7 @@ class Simulator:
         return found
 
     def _drive(self, part):
-        hold = self.record.input_hold if self.thin == 1 else "linear"
-        return sampled_drive(part.drive_time, part.drive_value, hold)
+        return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
 
     def _window(self, part, drive, windows, w, start, t):
         """Run one window, recording at the record's times `t`."""
@@ -297,12 +297,13 @@ class Simulator:
                 lags.append((state, signal))
             elif state < 0:
                 signal = primitive.value(signal)
+        hold = record.input_hold
         if self.thin > 1:
-            time, value = _thinned(t, held, self.thin)
+            time, value, hold = _thinned(t, held, self.thin)
             time, value = self._before(time, value)
         return _Parts(Engine(inner), core, 0, time + input_delay, value, float(sum(delays)), output, [
             (state, np.interp(t - input_delay, t, s)) for state, s in lags
-        ])  # fmt: skip
+        ], hold)  # fmt: skip
 
     def _start(self, part, windows, w, start, time) -> State:
         engine, core = part.engine, part.core
@@ -388,13 +389,20 @@ def _lagged(t, u, time_constant):
 
 
 def _thinned(t, u, factor):
-    """Return knots and values of a broken line whose second integral is that of the held input at every knot.
+    """Return times and values of a held input in fewer steps, and how to join them: "zoh" or "linear".
+
+    An input that changes seldom is given as it is, at the times when it changes. Of another one it is the knots of
+    a broken line whose second integral is that of the input at every knot.
 
     A mass moved by either passes the same places at the knots: (s[k-1] + 4 s[k] + s[k+1]) T^2/6 equals the
     second difference of the place.
     """
     from scipy.linalg import solve_banded
 
+    changes = np.flatnonzero(np.diff(u) != 0) + 1
+    if len(changes) <= len(u) // factor:
+        at = np.unique(np.concatenate(([0], changes, [len(u) - 1])))
+        return t[at], u[at], "zoh"
     dt = float(t[-1] - t[0]) / (len(t) - 1)
     count = (len(t) - 1) // factor
     knots = np.arange(count + 1) * factor
@@ -415,4 +423,4 @@ def _thinned(t, u, factor):
     rest = len(t) - 1 - int(knots[-1])
     if rest:
         time, values = np.append(time, t[-1]), np.append(values, u[-1])
-    return time, values
+    return time, values, "linear"

@@ -15,7 +15,7 @@ from .regression import Start, force_regression, motion_of
 from .screen import Screen, starts_for
 from .simulator import feasible
 from .trial import FORCED, Data, Trial, prepare
-from .valleys import centred, hopped, rough
+from .valleys import THRESHOLDS, hopped, open_range, rough
 
 CONFIRMED = 6
 """Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
@@ -151,18 +151,18 @@ class Study:
             return [[shortest.moved(f) for f in fits]], 0.0
         fits = [middle.moved(f) for f in fits]
         short = [shortest.moved(f) for f in fits]
-        floor, least = _FLOOR * min(f.rmse for f in short), min(f.rmse for f in fits)
-        fits = [hopped(f, middle.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
-        return [short, fits, [longest.moved(f) for f in fits]], floor
+        floor = _FLOOR * min(f.rmse for f in short)
+        fits = _all_hopped(fits, middle, floor)
+        return [short, fits, _all_hopped([longest.moved(f) for f in fits], longest, floor)], floor
 
     def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
         """Return a candidate fitted to the end: exactly, and in the best valley unless nothing better is possible."""
         fine, fit = self.data.fine, tried.train
         if exactly:
             fit = fine.moved(fit, 8, 1e-6)
-        if rough(fit):
-            fit = hopped(fit, fine.fit) if fit.rmse > floor else centred(fit, fine.fit)
-        return tried if fit is tried.train else fine.judged(replace(tried, train=fit))
+        if rough(fit) and fit.rmse > floor:
+            fit = hopped(fit, fine.fit)
+        return _settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
 
     def _again(self, chosen, those) -> list[Trial]:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
@@ -189,6 +189,12 @@ class Study:
         return indistinguishable(a.outputs, b.outputs, self.noise)
 
 
+def _all_hopped(fits, data: Data, floor: float) -> list:
+    """Return fits in their best valleys: those that are neither at the floor nor far behind the best."""
+    least = min(f.rmse for f in fits)
+    return [hopped(f, data.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
+
+
 def _begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
     """Fit a candidate again from where the best one ended: it may be that one's limit (stiction, a narrow Stribeck bump).
 
@@ -200,13 +206,37 @@ def _begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
         name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
         if name in table and table[name].unit == p.unit:
             values[name] = p.value
-    alike = tried.block.effects[-1].role == best.block.effects[-1].role
-    if not alike or not any(name.startswith(f"{mine}.") for name in values):
+    frictions = {t.block.effects[-1].role for t in (tried, best)} == {"friction"}
+    if not frictions or not any(name.startswith(f"{mine}.") for name in values):
         return None
     block = tried.block.with_parameters(feasible(tried.block, values))
     near = data.fit(block, (), starts=best.train.starts, iterations=4)
     fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
-    return data.judged(replace(tried, train=centred(fitted, data.fit)))
+    return _settled(data.judged(replace(tried, train=fitted)), data)
+
+
+def _settled(tried: Trial, data: Data) -> Trial:
+    """Choose thresholds by the windows to be judged by, within what the windows fitted leave open."""
+    for name in THRESHOLDS:
+        if name not in tried.train.names:
+            continue
+        low, high = open_range(tried.train, data.fit, name)
+        for _ in range(2 if high > low else 0):
+            values = np.geomspace(low, high, 7)
+            runs = [_with_level(tried, name, v, data) for v in values]
+            i = min(range(len(runs)), key=lambda k: runs[k].held_rmse)
+            if runs[i].held_rmse < tried.held_rmse:
+                tried = runs[i]
+            low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
+        tried = replace(
+            tried, train=data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
+        )
+    return tried
+
+
+def _with_level(tried: Trial, name, value, data: Data) -> Trial:
+    block = tried.block.with_parameters(feasible(tried.block, {name: value}))
+    return data.judged(replace(tried, train=replace(tried.train, model=block)))
 
 
 def _periodic_enough(tried: Trial, span) -> bool:

@@ -104,6 +104,11 @@ class Trial:
         return self.train.model
 
     @property
+    def held_rmse(self) -> float:
+        """Error over the windows to be judged by; NaN before it was run over them."""
+        return self.held.rmse if self.held is not None else math.nan
+
+    @property
     def residuals(self) -> list[np.ndarray]:
         """Of all windows."""
         return [*self.train.residual, *(self.held.residual if self.held is not None else ())]

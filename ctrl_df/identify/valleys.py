@@ -11,6 +11,9 @@ from collections.abc import Callable
 from .candidate import Candidate
 from .simulator import feasible
 
+THRESHOLDS = ("stiction.level", "stribeck.level")
+"""Levels that nothing but breaking away shows: records leave ranges of them open."""
+
 _ROUGH = ("backlash.", "hard_stop.", "stiction.", "stribeck.")
 _HOPS = (0.6, 0.8, 1.25, 1.6)
 _SMALL = (
@@ -25,7 +28,7 @@ _SMALL = (
 )  # static levels: thresholds that single samples pass
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
-_REACH = (0.0025, 0.005, 0.01, 0.02, 0.04)  # how far the floor about a threshold is sought
+_REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a threshold that floor is sought
 
 
 def rough(found: Candidate) -> list[str]:
@@ -57,34 +60,22 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
             if tried.rmse < _WORTH * best.rmse:
                 best = tried
         found = best
-    return centred(found, fit)
-
-
-def centred(found: Candidate, fit: Callable[..., Candidate]) -> Candidate:
-    """Move static levels to the middle of the range over which they make no difference: they are known no better."""
-    for name in ("stiction.level", "stribeck.level"):
-        if name in found.names:
-            found = _centred(found, fit, name)
     return found
 
 
-def _centred(found, fit, name) -> Candidate:
+def open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> tuple[float, float]:
+    """Return the least and the largest value of a threshold for which the windows fitted are the same."""
     at, edges = found.parameters[name], []
     for sign in (-1, 1):
-        edge = 1.0
+        edge = at
         for reach in _REACH:
-            factor = 1 + sign * reach
-            moved = found.model.with_parameters(feasible(found.model, {name: factor * at}))
+            value = (1 + sign * reach) * at
+            moved = found.model.with_parameters(feasible(found.model, {name: value}))
             if fit(moved, (), starts=found.starts, iterations=2).rmse > _SAME * found.rmse:
                 break
-            edge = factor
+            edge = value
         edges.append(edge)
-    if edges == [1.0, 1.0]:
-        return found
-    value = 0.5 * sum(edges) * at
-    moved = found.model.with_parameters(feasible(found.model, {name: value}))
-    tried = fit(moved, found.names, starts=found.starts, iterations=1)
-    return tried if tried.rmse < _SAME * found.rmse else found
+    return edges[0], edges[1]
 
 
 def _within(found, name, value):
