@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .frequency_fit import Points, points_of, relative_error, rms, simulate_table
+from .frequency_fit import Points, counted, points_of, relative_error, rms, simulate_table
 from .frequency_measurement import FrequencyMeasurement
 from .where import Region, Regions
 
@@ -118,7 +118,7 @@ class FrequencyComparison:
         """Amplitudes and frequencies ranked by their share of the error."""
         points = points_of([r.record for r in self.records])
         error = np.concatenate(
-            [r.relative[np.isfinite(r.record.N) & (r.record.N != 0)] for r in self.records]
+            [r.relative[counted(r.record)] for r in self.records]
         )
         return plane_regions(points, error)
 
@@ -173,7 +173,7 @@ def comparison_of_tables(model, records) -> FrequencyComparison:
     for record in records:
         points = points_of([record])
         found = simulate_table(model, points)
-        where = np.isfinite(record.N) & (record.N != 0)
+        where = counted(record)
         simulated = np.full(record.N.shape, np.nan + 0j)
         relative = simulated.copy()
         simulated[where], relative[where] = found, relative_error(found, points)

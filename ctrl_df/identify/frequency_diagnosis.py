@@ -21,11 +21,13 @@ from .frequency_fit import (
     QUICK,
     FittedTable,
     Points,
+    counted,
     fit_table,
     points_of,
     relative_error,
     rms,
     simulate_table,
+    slopes_of,
     table_scales,
 )
 from .frequency_refit import uncertainty
@@ -38,7 +40,7 @@ SIGNIFICANT = 12.0
 _SCREEN = 30  # points while screening
 _ROUGH = 10  # of effects whose orbits take many times as long
 _SLOW = frozenset({"position_ripple", "sensor_quantization"})
-_SLOWER = _SLOW | {"backlash", "compliance", "bristle", "input_lag"}
+_SLOWER = _SLOW
 _CONFIRM = 4
 
 
@@ -147,10 +149,13 @@ class FrequencyStudy:
         inside = self.points.take(self.train)
         few, fewer = inside.thinned(_SCREEN), inside.thinned(_ROUGH)
         kinds = [c for c in classes if applicable(c, self.base.fitted.block)]
-        jobs = [
-            (c, self.base.fitted.block, fewer if c.id in _SLOWER else few, self.free, self.scales)
-            for c in kinds
-        ]
+        block, slopes = self.base.fitted.block, {}
+        for some in (few, fewer):
+            slopes[len(some)] = slopes_of(block, some, self.free, self.scales, QUICK)
+        jobs = []
+        for c in kinds:
+            some = fewer if c.id in _SLOWER else few
+            jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         rough = [self._tried(*r, work=QUICK) for r in run(_try, jobs) if r is not None]
         self._judge(rough)
@@ -289,7 +294,7 @@ class FrequencyStudy:
         grid = [np.where(np.isfinite(r.N), 0, np.nan).astype(complex) for r in [*self.records, *self.held]]
         for i, table in enumerate(grid):
             record = [*self.records, *self.held][i]
-            table[np.isfinite(record.N) & (record.N != 0)] = t.errors[self.points.record == i]
+            table[counted(record)] = t.errors[self.points.record == i]
         return not scatter(grid)
 
     def _alike(self, a, b) -> bool:
@@ -314,10 +319,10 @@ def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:
 
 def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     """Fit one effect class from its best starts (a job of its own, for executors)."""
-    cls, block, points, free, scales = job
+    cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     best = None
-    for grown in best_starts(cls, block, points, scales, keep=1 if cls.id in _SLOW else 2):
+    for grown in best_starts(cls, block, points, slopes, keep=1 if cls.id in _SLOW else 3):
         own = tuple(k for k in grown.parameters if k not in block.parameters and grown.parameters[k].free)
         iterations = 3 if cls.id in _SLOW else 5
         fitted = fit_table(

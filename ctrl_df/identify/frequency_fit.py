@@ -36,7 +36,7 @@ class Points:
         Which table a point belongs to.
     scale : (n,) array
         What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point is less
-        (a mass about to stick, an antiresonance: there the scatter does not shrink with N).
+        (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with N).
     """
 
     A: np.ndarray
@@ -71,14 +71,18 @@ class Points:
 
 
 def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
-    """Return the measured points of several tables in a row; points with N = 0 say nothing and are left out."""
+    """Return the measured points of several tables in a row.
+
+    N = 0 says that the mass stood still. At frequencies where nothing moved there is no scale to measure by: those
+    points are left out, see `counted`.
+    """
     rows, sigmas, numbers = [], [], []
     for i, r in enumerate(records):
-        a, w, n = r.points
-        keep = n != 0
-        rows.append((a[keep], w[keep], n[keep]))
-        sigmas.append(r.noise_of_points[keep])
-        numbers.append(np.full(int(keep.sum()), i))
+        keep = counted(r)
+        row, column = np.nonzero(keep)
+        rows.append((r.A[row], r.omega[column], r.N[keep]))
+        sigmas.append(r.noise_of_points[keep[np.isfinite(r.N)]])
+        numbers.append(np.full(len(row), i))
     a, w, n = (np.concatenate(column) for column in zip(*rows, strict=True))
     sigma, known = np.concatenate(sigmas), np.concatenate(sigmas)
     if np.all(np.isfinite(known)):
@@ -89,8 +93,15 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
         noise, weight = math.nan, np.ones(len(a))
     scale = np.abs(n)
     for value in np.unique(w):
-        scale[w == value] = np.maximum(scale[w == value], 0.1 * np.median(np.abs(n[w == value])))
+        here = w == value
+        scale[here] = np.maximum(scale[here], 0.1 * np.median(np.abs(n[here & (n != 0)])))
     return Points(a, w, n, weight, noise, np.concatenate(numbers), scale)
+
+
+def counted(record: FrequencyMeasurement) -> np.ndarray:
+    """Return which cells (na, nw) of a table say something: measured, at frequencies where some amplitude moved it."""
+    measured = np.isfinite(record.N)
+    return measured & np.any(measured & (record.N != 0), axis=0)
 
 
 # Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for ever.
@@ -227,6 +238,14 @@ def fit_table(
     n = len(points)
     error = (e[:n] + 1j * e[n:]) / points.weight
     return FittedTable(model, tuple(names), error, e, jacobian, tuple(job.variables), z, job.count, converged)
+
+
+def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.ndarray:
+    """Return the slopes (2 n, p) of the weighted errors by scaled parameters."""
+    table = block.parameters
+    job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)
+    z = np.array([v.q(table[v.name].value) for v in job.variables])
+    return job.slopes(z, job.errors(z)) if len(z) else np.zeros((2 * len(points), 0))
 
 
 class _Job:
