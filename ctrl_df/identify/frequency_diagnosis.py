@@ -321,18 +321,20 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     """Fit one effect class from its best starts (a job of its own, for executors)."""
     cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
-    best = None
-    for grown in best_starts(cls, block, points, slopes, keep=1 if cls.id in _SLOW else 3):
-        own = tuple(k for k in grown.parameters if k not in block.parameters and grown.parameters[k].free)
-        iterations = 3 if cls.id in _SLOW else 5
-        fitted = fit_table(
-            grown, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK
+    slow = cls.id in _SLOW
+    grown = best_starts(cls, block, points, slopes, keep=1 if slow else 3)
+    if not grown:
+        return None
+    own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
+
+    def fitted(begin, iterations):
+        return fit_table(
+            begin, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK
         )
-        if best is None or float(fitted.weighted @ fitted.weighted) < float(
-            best[1].weighted @ best[1].weighted
-        ):
-            best = cls.id, fitted, own
-    return best
+
+    begun = [fitted(g, 2) for g in grown]
+    best = min(begun, key=lambda f: float(f.weighted @ f.weighted))
+    return cls.id, best if slow or best.converged else fitted(best.block, 4), own
 
 
 # --- in words -------------------------------------------------------------------------------------

@@ -90,7 +90,7 @@ def _breakaway(p: Plane):
 
 
 def _bristle(p: Plane):
-    for bend in p.swing.over(7, 0.02, 0.5):
+    for bend in p.swing.over(6, 0.3, 0.3):
         stiffness = max(p.friction, 0.02 * p.force.high) / bend
         for ratio in (0.1, 0.6):
             yield {"stiffness": stiffness, "damping": ratio * math.sqrt(stiffness * p.mass)}, 1.0
@@ -118,7 +118,7 @@ def _hard_stop(p: Plane):
 
 
 def _position_ripple(p: Plane):
-    for wavelength in p.swing.over(9, 1.0, 5.0):
+    for wavelength in p.swing.over(7, 1.0, 5.0):
         for amplitude in (0.02, 0.1):
             yield {"amplitude": amplitude * p.force.high, "wavelength": wavelength}, 1.0
 
@@ -230,15 +230,19 @@ def best_starts(cls, block, points: Points, slopes, keep: int = 3) -> list:
     """Return the blocks grown by the most promising starts, best first.
 
     A start is judged by what remains of its errors once the model's own parameters have moved along `slopes` (2 n, p),
-    those of the weighted errors.
+    those of the weighted errors. An effect that changes no point leaves no print: no start.
     """
+    before = simulate_table(block, points, QUICK)
     q = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((2 * len(points), 0))
     scored = []
     for grown in proposals(cls, block, points):
         try:
-            e = points.weight * relative_error(simulate_table(grown, points, QUICK), points)
+            table = simulate_table(grown, points, QUICK)
         except (ValueError, ArithmeticError):
             continue
+        if np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
+            continue
+        e = points.weight * relative_error(table, points)
         e = np.concatenate([e.real, e.imag])
         left = float(np.linalg.norm(e - q @ (q.T @ e)))
         if np.isfinite(left):
