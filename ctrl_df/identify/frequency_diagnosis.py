@@ -19,6 +19,7 @@ from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagno
 from .frequency_compare import as_tables, plane_regions
 from .frequency_fit import (
     QUICK,
+    ROUGH,
     FittedTable,
     Points,
     counted,
@@ -322,14 +323,15 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     slow = cls.id in _SLOW
-    grown = best_starts(cls, block, points, slopes, keep=1 if slow else 3)
+    work = ROUGH if slow else QUICK
+    grown = best_starts(cls, block, points, slopes, 1 if slow else 3, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
 
     def fitted(begin, iterations):
         return fit_table(
-            begin, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK
+            begin, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=work
         )
 
     begun = [fitted(g, 2) for g in grown]

@@ -106,14 +106,15 @@ def counted(record: FrequencyMeasurement) -> np.ndarray:
 
 
 # Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for ever.
-QUICK = {"max_steps": 12_000, "averages": 8}
+ROUGH = {"max_steps": 4_000, "averages": 8}
+QUICK = {"max_steps": 25_000, "averages": 8}
 CAREFUL = {"max_steps": 200_000, "averages": 16}
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
     """Return N of the model at the points; NaN where it has no periodic answer, or none within the work allowed."""
     N = np.empty(len(points), complex)
-    rigid = _rigid(model, points, RIGID[0] if work is QUICK else RIGID[1])
+    rigid = _rigid(model, points, RIGID[1] if work in (None, CAREFUL) else RIGID[0])
     for some, block in ((rigid, model.without_effect("bristle") if rigid.any() else model), (~rigid, model)):
         if some.any():
             N[some] = _described(block, points.A[some], points.omega[some], work or CAREFUL)
@@ -229,7 +230,7 @@ def fit_table(
     budget : int
         Bound on the tables computed.
     work : mapping or None
-        Bounds on the work of one point, `QUICK` or `CAREFUL` (the default).
+        Bounds on the work of one point, `ROUGH`, `QUICK` or `CAREFUL` (the default).
     """
     table = block.parameters
     job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)

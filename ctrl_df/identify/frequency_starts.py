@@ -226,18 +226,18 @@ def proposals(cls, block, points: Points) -> Iterator:
             yield grown
 
 
-def best_starts(cls, block, points: Points, slopes, keep: int = 3) -> list:
+def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -> list:
     """Return the blocks grown by the most promising starts, best first.
 
     A start is judged by what remains of its errors once the model's own parameters have moved along `slopes` (2 n, p),
     those of the weighted errors. An effect that changes no point leaves no print: no start.
     """
-    before = simulate_table(block, points, QUICK)
+    before = simulate_table(block, points, work)
     q = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((2 * len(points), 0))
     scored = []
     for grown in proposals(cls, block, points):
         try:
-            table = simulate_table(grown, points, QUICK)
+            table = simulate_table(grown, points, work)
         except (ValueError, ArithmeticError):
             continue
         if np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
