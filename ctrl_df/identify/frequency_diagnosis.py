@@ -38,11 +38,11 @@ from .trial import Scales
 SIGNIFICANT = 12.0
 """Evidence [nats] an effect needs; fewer shapes are tried than over time, and points err independently."""
 
-_SCREEN = 30  # points while screening
+_SCREEN = 20  # points while screening, those where the model errs most in their part of the plane
 _ROUGH = 10  # of effects whose orbits take many times as long
 _SLOW = frozenset({"position_ripple", "sensor_quantization"})
-_SLOWER = _SLOW
-_CONFIRM = 4
+_DEAR = _SLOW | {"backlash", "bristle", "compliance"}  # fewer starts are followed
+_CONFIRM = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +135,9 @@ class FrequencyStudy:
         inside = self.points.take(self.train)
         begins = [self.block]
         if "mass" in self.free:
-            top = inside.omega >= np.quantile(inside.omega, 0.8)
-            mass = float(np.median(1 / (np.abs(inside.N[top]) * inside.omega[top] ** 2)))
+            moved = inside.take(inside.N != 0)
+            top = moved.omega >= np.quantile(moved.omega, 0.8)
+            mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
             begins.append(self.block.with_parameters({"mass": mass}))
         fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
@@ -148,14 +149,15 @@ class FrequencyStudy:
     def screen(self, classes, executor):
         """Try every effect, roughly on some points, the best then on all of them."""
         inside = self.points.take(self.train)
-        few, fewer = inside.thinned(_SCREEN), inside.thinned(_ROUGH)
+        size = np.abs(inside.weight * self.base.errors[self.train])
+        few, fewer = inside.thinned(_SCREEN, size), inside.thinned(_ROUGH, size)
         kinds = [c for c in classes if applicable(c, self.base.fitted.block)]
         block, slopes = self.base.fitted.block, {}
         for some in (few, fewer):
             slopes[len(some)] = slopes_of(block, some, self.free, self.scales, QUICK)
         jobs = []
         for c in kinds:
-            some = fewer if c.id in _SLOWER else few
+            some = fewer if c.id in _SLOW else few
             jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         rough = [self._tried(*r, work=QUICK) for r in run(_try, jobs) if r is not None]
@@ -324,7 +326,8 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     slow = cls.id in _SLOW
     work = ROUGH if slow else QUICK
-    grown = best_starts(cls, block, points, slopes, 1 if slow else 3, work)
+    keep = 1 if slow else 2 if cls.id in _DEAR else 3
+    grown, hopeful = best_starts(cls, block, points, slopes, keep, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
@@ -334,6 +337,8 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
             begin, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=work
         )
 
+    if not hopeful:
+        return cls.id, fitted(grown[0], 0), own
     begun = [fitted(g, 2) for g in grown]
     best = min(begun, key=lambda f: float(f.weighted @ f.weighted))
     return cls.id, best if slow or best.converged else fitted(best.block, 4), own

@@ -57,8 +57,8 @@ class Points:
         parts = {k: getattr(self, k)[where] for k in ("A", "omega", "N", "weight", "record", "scale")}
         return replace(self, **parts)
 
-    def thinned(self, count: int) -> Points:
-        """Return about `count` points spread over the plane: every one belongs to a cell of equal logarithmic size."""
+    def thinned(self, count: int, size) -> Points:
+        """Return up to `count` points: of every cell of equal logarithmic size on the plane that of largest `size`."""
         if len(self) <= count:
             return self
         side = max(int(math.sqrt(count)), 2)
@@ -67,8 +67,9 @@ class Points:
             place = np.log(axis)
             width = max(float(np.ptp(place)), 1e-12)
             cell = cell * side + np.minimum((side * (place - place.min()) / width).astype(int), side - 1)
-        _, first = np.unique(cell, return_index=True)
-        return self.take(np.sort(first))
+        order = np.argsort(-np.asarray(size), kind="stable")
+        _, first = np.unique(cell[order], return_index=True)
+        return self.take(np.sort(order[first]))
 
 
 def points_of(records: Sequence[FrequencyMeasurement]) -> Points:

@@ -226,27 +226,32 @@ def proposals(cls, block, points: Points) -> Iterator:
             yield grown
 
 
-def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -> list:
-    """Return the blocks grown by the most promising starts, best first.
+_HOPELESS = 3.0  # times the error of the model itself: no start value to begin with
+
+
+def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -> tuple[list, bool]:
+    """Return the blocks grown by the most promising starts, best first, and whether any of them promises anything.
 
     A start is judged by what remains of its errors once the model's own parameters have moved along `slopes` (2 n, p),
     those of the weighted errors. An effect that changes no point leaves no print: no start.
     """
-    before = simulate_table(block, points, work)
     q = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((2 * len(points), 0))
+
+    def left(table):
+        e = points.weight * relative_error(table, points)
+        e = np.concatenate([e.real, e.imag])
+        return float(np.linalg.norm(e - q @ (q.T @ e)))
+
+    before = simulate_table(block, points, work)
     scored = []
     for grown in proposals(cls, block, points):
         try:
             table = simulate_table(grown, points, work)
         except (ValueError, ArithmeticError):
             continue
-        if np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
-            continue
-        e = points.weight * relative_error(table, points)
-        e = np.concatenate([e.real, e.imag])
-        left = float(np.linalg.norm(e - q @ (q.T @ e)))
-        if np.isfinite(left):
-            scored.append((left, len(scored), grown))
+        if not np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
+            scored.append((left(table), len(scored), grown))
     scored.sort(key=lambda s: s[:2])
-    return [grown for _, _, grown in scored[:keep]]
-
+    bound = _HOPELESS * left(before)
+    hopeful = [g for size, _, g in scored[:keep] if size < bound]
+    return hopeful or [g for _, _, g in scored[:1]], bool(hopeful)
