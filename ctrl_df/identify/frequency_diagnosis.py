@@ -36,7 +36,10 @@ from .frequency_starts import best_starts
 from .trial import Scales
 
 SIGNIFICANT = 12.0
-"""Evidence [nats] an effect needs; fewer shapes are tried than over time, and points err independently."""
+"""Evidence [nats] an effect needs on the points fitted; fewer shapes are tried than over time."""
+
+HELD = 2.0
+"""Evidence [nats] it needs on the points held out; there are few of them."""
 
 _SCREEN = 20  # points while screening, those where the model errs most in their part of the plane
 _ROUGH = 10  # of effects whose orbits take many times as long
@@ -107,6 +110,7 @@ class _Tried:
     errors: np.ndarray
     table: np.ndarray
     evidence: float = 0.0
+    held: float = 0.0  # of it on the points held out
     confirmed: bool = False
 
     @property
@@ -194,19 +198,32 @@ class FrequencyStudy:
             ):
                 self.base = self._tried("", again, ())
 
-    def _power(self, tried) -> float:
-        return float(np.sum(np.abs(self.points.weight * tried.errors) ** 2))
+    def _power(self, tried, where=slice(None)) -> float:
+        errors = (self.points.weight * tried.errors)[where]
+        return max(float(np.sum(np.abs(errors) ** 2)), self._floor(len(errors)))
+
+    def _ratio(self, worse, better, where) -> float:
+        """Return the log likelihood ratio [nats] of independent complex errors at some points."""
+        ratio = self._power(worse, where) / self._power(better, where)
+        return np.count_nonzero(where) * math.log(ratio)
+
+    def evidence(self, better, worse) -> float:
+        """Return the log likelihood ratio [nats] at all points."""
+        return self._ratio(worse, better, self.train) + self._ratio(worse, better, ~self.train)
+
+    def refitted(self, block, names) -> _Tried:
+        """Return a block with these parameters refitted to the points of the fit."""
+        inside = self.points.take(self.train)
+        return self._tried("", fit_table(block, inside, names, self.scales, iterations=12), ())
 
     def _judge(self, tried):
-        """Set the evidence: likelihood ratio of independent complex errors, less Schwarz's price."""
-        n = len(self.points)
-        least = self._floor(n)
-        base = max(self._power(self.base), least)
+        """Set the evidence: of the points fitted, less Schwarz's price, and of those held out."""
+        price = 0.5 * math.log(2 * len(self.points))
         for t in tried:
-            power = max(self._power(t), least)
-            t.evidence = n * math.log(base / power) - 0.5 * len(t.extra) * math.log(2 * n)
+            t.held = self._ratio(self.base, t, ~self.train)
+            t.evidence = self._ratio(self.base, t, self.train) + t.held - len(t.extra) * price
 
-    def _floor(self, n):
+    def _floor(self, n) -> float:
         """Return the power below which no model gets: the stated noise, or the accuracy of the orbits."""
         stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
         return n * max(0.5 * stated, 1e-6) ** 2
@@ -233,9 +250,7 @@ class FrequencyStudy:
         noise, structure = self._split(best)
         _, structure0 = self._split(self.base)
         errors = self._errors(self.base)
-        significant = (
-            first is not None and best.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * errors[1]
-        )
+        significant = first is not None and worth(first)
         if self._unexplained(best if significant else self.base, noise, structure, structure0):
             verdict = UNKNOWN
         elif first is None or not significant:
@@ -263,7 +278,7 @@ class FrequencyStudy:
         errors = {n.rpartition(".")[2]: names[n] for n in t.extra if n in names}
         return CandidateEffect(
             effect, t.id, *self._errors(t), t.evidence, probability, values, alike, t.fitted.block, t.confirmed,
-            (t.table,), errors,
+            (t.table,), errors, t.held,
         )  # fmt: skip
 
     def _errors(self, t) -> tuple[float, float]:
@@ -305,9 +320,14 @@ class FrequencyStudy:
         both = np.isfinite(a.table) & np.isfinite(b.table)
         if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
             return False
-        sigma2 = max(min(self._power(a), self._power(b)), self._floor(len(self.points))) / len(self.points)
+        sigma2 = min(self._power(a), self._power(b)) / len(self.points)
         gap = self.points.weight * np.abs(a.table - b.table) / np.abs(self.points.N)
         return float(np.sum(gap[both] ** 2)) / sigma2 < 6.0
+
+
+def worth(candidate: CandidateEffect) -> bool:
+    """Whether the points fitted speak for an effect, and those held out by themselves too."""
+    return candidate.evidence_fitted > SIGNIFICANT and candidate.evidence_holdout > HELD
 
 
 def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:

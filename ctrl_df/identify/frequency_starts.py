@@ -84,7 +84,7 @@ def _stribeck(p: Plane):
 
 
 def _breakaway(p: Plane):
-    """Static levels between what the model slides with, or what stood still, and the least force that moved it."""
+    """Return static levels between what the model slides with (or what stood still) and the least moving force."""
     low = max(p.stuck, min(p.friction, 0.9 * p.force.low))
     return [low + f * (p.force.low - low) for f in (0.25, 0.6, 0.95)]
 
