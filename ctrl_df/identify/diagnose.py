@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..blocks.mechanism import Mechanism
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
 from .explain import explain, find_regions
 from .lack_of_fit import lacks
-from .measurement import Measurement
+from .records import as_records, has_tables
 from .study import Study
 from .trial import Trial
 from .variables import default_free
@@ -68,8 +67,6 @@ def diagnose(
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     began = time.perf_counter()
-    from .frequency_compare import has_tables
-
     if has_tables(data):
         from .frequency_diagnosis import diagnose_frequency
 
@@ -83,20 +80,6 @@ def diagnose(
     study = Study(block, records, held, free)
     found = study.candidates(effect_classes(candidates), executor)
     return verdict_of(study, found, began, limits)
-
-
-def as_records(data, name) -> tuple:
-    """Return records as a tuple; TypeError for anything else."""
-    from .frequency_measurement import FrequencyMeasurement
-
-    kinds = (Measurement, FrequencyMeasurement)
-    records = (data,) if isinstance(data, kinds) else data
-    if not isinstance(records, Sequence) or not records or not all(isinstance(r, kinds) for r in records):
-        raise TypeError(
-            f"{name} must be a Measurement or a sequence of them; got {data!r}. "
-            "Wrap arrays: ctrl_df.Measurement(t, u, y)."
-        )
-    return tuple(records)
 
 
 def block_of(model) -> Mechanism:

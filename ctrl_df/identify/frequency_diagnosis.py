@@ -16,7 +16,7 @@ import numpy as np
 from .attach import applicable
 from .diagnose import block_of, effect_classes, free_names
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
-from .frequency_compare import as_tables, plane_regions
+from .frequency_compare import plane_regions
 from .frequency_fit import (
     QUICK,
     ROUGH,
@@ -33,6 +33,7 @@ from .frequency_fit import (
 )
 from .frequency_refit import uncertainty
 from .frequency_starts import best_starts
+from .records import as_tables
 from .trial import Scales
 
 SIGNIFICANT = 12.0
@@ -321,7 +322,7 @@ class FrequencyStudy:
         if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
             return False
         sigma2 = min(self._power(a), self._power(b)) / len(self.points)
-        gap = self.points.weight * np.abs(a.table - b.table) / np.abs(self.points.N)
+        gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
         return float(np.sum(gap[both] ** 2)) / sigma2 < 6.0
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 
 from .diagnose import block_of, effect_classes
-from .frequency_compare import as_tables
 from .frequency_diagnosis import SIGNIFICANT, FrequencyStudy, worth
 from .ladder import Found, Study, climb, outcome
+from .records import as_tables
 
 
 def improve_frequency(
@@ -44,7 +44,9 @@ def improve_frequency(
             study.screen(classes, executor)
         found = study.verdict(time.perf_counter(), None)
         return Found(
-            found, bool(found.ranking) and worth(found.ranking[0]), lambda b, ids: _without_idle(b, ids, study)
+            found,
+            bool(found.ranking) and worth(found.ranking[0]),
+            lambda b, ids: _without_idle(b, ids, study),
         )
 
     steps = climb(start, free, max_effects, ask)

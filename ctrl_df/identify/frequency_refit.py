@@ -6,8 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .frequency_compare import as_tables, comparison_of_tables, inner_block
+from .frequency_compare import comparison_of_tables, inner_block
 from .frequency_fit import FittedTable, fit_table, points_of, table_scales
+from .records import as_tables
 
 
 def refit_frequency(model, data, free=None, *, start=None, budget=600, **keywords):

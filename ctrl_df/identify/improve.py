@@ -7,8 +7,9 @@ import time
 from dataclasses import replace
 from typing import Any
 
-from .diagnose import HELD, SIGNIFICANT, as_records, block_of, effect_classes, free_names, verdict_of
+from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
 from .ladder import Found, Study, climb, outcome
+from .records import as_records, has_tables
 from .study import Study as Fits
 from .study import ranked
 from .trial import Trial
@@ -38,8 +39,6 @@ def improve(
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    from .frequency_compare import has_tables
-
     if has_tables(train):
         from .frequency_improve import improve_frequency
 
@@ -64,9 +63,7 @@ def improve(
     # The windows of a diagnosis are as long as its best model bears: steps are compared over those of the last.
     common = last.data.fine
     errors = [common.errors(step.model) for step in steps]
-    steps = tuple(
-        replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True)
-    )
+    steps = tuple(replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True))
     spread = math.sqrt(
         sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records))
     )
