@@ -24,6 +24,8 @@ from .frequency_fit import (
     Points,
     counted,
     fit_table,
+    log_density,
+    outlying,
     points_of,
     relative_error,
     rms,
@@ -45,7 +47,8 @@ HELD = 2.0
 _SCREEN = 20  # points while screening, those where the model errs most in their part of the plane
 _ROUGH = 10  # of effects whose orbits take many times as long
 _SLOW = frozenset({"position_ripple", "sensor_quantization"})
-_DEAR = _SLOW | {"backlash", "bristle", "compliance"}  # fewer starts are followed
+# Starts that are followed, where not three: each costs, and the plane of backlash has many valleys.
+_FOLLOWED = {"position_ripple": 1, "sensor_quantization": 1, "bristle": 2, "compliance": 2, "backlash": 4}
 _CONFIRM = 5
 
 
@@ -180,7 +183,9 @@ class FrequencyStudy:
     def _confirmed(self, tried, inside):
         iterations = 3 if tried.id in _SLOW else 12
         names = (*self.free, *tried.extra)
-        fitted = fit_table(tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=80)
+        fitted = _fit_either(
+            tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=200
+        )
         again = self._tried(tried.id, fitted, tried.extra)
         again.confirmed = True
         return again
@@ -199,18 +204,12 @@ class FrequencyStudy:
             ):
                 self.base = self._tried("", again, ())
 
-    def _power(self, tried, where=slice(None)) -> float:
-        errors = (self.points.weight * tried.errors)[where]
-        return max(float(np.sum(np.abs(errors) ** 2)), self._floor(len(errors)))
-
-    def _ratio(self, worse, better, where) -> float:
-        """Return the log likelihood ratio [nats] of independent complex errors at some points."""
-        ratio = self._power(worse, where) / self._power(better, where)
-        return np.count_nonzero(where) * math.log(ratio)
+    def _likelihood(self, tried) -> tuple[np.ndarray, float]:
+        return log_density(self.points.weight * tried.errors, self._floor())
 
     def evidence(self, better, worse) -> float:
         """Return the log likelihood ratio [nats] at all points."""
-        return self._ratio(worse, better, self.train) + self._ratio(worse, better, ~self.train)
+        return float(np.sum(self._likelihood(better)[0] - self._likelihood(worse)[0]))
 
     def refitted(self, block, names) -> _Tried:
         """Return a block with these parameters refitted to the points of the fit."""
@@ -218,16 +217,18 @@ class FrequencyStudy:
         return self._tried("", fit_table(block, inside, names, self.scales, iterations=12), ())
 
     def _judge(self, tried):
-        """Set the evidence: of the points fitted, less Schwarz's price, and of those held out."""
+        """Set the evidence: likelihood ratio of independent complex errors, less Schwarz's price."""
         price = 0.5 * math.log(2 * len(self.points))
+        base = self._likelihood(self.base)[0]
         for t in tried:
-            t.held = self._ratio(self.base, t, ~self.train)
-            t.evidence = self._ratio(self.base, t, self.train) + t.held - len(t.extra) * price
+            gain = self._likelihood(t)[0] - base
+            t.held = float(np.sum(gain[~self.train]))
+            t.evidence = float(np.sum(gain)) - len(t.extra) * price
 
-    def _floor(self, n) -> float:
-        """Return the power below which no model gets: the stated noise, or the accuracy of the orbits."""
+    def _floor(self) -> float:
+        """Return the variance below which no model gets: of the stated noise, or the accuracy of the orbits."""
         stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
-        return n * max(0.5 * stated, 1e-6) ** 2
+        return max(0.5 * stated, 1e-6) ** 2
 
     # --- what it comes to -----------------------------------------------------------------------------
 
@@ -283,11 +284,12 @@ class FrequencyStudy:
         )  # fmt: skip
 
     def _errors(self, t) -> tuple[float, float]:
-        return rms(t.errors[self.train]), rms(t.errors[~self.train])
+        good = ~outlying(t.errors)
+        return rms(t.errors[self.train & good]), rms(t.errors[~self.train & good])
 
     def _split(self, t) -> tuple[float, float]:
         """Split the relative error into scatter and what neighbours on the plane have in common."""
-        e, p = t.errors, self.points
+        p, e = self.points, np.where(outlying(t.errors), 0.0, t.errors)
         differences = []
         for record in np.unique(p.record):
             at = np.flatnonzero(p.record == record)
@@ -313,7 +315,8 @@ class FrequencyStudy:
         grid = [np.where(np.isfinite(r.N), 0, np.nan).astype(complex) for r in [*self.records, *self.held]]
         for i, table in enumerate(grid):
             record = [*self.records, *self.held][i]
-            table[counted(record)] = t.errors[self.points.record == i]
+            here = self.points.record == i
+            table[counted(record)] = np.where(outlying(t.errors)[here], np.nan, t.errors[here])
         return not scatter(grid)
 
     def _alike(self, a, b) -> bool:
@@ -321,7 +324,7 @@ class FrequencyStudy:
         both = np.isfinite(a.table) & np.isfinite(b.table)
         if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
             return False
-        sigma2 = min(self._power(a), self._power(b)) / len(self.points)
+        sigma2 = min(self._likelihood(a)[1], self._likelihood(b)[1])
         gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
         return float(np.sum(gap[both] ** 2)) / sigma2 < 6.0
 
@@ -347,22 +350,37 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     slow = cls.id in _SLOW
     work = ROUGH if slow else QUICK
-    keep = 1 if slow else 2 if cls.id in _DEAR else 3
+    keep = _FOLLOWED.get(cls.id, 3)
     grown, hopeful = best_starts(cls, block, points, slopes, keep, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
 
     def fitted(begin, iterations):
-        return fit_table(
+        return _fit_either(
             begin, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=work
         )
 
     if not hopeful:
         return cls.id, fitted(grown[0], 0), own
     begun = [fitted(g, 2) for g in grown]
-    best = min(begun, key=lambda f: float(f.weighted @ f.weighted))
-    return cls.id, best if slow or best.converged else fitted(best.block, 4), own
+    best = max(begun, key=_likeliest)
+    return cls.id, best if slow or best.converged else fitted(best.block, 8), own
+
+
+def _fit_either(block, points, names, scales, **options) -> FittedTable:
+    """Fit to all points and, where a few are far off at the start or at the end, to the others; return the likeliest."""
+    fits = [fit_table(block, points, names, scales, **options)]
+    at_start = relative_error(simulate_table(block, points, options.get("work")), points)
+    for begin, error in ((block, at_start), (fits[0].block, fits[0].error)):
+        far = outlying(error)
+        if far.any():
+            fits.append(fit_table(begin, points.without(far), names, scales, **options))
+    return max(fits, key=_likeliest)
+
+
+def _likeliest(fitted: FittedTable) -> float:
+    return float(log_density(fitted.error, 1e-12)[0].sum())
 
 
 # --- in words -------------------------------------------------------------------------------------

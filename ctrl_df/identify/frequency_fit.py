@@ -57,6 +57,10 @@ class Points:
         parts = {k: getattr(self, k)[where] for k in ("A", "omega", "N", "weight", "record", "scale")}
         return replace(self, **parts)
 
+    def without(self, where) -> Points:
+        """Return the same points, some of them of no weight."""
+        return replace(self, weight=np.where(where, 0.0, self.weight))
+
     def thinned(self, count: int, size) -> Points:
         """Return up to `count` points: of every cell of equal logarithmic size on the plane that of largest `size`."""
         if len(self) <= count:
@@ -159,6 +163,46 @@ def relative_error(simulated, points: Points) -> np.ndarray:
 def rms(error) -> float:
     """Return the root mean square of complex errors."""
     return math.sqrt(float(np.mean(np.abs(error) ** 2))) if len(error) else math.nan
+
+
+def outlying(error) -> np.ndarray:
+    """Return which points err by ten times the median: one in sixteen at most, else none are taken as such.
+
+    Motions coexist (backlash, ripple): where the drive was found in another one than the model, or was measured badly,
+    the two differ by as much as N itself, and say nothing of the rest of the plane.
+    """
+    size = np.abs(error)
+    far = size > np.maximum(10 * np.median(size), 1e-3) if len(size) else np.zeros(0, bool)
+    return far if np.count_nonzero(far) <= max(len(size) // 16, 1) else np.zeros(len(size), bool)
+
+
+_GROSS = 0.02  # share of points expected to err by as much as N itself
+
+
+def log_density(error, least: float) -> tuple[np.ndarray, float]:
+    """Return the log density [nats] of every point's error, and the variance of what is mere scatter.
+
+    Parameters
+    ----------
+    error : (n,) complex array
+        Taken as a mixture: scatter of a variance fitted to them, and a few gross errors about as large as N.
+    least : float
+        The variance is no less.
+    """
+    size = np.abs(error) ** 2
+    gross = _GROSS * np.exp(-np.minimum(size, 700.0))
+    best = (np.full(len(size), -np.inf), least)
+    for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
+        variance = max(variance, least)
+        for _ in range(30):
+            usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+            share = usual / (usual + gross)
+            variance = max(float(share @ size) / max(float(share.sum()), 1e-300), least)
+        usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+        density = np.log(usual + gross)
+        if density.sum() > best[0].sum():
+            best = density, variance
+    return best
 
 
 def table_scales(block, points: Points) -> Scales:
@@ -264,8 +308,7 @@ def fit_table(
             converged = True
             break
     model = job.model(z)
-    n = len(points)
-    error = (e[:n] + 1j * e[n:]) / points.weight
+    error = relative_error(simulate_table(model, points, work), points)
     return FittedTable(model, tuple(names), error, e, jacobian, tuple(job.variables), z, job.count, converged)
 
 

@@ -105,7 +105,7 @@ def _compliance(p: Plane):
 
 
 def _backlash(p: Plane):
-    for gap in p.swing.over(6, 0.05, 0.5):
+    for gap in p.swing.over(8, 0.1, 0.3):
         for share in (0.3, 0.6):
             yield {"gap": gap, "restitution": 0.3, "load_fraction": share}, 1.0
 
@@ -239,10 +239,14 @@ def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -
 
     def left(table):
         e = points.weight * relative_error(table, points)
-        e = np.concatenate([e.real, e.imag])
-        return float(np.linalg.norm(e - q @ (q.T @ e)))
+        e = np.concatenate([np.real(e), np.imag(e)])
+        e = e - q @ (q.T @ e)
+        return e[: len(points)] ** 2 + e[len(points) :] ** 2
 
     before = simulate_table(block, points, work)
+    size = left(before)
+    # a single point of another motion must not hide a good start
+    common = 0.1 * float(np.mean(size)) + 1e-12
     scored = []
     for grown in proposals(cls, block, points):
         try:
@@ -250,8 +254,8 @@ def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -
         except (ValueError, ArithmeticError):
             continue
         if not np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
-            scored.append((left(table), len(scored), grown))
+            scored.append((float(np.sum(np.log(left(table) + common))), len(scored), grown))
     scored.sort(key=lambda s: s[:2])
-    bound = _HOPELESS * left(before)
+    bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(_HOPELESS)
     hopeful = [g for size, _, g in scored[:keep] if size < bound]
     return hopeful or [g for _, _, g in scored[:1]], bool(hopeful)
