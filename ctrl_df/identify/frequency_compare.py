@@ -1,4 +1,4 @@
-"""A model beside measured tables N(A, omega): how far off, whether by more than scatter, and where on the plane."""
+"""A model beside measured tables N(A, omega): how far off, whether beyond scatter, and where on the plane."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class FrequencyComparison(Compared):
         return text + "."
 
     def plot(self, record=None, **keywords):
-        """Draw measured and model's N over frequency, and the error on the plane; returns a ct.ControlPlot."""
+        """Draw measured and model's N, and the error on the plane; returns a ``ct.ControlPlot``."""
         from ..plot.table import table_comparison_plot
 
         return table_comparison_plot(self, record, **keywords)
@@ -213,7 +213,8 @@ def plane_regions(points: Points, error) -> Regions:
         p = min(p * (len(found) - i), 1.0)
         what = "amplitudes" if kind == "amplitude" else "frequencies"
         sentence = (
-            f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the points"
+            f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the "
+            "points"
             f" (p {'< 1e-6' if p < 1e-6 else f'= {p:.2g}'})."
         )
         regions.append(Region(kind, label, share, expected, p, bias, 1.0, span, sentence))

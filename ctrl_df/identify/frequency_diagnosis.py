@@ -1,8 +1,8 @@
 """Which effect is missing, from measured tables N(A, omega): each effect leaves its print on the plane.
 
-The course is that of the diagnosis over time: refit the model, try every effect of the library from start values
-of several magnitudes, confirm the best on all points, and say what remains. Points of a table are taken to err
-independently; what neighbours have in common is structure.
+The course is that of the diagnosis over time: refit the model, try every effect of the library from start
+values of several magnitudes, confirm the best on all points, and say what remains. Points of a table are
+taken to err independently; what neighbours have in common is structure.
 """
 
 from __future__ import annotations
@@ -131,7 +131,8 @@ class FrequencyStudy:
         self.train = _train_mask(self.points, len(records), bool(held))
         if np.count_nonzero(self.train) <= len(self.free) // 2 + 1:
             raise ValueError(
-                f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to fit "
+                f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to "
+                "fit "
                 f"{len(self.free)} parameters. Measure more, or name fewer in free."
             )
         self.scales = table_scales(block, self.points)
@@ -139,7 +140,7 @@ class FrequencyStudy:
         self.found: list[_Tried] = []
 
     def _fit_base(self) -> FittedTable:
-        """Fit from the model's values, and from the mass that the highest frequency suggests; keep the better."""
+        """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
         inside = self.points.take(self.train)
         begins = [self.block]
         if "mass" in self.free:
@@ -226,7 +227,7 @@ class FrequencyStudy:
             t.evidence = float(np.sum(gain)) - len(t.extra) * price
 
     def _floor(self) -> float:
-        """Return the variance below which no model gets: of the stated noise, or the accuracy of the orbits."""
+        """Return the variance below which no model gets: by the stated noise, or by how exact orbits are."""
         stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
         return max(0.5 * stated, 1e-6) ** 2
 
@@ -266,8 +267,9 @@ class FrequencyStudy:
         before = comparison_of_tables(self.base.fitted.block, tables)
         after = before if best is self.base else comparison_of_tables(best.fitted.block, tables)
         result = FrequencyDiagnosis(
-            verdict, tuple(ranking), self.base.fitted.block, self.block, *errors, noise, structure, "", where.kinds,
-            where, tuple(self.records), tuple(self.held), time.perf_counter() - began, dict(limits or {}),
+            verdict, tuple(ranking), self.base.fitted.block, self.block, *errors, noise, structure, "",
+            where.kinds, where, tuple(self.records), tuple(self.held), time.perf_counter() - began,
+            dict(limits or {}),
             before=before, after=after,
         )  # fmt: skip
         object.__setattr__(result, "explanation", _explain(result))
@@ -279,8 +281,8 @@ class FrequencyStudy:
         names = {f"{k}": e for k, e in uncertainty(t.fitted)[1].items()} if t.confirmed else {}
         errors = {n.rpartition(".")[2]: names[n] for n in t.extra if n in names}
         return CandidateEffect(
-            effect, t.id, *self._errors(t), t.evidence, probability, values, alike, t.fitted.block, t.confirmed,
-            (t.table,), errors, t.held,
+            effect, t.id, *self._errors(t), t.evidence, probability, values, alike, t.fitted.block,
+            t.confirmed, (t.table,), errors, t.held,
         )  # fmt: skip
 
     def _errors(self, t) -> tuple[float, float]:
@@ -369,7 +371,7 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
 
 
 def _fit_either(block, points, names, scales, **options) -> FittedTable:
-    """Fit to all points and, where a few are far off at the start or at the end, to the others; return the likeliest."""
+    """Fit to all points and, where a few are far off, to the others; return the likeliest."""
     fits = [fit_table(block, points, names, scales, **options)]
     at_start = relative_error(simulate_table(block, points, options.get("work")), points)
     for begin, error in ((block, at_start), (fits[0].block, fits[0].error)):
@@ -392,18 +394,24 @@ def _explain(d: FrequencyDiagnosis) -> str:
     first = d.ranking[0] if d.ranking else None
     if d.verdict == NONE:
         return (
-            f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} of |N| (held out "
-            f"{d.nrmse_holdout:.2%}), which is scatter. No effect of the library improves on it beyond chance."
+            f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} of |N| (held "
+            "out "
+            f"{d.nrmse_holdout:.2%}), which is scatter. No effect of the library improves on it beyond "
+            "chance."
         )
     places = " ".join(r.sentence for r in d.where.significant[:2])
     if d.verdict == UNKNOWN or first is None:
         tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
         return (
-            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%} of |N|; {tried}"
+            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%} of |N|; "
+            f"{tried}"
             f"Neighbouring points err alike: {d.structure:.2%} beside {d.noise:.2%} of scatter. "
             f"Look here: {places or 'the error is spread over the whole plane.'}"
         )
-    size = f"{d.nrmse:.2%} to {first.nrmse:.2%} of |N| (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
+    size = (
+        f"{d.nrmse:.2%} to {first.nrmse:.2%} of |N| "
+        f"(held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
+    )
     same = ""
     if first.equivalents:
         names = ", ".join(e.replace("_", " ") for e in first.equivalents)
@@ -411,12 +419,14 @@ def _explain(d: FrequencyDiagnosis) -> str:
     if d.verdict == EFFECT:
         sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
         return (
-            f"Missing: {named(first.effect)} ({values_of(first.effect)}). With it the error falls from {size}; "
+            f"Missing: {named(first.effect)} ({values_of(first.effect)}). With it the error falls from "
+            f"{size}; "
             f"probability {sure:.1%}.{same}" + (f" Before, {places}" if places else "")
         )
     others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
     names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
     return (
-        f"An effect is missing, and these tables do not tell which: {names}. The first reduces the error from {size}."
+        f"An effect is missing, and these tables do not tell which: {names}. The first reduces the error "
+        f"from {size}."
         f"{same} next_experiment gives the points of the plane that would separate them."
     )

@@ -1,8 +1,8 @@
 """A block beside measured tables N(A, omega): relative errors, and their least squares.
 
-N of a drive falls by decades over frequency, and a stepped sine is as good, relative to what it measures, at one
-end as at the other: errors are relative to ``|N|``, weighted by the stated standard errors where there are any.
-Where the block has no periodic answer or stands still, its N counts as zero.
+N of a drive falls by decades over frequency, and a stepped sine is as good, relative to what it measures, at
+one end as at the other: errors are relative to ``|N|``, weighted by the stated standard errors where there
+are any. Where the block has no periodic answer or stands still, its N counts as zero.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ class Points:
     record : (n,) array of int
         Which table a point belongs to.
     scale : (n,) array
-        What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point is less
-        (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with N).
+        What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point
+        is less (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with
+        N).
     """
 
     A: np.ndarray
@@ -62,7 +63,7 @@ class Points:
         return replace(self, weight=np.where(where, 0.0, self.weight))
 
     def thinned(self, count: int, size) -> Points:
-        """Return up to `count` points: of every cell of equal logarithmic size on the plane that of largest `size`."""
+        """Return up to `count` points: that of largest `size` in every cell of the logarithmic plane."""
         if len(self) <= count:
             return self
         side = max(int(math.sqrt(count)), 2)
@@ -79,8 +80,8 @@ class Points:
 def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
     """Return the measured points of several tables in a row.
 
-    N = 0 says that the mass stood still. At frequencies where nothing moved there is no scale to measure by: those
-    points are left out, see `counted`.
+    N = 0 says that the mass stood still. At frequencies where nothing moved there is no scale to measure by:
+    those points are left out, see `counted`.
     """
     rows, sigmas, numbers = [], [], []
     for i, r in enumerate(records):
@@ -105,19 +106,20 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
 
 
 def counted(record: FrequencyMeasurement) -> np.ndarray:
-    """Return which cells (na, nw) of a table say something: measured, at frequencies where some amplitude moved it."""
+    """Return which cells (na, nw) of a table count: measured, where some amplitude moved the mass."""
     measured = np.isfinite(record.N)
     return measured & np.any(measured & (record.N != 0), axis=0)
 
 
-# Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for ever.
+# Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for
+# ever.
 ROUGH = {"max_steps": 4_000, "averages": 8}
 QUICK = {"max_steps": 25_000, "averages": 8}
 CAREFUL = {"max_steps": 200_000, "averages": 16}
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
-    """Return N of the model at the points; NaN where it has no periodic answer, or none within the work allowed."""
+    """Return N of the model at the points; NaN where it has no answer within the work allowed."""
     N = np.empty(len(points), complex)
     rigid = _rigid(model, points, RIGID[1] if work in (None, CAREFUL) else RIGID[0])
     for some, block in ((rigid, model.without_effect("bristle") if rigid.any() else model), (~rigid, model)):
@@ -138,10 +140,10 @@ RIGID = (2e-3, 3e-4)  # share of the swing, when quick and when careful
 
 
 def _rigid(model, points: Points, share: float) -> np.ndarray:
-    """Return where the bristles of a model yield over so little of the measured swing that they might be rigid.
+    """Return where the bristles of a model yield over next to nothing of the measured swing.
 
-    There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by less than
-    that share.
+    There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by
+    less than that share.
     """
     bristles = [e for e in getattr(model, "effects", ()) if e.id == "bristle" and e.level == 0]
     if not bristles:
@@ -168,8 +170,8 @@ def rms(error) -> float:
 def outlying(error) -> np.ndarray:
     """Return which points err by ten times the median: one in sixteen at most, else none are taken as such.
 
-    Motions coexist (backlash, ripple): where the drive was found in another one than the model, or was measured badly,
-    the two differ by as much as N itself, and say nothing of the rest of the plane.
+    Motions coexist (backlash, ripple): where the drive was found in another one than the model, or was
+    measured badly, the two differ by as much as N itself, and say nothing of the rest of the plane.
     """
     size = np.abs(error)
     far = size > np.maximum(10 * np.median(size), 1e-3) if len(size) else np.zeros(0, bool)

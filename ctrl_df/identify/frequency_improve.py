@@ -1,4 +1,4 @@
-"""The ladder on measured tables N(A, omega): one effect at a time while held-out error falls beyond scatter."""
+"""The ladder on measured tables N(A, omega): one effect at a time while points held out speak for it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 
 from .diagnose import block_of, effect_classes
 from .frequency_diagnosis import SIGNIFICANT, FrequencyStudy, worth
-from .ladder import Found, Study, climb, outcome
+from .ladder import Found, Study, climb, last_diagnosis, outcome
 from .records import as_tables
 
 
@@ -50,7 +50,7 @@ def improve_frequency(
         )
 
     steps = climb(start, free, max_effects, ask)
-    noise = steps[-1].diagnosis.noise
+    noise = last_diagnosis(steps).noise
     return Study(
         steps, steps[-1].model, outcome(steps), noise, start, records, held, time.perf_counter() - began
     )

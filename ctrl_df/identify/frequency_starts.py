@@ -1,8 +1,9 @@
 """Start values of every effect for a table N(A, omega): sizes at which it would show somewhere on the plane.
 
-Forces, swings, speeds and frequencies of a table span decades. A gap shows where it is comparable with a swing, a
-delay where it is comparable with a period, and so on: every effect is tried at sizes spread over the range in which
-it matters, and where it takes over a part of the friction that the refitted model has, that is taken from the model.
+Forces, swings, speeds and frequencies of a table span decades. A gap shows where it is comparable with a
+swing, a delay where it is comparable with a period, and so on: every effect is tried at sizes spread over the
+range in which it matters, and where it takes over a part of the friction that the refitted model has, that is
+taken from the model.
 """
 
 from __future__ import annotations
@@ -36,9 +37,10 @@ class Span:
 
 @dataclass(frozen=True)
 class Plane:
-    """What a table spans: forces [N], swings [m], speeds [m/s], frequencies [rad/s]; friction and mass of the model.
+    """What a table spans: forces [N], swings [m], speeds [m/s], frequencies [rad/s].
 
-    `stuck` is the largest force that moved nothing, 0 where all points moved.
+    `friction` and `mass` are the model's, `stuck` is the largest force that moved nothing, 0 where all
+    points moved.
     """
 
     force: Span
@@ -62,10 +64,10 @@ def plane_of(block, points: Points) -> Plane:
     spans = (points.A[moved], swing, swing * points.omega[moved], points.omega[moved])
     base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
     still = points.A[~moved]
-    return Plane(
-        *(Span(float(s.min()), float(s.max())) for s in spans), level(base, 1.0, 1.0, 0.0),
-        sum(p.value for k, p in block.parameters.items() if "." not in k), float(still.max(initial=0.0)),
-    )  # fmt: skip
+    force, swings, speed, omega = (Span(float(s.min()), float(s.max())) for s in spans)
+    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
+    friction, stuck = level(base, 1.0, 1.0, 0.0), float(still.max(initial=0.0))
+    return Plane(force, swings, speed, omega, friction, mass, stuck)
 
 
 # --- where each effect shows ----------------------------------------------------------------------
@@ -84,7 +86,7 @@ def _stribeck(p: Plane):
 
 
 def _breakaway(p: Plane):
-    """Return static levels between what the model slides with (or what stood still) and the least moving force."""
+    """Return static levels between the model's friction (or what stood still) and the least moving force."""
     low = max(p.stuck, min(p.friction, 0.9 * p.force.low))
     return [low + f * (p.force.low - low) for f in (0.25, 0.6, 0.95)]
 
@@ -111,7 +113,8 @@ def _backlash(p: Plane):
 
 
 def _hard_stop(p: Plane):
-    # a mass that hits both stops swings by 0.8 (to and fro at one speed) to 1.27 of the limit (standing in between)
+    # a mass that hits both stops swings by 0.8 (to and fro at one speed) to 1.27 of the limit (standing in
+    # between)
     for f in (0.75, 0.85, 0.95, 1.05, 1.2):
         yield {"limit": f * p.swing.high, "restitution": 0.3}, 1.0
     yield {"limit": 0.4 * p.swing.high, "restitution": 0.3}, 1.0
@@ -230,10 +233,10 @@ _HOPELESS = 3.0  # times the error of the model itself: no start value to begin 
 
 
 def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -> tuple[list, bool]:
-    """Return the blocks grown by the most promising starts, best first, and whether any of them promises anything.
+    """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 
-    A start is judged by what remains of its errors once the model's own parameters have moved along `slopes` (2 n, p),
-    those of the weighted errors. An effect that changes no point leaves no print: no start.
+    A start is judged by what remains of its errors once the model's own parameters have moved along `slopes`
+    (2 n, p), those of the weighted errors. An effect that changes no point leaves no print: no start.
     """
     q = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((2 * len(points), 0))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
-from .ladder import Found, Study, climb, outcome
+from .ladder import Found, Study, climb, last_diagnosis, outcome
 from .records import as_records, has_tables
 from .study import Study as Fits
 from .study import ranked
@@ -60,14 +60,15 @@ def improve(
         return Found(found, worth, lambda block, ids: _without_idle(block, ids, fits, names))
 
     steps = climb(start, free, max_effects, ask)
-    # The windows of a diagnosis are as long as its best model bears: steps are compared over those of the last.
+    # The windows of a diagnosis are as long as its best model bears: steps are compared over those of the
+    # last.
     common = last.data.fine
     errors = [common.errors(step.model) for step in steps]
     steps = tuple(replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True))
     spread = math.sqrt(
         sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records))
     )
-    noise = steps[-1].diagnosis.noise / spread
+    noise = last_diagnosis(steps).noise / spread
     return Study(
         steps, steps[-1].model, outcome(steps), noise, start, records, held, time.perf_counter() - began
     )

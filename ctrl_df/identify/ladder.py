@@ -1,4 +1,4 @@
-"""The ladder, over time and over the (A, omega) plane alike: its steps, the study they make, and the climb."""
+"""The ladder, over time and over the (A, omega) plane alike: its steps, the study they make, the climb."""
 
 from __future__ import annotations
 
@@ -96,7 +96,8 @@ class Study:
         else:
             added = ", ".join(e.replace("_", " ") for e in self.effects) or "nothing"
             head = (
-                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}, on held-out data from "
+                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}, on held-out "
+                "data from "
                 f"{first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%} (noise {self.noise:.2%})."
             )
         if self.verdict == UNKNOWN and last.diagnosis is not None:
@@ -131,8 +132,8 @@ class Found(NamedTuple):
     worth : bool
         Whether the first of its ranking is worth a step.
     drop : callable
-        ``drop(block, ids) -> (block, ids dropped)``: leaves out those of the effects `ids`, added earlier, that the
-        last one of the block made idle.
+        ``drop(block, ids) -> (block, ids dropped)``: leaves out those of the effects `ids`, added earlier,
+        that the last one of the block made idle.
     """
 
     diagnosis: Diagnosis
@@ -151,8 +152,8 @@ def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
     max_effects : int
         Longest ladder, >= 0.
     ask : callable
-        ``ask(block, names, search) -> Found``: the block refitted in its parameters `names`, and what it misses; no
-        effect is tried where `search` is false.
+        ``ask(block, names, search) -> Found``: the block refitted in its parameters `names`, and what it
+        misses; no effect is tried where `search` is false.
 
     Raises
     ------
@@ -177,8 +178,15 @@ def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
         block, dropped = found.drop(best.model, added) if added else (best.model, ())
 
 
-def outcome(steps) -> str:
+def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:
+    """Return what was asked of the last model of a ladder."""
+    found = steps[-1].diagnosis
+    assert found is not None
+    return found
+
+
+def outcome(steps: Sequence[Step]) -> str:
     """Return the verdict of a ladder."""
-    if steps[-1].diagnosis.verdict == UNKNOWN:
+    if last_diagnosis(steps).verdict == UNKNOWN:
         return UNKNOWN
     return NONE if len(steps) == 1 else "effect"

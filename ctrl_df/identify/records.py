@@ -22,7 +22,8 @@ def as_tables(data, name: str = "data") -> tuple[FrequencyMeasurement, ...]:
     if bad or not records:
         got = f"also {type(bad[0]).__name__}" if bad else "an empty sequence"
         raise TypeError(
-            f"{name} must hold frequency tables only (FrequencyMeasurement), or records over time only; got {got}. "
+            f"{name} must hold frequency tables only (FrequencyMeasurement), or records over time only; got "
+            f"{got}. "
             "Study them in two calls, the second with the model of the first."
         )
     return records
