@@ -22,7 +22,8 @@ class FrequencyMeasurement:
     omega : array_like, shape (nw,)
         Frequencies [rad/s], > 0, increasing.
     N : array_like, shape (na, nw), complex
-        ``(Y1/A) exp(j phi1)`` for input ``A cos(omega t)``; NaN where nothing was measured.
+        ``(Y1/A) exp(j phi1)`` for input ``A cos(omega t)``; NaN where nothing was measured, 0 where nothing
+        moved.
     name : str
         Shown in tables and pictures.
     input_unit, output_unit : str
