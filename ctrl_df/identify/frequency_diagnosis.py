@@ -184,8 +184,9 @@ class FrequencyStudy:
     def _confirmed(self, tried, inside):
         iterations = 3 if tried.id in _SLOW else 12
         names = (*self.free, *tried.extra)
+        work = QUICK if tried.id in _FOLLOWED else None
         fitted = _fit_either(
-            tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=200
+            tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=120, work=work
         )
         again = self._tried(tried.id, fitted, tried.extra)
         again.confirmed = True
@@ -360,8 +361,9 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
 
     def fitted(begin, iterations):
         return _fit_either(
-            begin, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=work
-        )
+            begin, points, (*free, *own), scales,
+            again=False, iterations=iterations, tolerance=1e-2, work=work,
+        )  # fmt: skip
 
     if not hopeful:
         return cls.id, fitted(grown[0], 0), own
@@ -370,11 +372,17 @@ def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     return cls.id, best if slow or best.converged else fitted(best.block, 8), own
 
 
-def _fit_either(block, points, names, scales, **options) -> FittedTable:
-    """Fit to all points and, where a few are far off, to the others; return the likeliest."""
+def _fit_either(block, points, names, scales, *, again=True, **options) -> FittedTable:
+    """Fit to all points and, where a few are far off, to the others; return the likeliest.
+
+    `again` says whether to begin with those that are far off at the start, too.
+    """
     fits = [fit_table(block, points, names, scales, **options)]
-    at_start = relative_error(simulate_table(block, points, options.get("work")), points)
-    for begin, error in ((block, at_start), (fits[0].block, fits[0].error)):
+    begins = [(fits[0].block, fits[0].error)]
+    if again:
+        table = simulate_table(block, points, options.get("work"))
+        begins.append((block, relative_error(table, points)))
+    for begin, error in begins:
         far = outlying(error)
         if far.any():
             fits.append(fit_table(begin, points.without(far), names, scales, **options))

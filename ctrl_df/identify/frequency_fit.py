@@ -115,7 +115,7 @@ def counted(record: FrequencyMeasurement) -> np.ndarray:
 # ever.
 ROUGH = {"max_steps": 4_000, "averages": 8}
 QUICK = {"max_steps": 25_000, "averages": 8}
-CAREFUL = {"max_steps": 200_000, "averages": 16}
+CAREFUL = {"max_steps": 60_000, "averages": 16}
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
