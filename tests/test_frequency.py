@@ -154,6 +154,7 @@ def test_a_gap_is_named_although_one_point_is_of_another_motion():
     )
     assert found.verdict == "effect" and found.best.id == "backlash", found.explanation
     assert found.best.parameters["gap"] == pytest.approx(2e-3, rel=0.1)
+    assert "of 30 points err" in found.explanation
 
 
 def test_delays_are_one_class():

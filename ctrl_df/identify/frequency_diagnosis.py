@@ -16,10 +16,11 @@ import numpy as np
 from .attach import applicable
 from .diagnose import block_of, effect_classes, free_names
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
+from .frequency_candidate import FOLLOWED, SLOW, fit_either, try_effect
 from .frequency_compare import plane_regions
+from .frequency_explain import explain_tables
 from .frequency_fit import (
     QUICK,
-    ROUGH,
     FittedTable,
     Points,
     counted,
@@ -34,9 +35,7 @@ from .frequency_fit import (
     table_scales,
 )
 from .frequency_refit import uncertainty
-from .frequency_starts import best_starts
 from .records import as_tables
-from .trial import Scales
 
 SIGNIFICANT = 12.0
 """Evidence [nats] an effect needs on the points fitted; fewer shapes are tried than over time."""
@@ -46,9 +45,6 @@ HELD = 2.0
 
 _SCREEN = 20  # points while screening, those where the model errs most in their part of the plane
 _ROUGH = 10  # of effects whose orbits take many times as long
-_SLOW = frozenset({"position_ripple", "sensor_quantization"})
-# Starts that are followed, where not three: each costs, and the plane of backlash has many valleys.
-_FOLLOWED = {"position_ripple": 1, "sensor_quantization": 1, "bristle": 2, "compliance": 2, "backlash": 4}
 _CONFIRM = 5
 
 
@@ -166,10 +162,10 @@ class FrequencyStudy:
             slopes[len(some)] = slopes_of(block, some, self.free, self.scales, QUICK)
         jobs = []
         for c in kinds:
-            some = fewer if c.id in _SLOW else few
+            some = fewer if c.id in SLOW else few
             jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
-        rough = [self._tried(*r, work=QUICK) for r in run(_try, jobs) if r is not None]
+        rough = [self._tried(*r, work=QUICK) for r in run(try_effect, jobs) if r is not None]
         self._judge(rough)
         rough.sort(key=lambda t: -t.evidence)
         # what explains next to nothing of a few points will not explain all of them
@@ -182,10 +178,10 @@ class FrequencyStudy:
         self.found = [*best, *(t for t in rough if t.id not in done)]
 
     def _confirmed(self, tried, inside):
-        iterations = 3 if tried.id in _SLOW else 12
+        iterations = 3 if tried.id in SLOW else 12
         names = (*self.free, *tried.extra)
-        work = QUICK if tried.id in _FOLLOWED else None
-        fitted = _fit_either(
+        work = QUICK if tried.id in FOLLOWED else None
+        fitted = fit_either(
             tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=120, work=work
         )
         again = self._tried(tried.id, fitted, tried.extra)
@@ -273,7 +269,9 @@ class FrequencyStudy:
             dict(limits or {}),
             before=before, after=after,
         )  # fmt: skip
-        object.__setattr__(result, "explanation", _explain(result))
+        object.__setattr__(
+            result, "explanation", explain_tables(result, before if verdict == NONE else after)
+        )
         return result
 
     def _entry(self, t, probability, alike):
@@ -345,96 +343,3 @@ def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:
     k = np.searchsorted(np.unique(points.omega), points.omega)
     mask = (i + k) % 3 != 2
     return mask if 0 < np.count_nonzero(mask) < len(mask) else np.arange(len(points)) % 3 != 2
-
-
-def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
-    """Fit one effect class from its best starts (a job of its own, for executors)."""
-    cls, block, points, free, scales, slopes = job
-    scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
-    slow = cls.id in _SLOW
-    work = ROUGH if slow else QUICK
-    keep = _FOLLOWED.get(cls.id, 3)
-    grown, hopeful = best_starts(cls, block, points, slopes, keep, work)
-    if not grown:
-        return None
-    own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
-
-    def fitted(begin, iterations):
-        return _fit_either(
-            begin, points, (*free, *own), scales,
-            again=False, iterations=iterations, tolerance=1e-2, work=work,
-        )  # fmt: skip
-
-    if not hopeful:
-        return cls.id, fitted(grown[0], 0), own
-    begun = [fitted(g, 2) for g in grown]
-    best = max(begun, key=_likeliest)
-    return cls.id, best if slow or best.converged else fitted(best.block, 8), own
-
-
-def _fit_either(block, points, names, scales, *, again=True, **options) -> FittedTable:
-    """Fit to all points and, where a few are far off, to the others; return the likeliest.
-
-    `again` says whether to begin with those that are far off at the start, too.
-    """
-    fits = [fit_table(block, points, names, scales, **options)]
-    begins = [(fits[0].block, fits[0].error)]
-    if again:
-        table = simulate_table(block, points, options.get("work"))
-        begins.append((block, relative_error(table, points)))
-    for begin, error in begins:
-        far = outlying(error)
-        if far.any():
-            fits.append(fit_table(begin, points.without(far), names, scales, **options))
-    return max(fits, key=_likeliest)
-
-
-def _likeliest(fitted: FittedTable) -> float:
-    return float(log_density(fitted.error, 1e-12)[0].sum())
-
-
-# --- in words -------------------------------------------------------------------------------------
-
-
-def _explain(d: FrequencyDiagnosis) -> str:
-    from .explain import named, values_of
-
-    first = d.ranking[0] if d.ranking else None
-    if d.verdict == NONE:
-        return (
-            f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} of |N| (held "
-            "out "
-            f"{d.nrmse_holdout:.2%}), which is scatter. No effect of the library improves on it beyond "
-            "chance."
-        )
-    places = " ".join(r.sentence for r in d.where.significant[:2])
-    if d.verdict == UNKNOWN or first is None:
-        tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
-        return (
-            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%} of |N|; "
-            f"{tried}"
-            f"Neighbouring points err alike: {d.structure:.2%} beside {d.noise:.2%} of scatter. "
-            f"Look here: {places or 'the error is spread over the whole plane.'}"
-        )
-    size = (
-        f"{d.nrmse:.2%} to {first.nrmse:.2%} of |N| "
-        f"(held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
-    )
-    same = ""
-    if first.equivalents:
-        names = ", ".join(e.replace("_", " ") for e in first.equivalents)
-        same = f" On these data the same map as {names}."
-    if d.verdict == EFFECT:
-        sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
-        return (
-            f"Missing: {named(first.effect)} ({values_of(first.effect)}). With it the error falls from "
-            f"{size}; "
-            f"probability {sure:.1%}.{same}" + (f" Before, {places}" if places else "")
-        )
-    others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
-    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
-    return (
-        f"An effect is missing, and these tables do not tell which: {names}. The first reduces the error "
-        f"from {size}."
-        f"{same} next_experiment gives the points of the plane that would separate them."
-    )

@@ -168,14 +168,14 @@ def rms(error) -> float:
 
 
 def outlying(error) -> np.ndarray:
-    """Return which points err by ten times the median: one in sixteen at most, else none are taken as such.
+    """Return which points err by ten times the median: one in sixteen (two) at most, else none.
 
     Motions coexist (backlash, ripple): where the drive was found in another one than the model, or was
     measured badly, the two differ by as much as N itself, and say nothing of the rest of the plane.
     """
     size = np.abs(error)
     far = size > np.maximum(10 * np.median(size), 1e-3) if len(size) else np.zeros(0, bool)
-    return far if np.count_nonzero(far) <= max(len(size) // 16, 1) else np.zeros(len(size), bool)
+    return far if np.count_nonzero(far) <= max(len(size) // 16, 2) else np.zeros(len(size), bool)
 
 
 _GROSS = 0.02  # share of points expected to err by as much as N itself
