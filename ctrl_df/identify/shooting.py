@@ -62,8 +62,8 @@ class Tangent:
 class Problem:
     """Records, windows and free parameters of one fit.
 
-    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the
-    initial states, `slopes` the derivatives of the last step.
+    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the initial
+    states, `slopes` the derivatives of the last step.
     """
 
     def __init__(self, model, records, names, budget, limits=None):
@@ -115,7 +115,7 @@ class Problem:
         return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.windows, nuisance, strict=True)]
 
     def round(self, theta):
-        """Let an encoder of the model round the solution's outputs (fits leave it out: it has no slope)."""
+        """Let an encoder of the model round the outputs of the solution (fits leave it out: it has no slope)."""
         if "sensor_quantization" not in getattr(self.block, "_keys", ()):
             return
         values = self.values(theta)
@@ -198,8 +198,8 @@ class Problem:
     def _rescue_starts(self, theta) -> bool:
         """Try other speeds where single windows err far more than the rest; whether any was better.
 
-        Stick and slip make the error of a window a rough function of the speed it begins with: a start that
-        is estimated badly may lie in another valley. What the window before ends with is tried first.
+        Stick and slip make the error of a window a rough function of the speed it begins with: a start that is
+        estimated badly may lie in another valley. What the window before ends with is tried first.
         """
         found, values = False, self.values(theta)
         for k, simulator in enumerate(self.simulators):
@@ -231,7 +231,7 @@ class Problem:
         return found
 
     def _speeds_before(self, k) -> np.ndarray:
-        """Return the simulated speed (nw,) at the end of the window before each; the first: its estimate."""
+        """Return the simulated speed (nw,) with which the window before each ends; the estimate for the first."""
         windows, y = self.windows[k], self.measured[k] - self.last[k]
         t, speeds = self.records[k].t[windows.samples], np.array(windows.v)
         for w in range(1, len(windows)):
@@ -291,7 +291,7 @@ class Problem:
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
     def _by_start(self, k, theta, nuisance, base) -> np.ndarray:
-        """Return the derivatives (n, ns) of one record's output by the initial states of all windows."""
+        """Return the derivatives (n, ns) of one record's output by its initial states, all windows at once."""
         simulator, windows, rows = self.simulators[k], self.windows[k], []
         values = self.values(theta)
         for j, name in enumerate(simulator.nuisances):
