@@ -54,7 +54,7 @@ class Finding:
     def _predicted(self) -> str:
         lines = [
             f"{c.omega:.4f} rad/s, {_stability(c.stable)}, {c.grade}\n"
-            f"  F1 {c.amplitude:.3f} N, x1 {1e3 * c.output_amplitude:.3f} mm"
+            f"  F1 {c.amplitude:.3f} N, x1 {1e3 * c.output_amplitude:.3f} mm" + _standing(c)
             for c in self.response.limit_cycles
         ]
         return "\n".join(lines) or "no limit cycle"
@@ -138,3 +138,11 @@ def settled(run: EventResponse) -> Settled | None:
 
 def _stability(stable) -> str:
     return {True: "stable", False: "unstable", None: "stability unknown"}[stable]
+
+
+def _standing(cycle) -> str:
+    """Say on which motion of the block a crossing stands, where N names another."""
+    if not cycle.branch:
+        return ""
+    rest = "unstable under this force alone" if cycle.forced_multiplier >= 1 else "beside others"
+    return f"\n  on the {cycle.branch}, {rest}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import control as ct
@@ -15,6 +15,7 @@ from ..blocks.hysteresis import play, relay_with_hysteresis
 from ..blocks.mechanism import Mass, Mechanism, TwoMass
 from ..blocks.memoryless import saturation
 from ..status import Status
+from .branch import Branch
 from .memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
 
 # python-control's own classes, held at import: someone may put ours in their place.
@@ -84,6 +85,29 @@ class Method:
             y = y * (1j * np.arange(orders + 1) * omega[:, None]) ** self.order
         return y, regime, residual
 
+    def brief(self) -> Method:
+        """Return the method with short averages over irregular motion, for who has no use for them."""
+        return replace(self, options={"periods": 8}) if self.name == "backlash" else self
+
+    def branches(self, A, omega, near_A, near_omega) -> list[Branch]:
+        """Return known motions besides those that `harmonics` names, each a branch of N of its own.
+
+        A method without such knowledge has none; one that knows more adds its branches here.
+
+        Parameters
+        ----------
+        A, omega : ndarray
+            The box of interest: from the least to the greatest of each.
+        near_A, near_omega : ndarray, equally long
+            Points at which motions that attract beside each other matter.
+        """
+        if self.name != "backlash":
+            return []
+        from .backlash_branches import backlash_branches
+
+        found = backlash_branches(self.subject, A, omega, near_A, near_omega)
+        return [b.differentiated(self.order) for b in found] if self.order else found
+
     def _static(self, A, orders):
         if self.name == "element":
             return element_harmonics(self.subject, A, None, orders)
@@ -129,7 +153,14 @@ class Method:
 
             joint = block.effects[0]
             y, code, residual = backlash.backlash_family(
-                block.motor_mass, block.load_mass, joint.gap, joint.restitution, A, omega, orders
+                block.motor_mass,
+                block.load_mass,
+                joint.gap,
+                joint.restitution,
+                A,
+                omega,
+                orders,
+                **self.options,
             )
             return y, named(code, backlash.BACKLASH_REGIMES), residual
         from . import orbits

@@ -14,7 +14,7 @@ from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagno
 from .explain import explain, find_regions
 from .lack_of_fit import lacks
 from .records import as_records, has_tables
-from .study import Study
+from .study import ROUNDED, Study
 from .trial import Trial
 from .variables import default_free
 from .windows import facts
@@ -124,7 +124,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     best = chosen[0] if chosen else base
     # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not
     # rounded.
-    rounds = best.key == "sensor_quantization"
+    rounds = best.key == ROUNDED
     missed = lacks(base if rounds else best, study.data, study.noise)
     base_errors = _errors(base, study)
     keys = {c.key for c in chosen}
@@ -178,7 +178,8 @@ def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float,
     floors = [
         math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records]))) for v in (data.train, data.held)
     ]
-    expected = _NOISIER * noise * floors[1] / floors[0]
+    # the floors see what is fast: of two records with slow noise neither counts as the quieter one
+    expected = _NOISIER * noise * max(1.0, floors[1] / floors[0])
     outside = math.sqrt(max(best.held.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.held.rmse**2 - expected**2, outside**2, 1e-300))
     return noise, max(structure, outside), max(structure / there, outside / there_outside)

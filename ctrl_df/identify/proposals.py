@@ -146,15 +146,15 @@ def _quantization(screen):
     inverse = np.linspace(1 / high, 1 / low, count)
     some = y[:: max(1, len(y) // 4000)]
     contrast = np.array([abs(np.mean(np.exp(2j * math.pi * some * q))) for q in inverse])
-    best = [int(np.argmax(contrast))]
-    strong = np.flatnonzero(contrast > 0.8 * contrast[best[0]])
-    best.append(int(strong[0]))  # the coarsest of the grids that fit as well
-    steps = []
-    for i in best:
-        fine = np.linspace(inverse[max(i - 1, 0)], inverse[min(i + 1, count - 1)], 81)
-        value = [abs(np.mean(np.exp(2j * math.pi * some * q))) for q in fine]
-        steps.append(1 / fine[int(np.argmax(value))])
-    return [library.SensorQuantization(s) for s in dict.fromkeys(steps)]
+    # Finer grids that hold this one fit as well: of all that stand out, the coarsest.
+    inner = contrast[1:-1]
+    tops = 1 + np.flatnonzero(
+        (inner >= contrast[:-2]) & (inner >= contrast[2:]) & (inner > 0.9 * contrast.max())
+    )
+    at = int(tops[0]) if len(tops) else int(np.argmax(contrast))
+    fine = np.linspace(inverse[max(at - 1, 0)], inverse[min(at + 1, count - 1)], 201)
+    value = [abs(np.mean(np.exp(2j * math.pi * some * q))) for q in fine]
+    return [library.SensorQuantization(1 / fine[int(np.argmax(value))])]
 
 
 def _ripple(screen):

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .candidate import Candidate, fit_candidate
+from .candidate import Candidate, fit_candidate, fit_windows
 from .compare import Comparison, comparison_of
 from .records import as_records, has_tables
 from .simulator import Simulator
+from .valleys import hopped, rough
 from .variables import default_free
 
 __all__ = ["Candidate", "Fit", "FittedParameter", "default_free", "fit_candidate", "refit"]
@@ -173,11 +174,16 @@ def refit(
         )
     names = _names(block, free)
     start_values = {**{k: block.parameters[k].value for k in names}, **dict(start or {})}
-    found = fit_candidate(
-        fitted, records, start, names, budget=budget, mode=mode, window=window, robust=robust,
-        coarse=start is None, tolerance=1e-4, central=True, polish=6,
-        iterations=40,
-    )  # fmt: skip
+    settings: dict[str, Any] = dict(
+        budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
+    )
+    found = fit_candidate(fitted, records, start, names, coarse=start is None, iterations=40, **settings)
+    if rough(found):
+        better = hopped(found, _Beside(records, found.windows))
+        if better is not found:
+            found = fit_candidate(
+                better.model, records, None, names, coarse=False, starts=better.starts, **settings
+            )
     found = _with_steps(found, records, block, free)
     comparison = comparison_of(found.model, records, found.windows, found.starts, fitted=len(names))
     blurred = _blurred(found)
@@ -193,6 +199,18 @@ def refit(
         _as_given(model, found.model), MappingProxyType(parameters), comparison, found.covariance,
         _sentences(found), found.converged, found.nfev,
     )  # fmt: skip
+
+
+class _Beside:
+    """Fits over the windows of a refit, at the full rate."""
+
+    def __init__(self, records, windows):
+        self.records, self.windows = records, windows
+
+    def __call__(self, model, names, *, starts, iterations) -> Candidate:
+        return fit_windows(
+            model, self.records, self.windows, names, thin=1, starts=starts, iterations=iterations
+        )
 
 
 def _fitted_model(model, records):

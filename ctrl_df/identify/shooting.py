@@ -20,6 +20,13 @@ from .windows import Windows, facts
 
 Signals = list[np.ndarray]
 
+# Speeds to begin a window with, over how far the estimate may be off.
+_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
+
+
+def _power(signals: Signals) -> float:
+    return sum(float(e @ e) for e in signals)
+
 
 class Tangent:
     """A fitted model as a linear map: what its parameters and initial states can change in the output.
@@ -158,11 +165,40 @@ class Problem:
             self._scan_slack(theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
-        if self._rescue_starts(theta):
-            theta = self._descend(theta, max(iterations // 2, 3), tolerance, robust)
+        again = max(iterations // 2, 3)
+        # without parameters a window found lets the next one go on where it ends
+        for _ in range(1 if self.names else 4):
+            if not self._rescue_starts(theta):
+                break
+            theta = self._descend(theta, again, tolerance, robust)
+        if self.names and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
+            theta = self._without_the_lost(theta, again, tolerance, robust)
         return theta
 
-    def _descend(self, theta, iterations, tolerance, robust):
+    def _without_the_lost(self, theta, iterations, tolerance, robust):
+        """Let the windows that fit decide the parameters, then find where the others begin; keep what is better.
+
+        A window whose start lies in a wrong valley pulls the parameters to where it can never leave that valley.
+        """
+        kept = theta, self.nuisance, self.last, self.slopes, self.converged
+        trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
+        self._rescue_starts(trial)
+        trial = self._descend(trial, iterations, tolerance, robust)
+        if _power(self.last) < _power(kept[2]):
+            return trial
+        theta, self.nuisance, self.last, self.slopes, self.converged = kept
+        return theta
+
+    def _trusts(self) -> Signals:
+        """Return weights of the samples (n,): 1 in windows that err like the rest, little in those that err more."""
+        trusts = []
+        for windows, e in zip(self.windows, self.last, strict=True):
+            power = np.array([float(np.mean(e[w] ** 2)) for w in windows.slices])
+            usual = max(float(np.median(power)), self.noise**2)
+            trusts.append(np.repeat(np.minimum(1.0, (2 * usual / power) ** 2), windows.ends - windows.begins))
+        return trusts
+
+    def _descend(self, theta, iterations, tolerance, robust, trusts=None):
         damping, self.converged = 1e-3, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
@@ -170,6 +206,8 @@ class Problem:
             if self.nfev >= self.budget:
                 break
             weights = self._weights(residual, robust and iteration > 0)
+            if trusts is not None:
+                weights = [w * t for w, t in zip(weights, trusts, strict=True)]
             cost = self.cost(residual, nuisance, weights)
             base = [m - e for m, e in zip(self.measured, residual, strict=True)]
             self.slopes = jp, js = self.jacobian(theta, nuisance, base)
@@ -196,10 +234,11 @@ class Problem:
         return theta
 
     def _rescue_starts(self, theta) -> bool:
-        """Try other speeds where single windows err far more than the rest; whether any was better.
+        """Try other starts where single windows err far more than the rest; whether any was better.
 
-        Stick and slip make the error of a window a rough function of the speed it begins with: a start that is
-        estimated badly may lie in another valley. What the window before ends with is tried first.
+        Stick and slip make the error of a window a rough function of the speed it begins with, and so does a gap
+        of where in it and how fast the other body is: a start that is estimated badly may lie in another valley.
+        What the window before ends with is tried first.
         """
         found, values = False, self.values(theta)
         for k, simulator in enumerate(self.simulators):
@@ -214,11 +253,16 @@ class Problem:
             measured, least = self.records[k].y[some.samples], 0.7 * rms[bad] ** 2
             self.priors[k][bad, column] *= 3
             reach, chosen = self.priors[k][bad, column], starts[bad].copy()
-            before = self._speeds_before(k)[bad] - some.v
-            tries = [before, *(f * reach for f in (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1))]
-            for speed in tries:
+            before = simulator.carried_on(windows, values, starts)[bad]
+            before = np.where(np.isfinite(before), before, starts[bad])
+            tries: list[tuple[Any, Any]] = [(slice(None), before)]
+            tries += [(column, f * reach) for f in _SPEEDS]
+            if "slack" in simulator.nuisances:
+                at = simulator.nuisances.index("slack")
+                tries += [(slice(at, at + 2), pair) for pair in self._slacks(k)]
+            for which, value in tries:
                 trial = starts[bad].copy()
-                trial[:, column] = speed
+                trial[:, which] = value
                 e = measured - simulator.run(some, values, trial)
                 for w, where in enumerate(some.slices):
                     shift = 0.0 if simulator.tied else float(np.mean(e[where]))
@@ -227,38 +271,37 @@ class Problem:
                         least[w], chosen[w], found = power, trial[w], True
                         chosen[w, 0] += shift
             starts[bad] = chosen
-            self.nfev += len(tries) * len(some) / len(windows)
+            self._count(len(tries) * len(some) / len(windows))
         return found
 
-    def _speeds_before(self, k) -> np.ndarray:
-        """Return the simulated speed (nw,) with which the window before each ends; the estimate for the first."""
-        windows, y = self.windows[k], self.measured[k] - self.last[k]
-        t, speeds = self.records[k].t[windows.samples], np.array(windows.v)
-        for w in range(1, len(windows)):
-            end = windows.slices[w - 1].stop
-            if windows.begins[w] == windows.ends[w - 1] and end >= 4:
-                speeds[w] = (y[end - 1] - y[end - 4]) / (t[end - 1] - t[end - 4])
-        return speeds
-
     def _scan_slack(self, theta):
-        """Find where in its gap each window begins, by trying five places (the cost has several minima)."""
+        """Find where in its gap each window begins, and how fast it crosses it (the cost has several minima)."""
         for k, simulator in enumerate(self.simulators):
             if "slack" not in simulator.nuisances:
                 continue
-            column = simulator.nuisances.index("slack")
-            values, best, chosen = self.values(theta), None, None
-            for place in (0.02, 0.25, 0.5, 0.75, 0.98):
+            at = simulator.nuisances.index("slack")
+            windows, chosen = self.windows[k], self.nuisance[k].copy()
+            least, values, tries = np.full(len(windows), np.inf), self.values(theta), self._slacks(k)
+            for place, rate in tries:
                 trial = self.nuisance[k].copy()
-                trial[:, column] = place
-                e = self.measured[k] - simulator.run(self.windows[k], values, trial)
-                errors = np.array([np.sum((e[w] - e[w].mean()) ** 2) for w in self.windows[k].slices])
-                if best is None:
-                    best, chosen = errors, np.full(len(errors), place)
-                else:
-                    chosen = np.where(errors < best, place, chosen)  # type: ignore[arg-type]
-                    best = np.minimum(best, errors)
-            self.nuisance[k][:, column] = chosen
-            self.nfev += 5
+                trial[:, at], trial[:, at + 1] = place, rate
+                e = self.measured[k] - simulator.run(windows, values, trial)
+                errors = np.array([np.sum((e[w] - e[w].mean()) ** 2) for w in windows.slices])
+                better = errors < least
+                chosen[better], least = trial[better], np.minimum(least, errors)
+            self.nuisance[k] = chosen
+            self._count(len(tries) / len(self.simulators))
+
+    def _count(self, runs):
+        """Count simulations that seek initial states: bounded by themselves, they leave the budget to the descent."""
+        self.nfev += runs
+        self.budget += runs
+
+    def _slacks(self, k) -> list[tuple[float, float]]:
+        """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a window with."""
+        speed = self.known[k].speed
+        rates = [f * speed for f in (0.0, -0.2, 0.2, -0.7, 0.7)]
+        return [(p, r) for p in (0.02, 0.25, 0.5, 0.75, 0.98) for r in rates]
 
     def jacobian(self, theta, nuisance, base, central=False):
         """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""

@@ -15,11 +15,11 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..blocks.core import ELASTIC, IMPACT, level
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ..simulate.engine import Engine, State, sampled_drive
 from ..simulate.loop import closed_loop
+from . import initial_states
 from .measurement import Measurement
 from .windows import Windows, facts
 
@@ -122,37 +122,11 @@ class Simulator:
     @property
     def nuisances(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per window."""
-        if not self.mechanism:
-            return ()
-        core = self.block.core
-        names = ["x", "v"]
-        if core.joint == IMPACT:
-            names.append("slack")
-        elif core.joint == ELASTIC:
-            names += ["stretch", "stretch_rate"]
-        if core.bristle is not None:
-            names.append("bristle")
-        return tuple(names)
+        return initial_states.names(self.block.core) if self.mechanism else ()
 
     def priors(self, windows: Windows) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
-        known, core = self.facts, self.block.core if self.mechanism else None
-        columns = []
-        for name in self.nuisances:
-            if name == "x":
-                columns.append(5 * windows.x_error + 0.02 * known.spread)
-            elif name == "v":
-                columns.append(2 * windows.v_error + 0.01 * known.speed)
-            elif name == "slack":
-                columns.append(np.full(len(windows), 1.0))
-            elif name == "bristle":
-                columns.append(np.full(len(windows), 0.5))
-            else:
-                bend = known.force / max(core.stiffness, 1e-300)  # type: ignore[union-attr]
-                mass = core.masses[0] * core.masses[-1] / sum(core.masses)  # type: ignore[union-attr]
-                rate = bend * math.sqrt(core.stiffness / mass)  # type: ignore[union-attr]
-                columns.append(np.full(len(windows), 0.3 * (bend if name == "stretch" else rate)))
-        return np.array(columns).T.reshape(len(windows), len(columns))
+        return initial_states.reach(self.block.core if self.mechanism else None, self.facts, windows)
 
     def with_values(self, values: Mapping[str, float] | None):
         """Return the model with these values; a static level below the kinetic one is raised to it."""
@@ -179,8 +153,8 @@ class Simulator:
             Parameters that differ from the model's.
         start : (nw, number of nuisances) array or None
             Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
-            slack (0 to 1, None: from the acceleration), for an elastic joint its stretch [m] and rate [m/s]
-            beyond the steady one, for bristles the share of full deflection beyond the steady one.
+            slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its stretch [m]
+            and rate [m/s] beyond the steady one, for bristles the share of full deflection beyond the steady one.
         rounded : bool
             Whether an encoder of the model rounds the output. Fits leave it out: its steps have no slope.
 
@@ -194,24 +168,9 @@ class Simulator:
         record = self.record
         inside = windows.samples
         out = np.empty(len(inside))
-        drive = sampled_drive(
-            part.drive_time, part.drive_value, record.input_hold if self.thin == 1 else "linear"
-        )
+        drive = self._drive(part)
         for w, where in enumerate(windows.slices):
-            times = record.t[inside[where]] - part.delay
-            state = self._start(part, windows, w, None if start is None else start[w], times[0])
-            segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
-            state.segment = segment
-            run = part.engine.run(
-                state,
-                float(times[-1]),
-                drive,
-                times,
-                order=5,
-                rtol=self.rtol,
-                log=1,
-                max_steps=60 * len(times) + 20_000,
-            )
+            run = self._window(part, drive, windows, w, start, record.t[inside[where]])
             out[where] = run.outputs[:, 0]
             if not run.status.ok:
                 out[where.start + run.recorded : where.stop] = np.nan
@@ -227,6 +186,42 @@ class Simulator:
                 np.isfinite(out), np.clip(out, centre - 100 * limit, centre + 100 * limit), centre + limit
             )
         return out
+
+    def carried_on(self, windows: Windows, values, start: np.ndarray) -> np.ndarray:
+        """Return the initial states that let every window go on where the one before it ends.
+
+        Returns
+        -------
+        (nw, number of nuisances) array
+            NaN for windows that follow no other.
+        """
+        part, record = self._prepare(values), self.record
+        drive, found = self._drive(part), np.full_like(start, np.nan)
+        for w in range(len(windows) - 1):
+            if windows.ends[w] != windows.begins[w + 1]:
+                continue
+            run = self._window(part, drive, windows, w, start, record.t[[windows.begins[w], windows.ends[w]]])
+            if run.status.ok and part.core is not None:
+                shift, drift = self._ramps(part, int(windows.begins[w + 1]))
+                usual = windows.x[w + 1] - shift, windows.v[w + 1] - drift, windows.a[w + 1]
+                states = run.states[-1][part.offset :]
+                given = initial_states.corrections(states, part.core, usual, self.facts.speed)
+                found[w + 1] = [given[name] for name in self.nuisances]
+        return found
+
+    def _drive(self, part):
+        hold = self.record.input_hold if self.thin == 1 else "linear"
+        return sampled_drive(part.drive_time, part.drive_value, hold)
+
+    def _window(self, part, drive, windows, w, start, t):
+        """Run one window, recording at the record's times `t`."""
+        times = t - part.delay
+        state = self._start(part, windows, w, None if start is None else start[w], times[0])
+        state.segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
+        steps = 60 * int(windows.ends[w] - windows.begins[w]) + 20_000
+        return part.engine.run(
+            state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
+        )
 
     # --- preparing ------------------------------------------------------------------------------------
 
@@ -316,47 +311,19 @@ class Simulator:
             return engine.start(x0, time)
         given = dict(zip(self.nuisances, start, strict=True)) if start is not None else {}
         i = int(windows.begins[w])
-        x = float(windows.x[w]) + given.get("x", 0.0)
-        for primitive, later in part.output:
-            if isinstance(primitive, Ramp):
-                x -= primitive.offset + primitive.rate * (self.record.t[i] - later)
-        v = float(windows.v[w]) + given.get("v", 0.0)
-        v -= sum(p.rate for p, _ in part.output if isinstance(p, Ramp))
-        if core.stop is not None:
-            low, high = core.stop.span
-            x = min(max(x, low), high)
+        shift, drift = self._ramps(part, i)
+        usual = windows.x[w] - shift, windows.v[w] - drift, windows.a[w]
         states = x0[part.offset :]
-        stretch, rate = 0.0, 0.0
-        if core.joint == IMPACT:
-            slack = given.get("slack", 1.0 if windows.a[w] > 0 else 0.0)
-            stretch = min(max(slack, 0.0), 1.0) * core.gap
-        elif core.joint == ELASTIC:
-            pull = core.masses[0] * float(windows.a[w])
-            stretch = pull / core.stiffness + (core.gap if pull > 0 else 0.0) + given.get("stretch", 0.0)
-            rate = given.get("stretch_rate", 0.0)
-        if core.bodies == 2 and core.measured == 1:
-            states[2], states[3] = x, v
-            states[0], states[1] = x - stretch, v - rate
-        else:
-            states[0], states[1] = x, v
-            if core.bodies == 2:
-                states[2], states[3] = x + stretch, v + rate
-        if core.bodies == 2 and core.stop is not None:
-            low, high = core.stop.span
-            beyond = min(max(states[2], low), high) - states[2]
-            states[2] += beyond
-            states[0] += beyond
-        if core.bristle is not None:
-            speed = float(states[2 * core.driven + 1])
-            full = (
-                level(core.friction[core.driven], 1.0, math.copysign(1.0, speed), abs(speed))
-                + core.bristle.level
-            )
-            share = math.tanh(3 * speed / self.facts.speed) + given.get("bristle", 0.0)
-            states[core.bristle_state] = min(max(share, -1.0), 1.0) * full / core.bristle.stiffness
+        initial_states.fill(states, core, given, usual, self.facts.speed)
         for state, samples in part.lags:
             states[state] = samples[i]
         return engine.start(x0, time)
+
+    def _ramps(self, part, i) -> tuple[float, float]:
+        """Return what sensors add at sample i, and its rate."""
+        ramps = [(p, later) for p, later in part.output if isinstance(p, Ramp)]
+        shift = sum(p.offset + p.rate * (self.record.t[i] - later) for p, later in ramps)
+        return shift, sum(p.rate for p, _ in ramps)
 
 
 def free_run(

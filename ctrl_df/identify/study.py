@@ -12,9 +12,11 @@ from .equivalence import indistinguishable, whitened_power, whitener
 from .proposals import proposals
 from .regression import Start, force_regression, motion_of
 from .residual_tests import NoiseModel
+from .rounding import rounding_evidence
 from .screen import Screen, starts_for
 from .simulator import feasible
 from .trial import SHORTEST, Data, Trial, prepare
+from .valleys import centred, hopped, rough
 
 CONFIRMED = 6
 """Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
@@ -24,9 +26,16 @@ _LEVELS = (SHORTEST, 4, 1)
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
 _CLOSE = 60.0
+# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain;
+# error over the best candidate's beyond which it is not worth another try.
+_FLOOR, _HOPELESS = 1.03, 4.0
+
+ROUNDED = "sensor_quantization"
 
 # Effects whose error has many valleys over long windows: short ones first.
-_CURVED = frozenset({"stribeck", "stiction", "bristle", "backlash", "compliance", "position_ripple"})
+_CURVED = frozenset(
+    {"stribeck", "stiction", "bristle", "backlash", "compliance", "position_ripple", "hard_stop"}
+)
 
 
 class Study:
@@ -107,8 +116,14 @@ class Study:
         shortest, middle, longest = self.levels
         found = _promising(found)
         fits = [middle.moved(t.train) for t in (self.base, *found)]
-        stages = [[shortest.moved(f) for f in fits], fits, [longest.moved(f) for f in fits]]
-        at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
+        short = [shortest.moved(f) for f in fits]
+        # Over short windows nearly every model follows the data: how far a fit can come at best.
+        floor, least = _FLOOR * min(f.rmse for f in short), min(f.rmse for f in fits)
+        fits = [hopped(f, middle.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
+        stages = [short, fits, [longest.moved(f) for f in fits]]
+        # An error of whole steps of the sensor is averaged out by long windows, and followed by short ones.
+        rounds = bool(found) and found[0].key == ROUNDED
+        at = 2 if rounds else _longest_coherent([[f.rmse for f in stage] for stage in stages])
         self.data = self.levels[at]
         fine = self.data.fine
         best = [
@@ -117,17 +132,55 @@ class Study:
         ]
         self.base = best[0]
         chosen, _ = ranked(self.base, best[1:])
-        # Near equals are told apart by fits that have come to an end.
-        close = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
-        if len(close) > 1:
-            close = [fine.judged(replace(t, train=fine.moved(t.train, 8, 1e-6))) for t in close]
-            chosen = [*close, *chosen[len(close) :]]
+        chosen = self._again(chosen, chosen[:1])
+        # Near equals are told apart by fits that have come to an end, and in the right valley.
+        near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
+        close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
+        ended = [self._ended(t, t in near and len(near) > 1, floor) for t in close]
+        if any(a is not b for a, b in zip(ended, close, strict=True)):
+            chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
         chosen, self.noise = ranked(self.base, chosen)
         return chosen
+
+    def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
+        """Return a candidate fitted to the end: exactly, and in the best valley unless nothing better is possible."""
+        fine, fit = self.data.fine, tried.train
+        if exactly:
+            fit = fine.moved(fit, 8, 1e-6)
+        if rough(fit):
+            fit = hopped(fit, fine.fit) if fit.rmse > floor else centred(fit, fine.fit)
+        return tried if fit is tried.train else fine.judged(replace(tried, train=fit))
+
+    def _again(self, chosen, those) -> list[Trial]:
+        """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
+        fine = self.data.fine
+        begun = [_begun_at(t, best, fine) for best in those for t in chosen if t is not best]
+        judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
+        return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise."""
         return indistinguishable(a.outputs, b.outputs, self.noise)
+
+
+def _begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
+    """Fit a candidate again from where the best one ended: it may be that one's limit (stiction, a narrow Stribeck bump).
+
+    The cost of stick and slip is rough: of two fits of one law each may end in its own valley.
+    """
+    table, mine, its = tried.block.parameters, list(tried.block._keys)[-1], list(best.block._keys)[-1]
+    values = {}
+    for name, p in best.block.parameters.items():
+        name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
+        if name in table and table[name].unit == p.unit:
+            values[name] = p.value
+    alike = tried.block.effects[-1].role == best.block.effects[-1].role
+    if not alike or not any(name.startswith(f"{mine}.") for name in values):
+        return None
+    block = tried.block.with_parameters(feasible(tried.block, values))
+    near = data.fit(block, (), starts=best.train.starts, iterations=4)
+    fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
+    return data.judged(replace(tried, train=centred(fitted, data.fit)))
 
 
 def _periodic_enough(tried: Trial, span) -> bool:
@@ -164,16 +217,14 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
 
     Residuals are whitened by the noise model of the best one's.
     """
-    best = min([base, *trials], key=lambda t: t.size)
+    best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
     noise = whitener(best.residuals)
-    (fitted, n), (held, n_held) = _powers(base, noise)
+    before = _powers(base, noise)
     judged = []
     for t in trials:
+        gain, gain_held = _rounded_gains(base, t) if t.key == ROUNDED else _gains(before, _powers(t, noise))
         # nothing was fitted to the windows to be judged by but their starts: their gain also stands alone
-        (fitted_t, _), (held_t, _) = _powers(t, noise)
-        gain_held = 0.5 * n_held * math.log(held / held_t) if n_held else 0.0
-        gain = 0.5 * (n + n_held) * math.log((fitted + held) / (fitted_t + held_t))
-        price = 0.5 * t.extra * math.log(n + n_held)
+        price = 0.5 * t.extra * math.log(sum(n for _, n in before))
         judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
     return sorted(judged, key=lambda t: -t.evidence), noise
 
@@ -182,6 +233,29 @@ def _powers(tried: Trial, noise: NoiseModel):
     """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
     held = tried.held.residual if tried.held is not None else []
     return whitened_power(tried.train.residual, noise), whitened_power(held, noise)
+
+
+def _gains(before, after) -> tuple[float, float]:
+    """Return the log likelihood ratio of all windows, and of those to be judged by."""
+    (fitted, n), (held, n_held) = before
+    (fitted_t, _), (held_t, _) = after
+    gain_held = 0.5 * n_held * math.log(held / held_t) if n_held else 0.0
+    return 0.5 * (n + n_held) * math.log((fitted + held) / (fitted_t + held_t)), gain_held
+
+
+def _rounded_gains(base: Trial, tried: Trial) -> tuple[float, float]:
+    """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
+    step = tried.block.effects[-1].step
+    noise = whitener(base.residuals)
+    gains = []
+    for fit, power in zip((base.train, base.held), _powers(base, noise), strict=True):
+        if fit is None:
+            gains.append(0.0)
+            continue
+        plain = -0.5 * power[1] * math.log(2 * math.pi * math.e * power[0] / power[1])
+        measured = [a + b for a, b in zip(fit.simulated, fit.residual, strict=True)]
+        gains.append(rounding_evidence(measured, fit.simulated, step) - plain)
+    return sum(gains), gains[1]
 
 
 def _try(job) -> Trial | None:
@@ -216,7 +290,7 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
         for n, p in start.effect.parameters.items()
         if p.free and f"{key}.{n}" in block.parameters
     ]
-    rough = "sensor_quantization" in key
+    rough = ROUNDED in key
     names = (*free, *(() if rough else own))
     if start.effect.id in _CURVED:
         # a joint changes everything at once: its valley is long and bent

@@ -10,8 +10,9 @@ import numpy as np
 from ..df.family import Family
 from .balance import Balance, balance, responder
 from .bound import mees_bergen
+from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros
-from .grade import UNRELIABLE, LimitCycle, band, graded, loeb, sensitivity
+from .grade import UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
 from .scan_grid import FAST, grid_slope, noisy
 
 SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can be computed
@@ -20,34 +21,39 @@ SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can b
 # 0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79).
 MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
 FLOOR = 1e-3  # least half width of a band
+VAGUE = 0.3  # |1 + N H| beyond which an average over irregular motion places no crossing, however it spreads
 
 
 class Assessor:
     """Turns crossings into limit cycles with everything they say about themselves."""
 
-    def __init__(self, method, linear, F, D, grid, scan: Scan, family: Family, orders):
+    def __init__(self, method, linear, F, D, grid, scan: Scan, family: Family, orders, branched=()):
         self.method, self.linear, self.F, self.D, self.scan = method, linear, F, D, scan
         self.log_a, self.log_w = grid
         self.family = family
         self.orders = orders
         self.answer = responder(F, method)
+        self.branched: tuple[BranchCrossing, ...] = tuple(branched)
+        named = [b.crossing for b in self.branched if b.named]
+        self.named = [*self.scan.crossings, *named]  # on the motion that the describing function names
 
     def cycles(self) -> list[LimitCycle]:
-        """All cycles of the scan, by rising amplitude."""
+        """All cycles of the scan and of the branches, by rising amplitude."""
         found = [self._cycle(c) for c in self.scan.crossings] + self._irregular()
+        found += [self._on_branch(b) for b in self.branched]
         return sorted(without_doubles(found), key=lambda c: (c.amplitude, c.omega))
 
     def _irregular(self) -> list[LimitCycle]:
         """Crossings among averages over irregular motion: the interpolant's zeros, one a neighbourhood."""
         irregular = noisy(self.family.regime, self.family.residual)
-        if self.method.name in FAST or not irregular.any():
+        if self.method.name in FAST or not irregular.any() or min(irregular.shape) < 2:
             return []
         log_a, log_w = np.log(self.family.amplitudes), np.log(self.family.omega)
         with np.errstate(all="ignore"):
             values = 1 + self.family.N * self.linear(self.family.omega)
         cells = irregular[:-1, :-1] | irregular[1:, :-1] | irregular[:-1, 1:] | irregular[1:, 1:]
         reach = 3 * np.array([np.diff(log_a).max(), np.diff(log_w).max()])
-        known = [np.log([c.amplitude, c.omega]) for c in self.scan.crossings]
+        known = [np.log([c.amplitude, c.omega]) for c in self.named]
         found = []
         for place in linear_zeros(log_a, log_w, values, cells):
             if any((np.abs(place - other) < reach).all() for other in known):
@@ -56,7 +62,7 @@ class Assessor:
             w = np.exp(place[1:])
             y, regime, spread = self.method.harmonics(np.exp(place[:1]), w, 1)
             residual = float(abs(1 + y[0, 0, 1] * self.linear(w)[0]))
-            if not noisy(regime, spread)[0, 0] or not residual <= max(0.05, 3 * spread[0, 0]):
+            if not noisy(regime, spread)[0, 0] or not residual <= min(max(0.05, 3 * spread[0, 0]), VAGUE):
                 continue  # a jump between coexisting motions, not a crossing
             note = (
                 2,
@@ -66,11 +72,46 @@ class Assessor:
             found.append(self._cycle(Crossing(float(np.exp(place[0])), float(w[0]), residual, J), [note]))
         return found
 
-    def _cycle(self, crossing: Crossing, notes=()) -> LimitCycle:
+    def _on_branch(self, found: BranchCrossing) -> LimitCycle:
+        """Turn a solution on a branch into a cycle that says which motion it stands on."""
+        a, w = found.crossing.amplitude, found.crossing.omega
+        y = found.branch.motions(np.array([found.s]), np.array([w]), self.orders).harmonics[0]
+        regime = found.branch.regime
+        rivals = " and ".join(f"the {name}" for name in found.rivals)
+        if found.named:
+            notes = []
+            if rivals:
+                notes = [(1, f"under the same force {rivals} attracts too: N jumps from one to the other")]
+            cycle = self._cycle(found.crossing, notes, (y, regime), self.named)
+            return replace(cycle, forced_multiplier=found.multiplier)
+        if found.attracts:
+            note = (
+                1,
+                f"it stands on the {found.branch.name}, which attracts under this force beside the motion "
+                f"that the describing function names (|1 + N H| there: {found.defect:.2g}); the start "
+                f"decides which one comes",
+            )
+        else:
+            note = (
+                2,
+                f"it stands on the {found.branch.name}, which is unstable under this force alone (multiplier "
+                f"{found.multiplier:.3g} a period): the block leaves it for a motion whose |1 + N H| is "
+                f"{found.defect:.2g}, so that no cycle stays here",
+            )
+        own = [b.crossing for b in self.branched if b.branch is found.branch]
+        cycle = self._cycle(found.crossing, [note], (y, regime), own, found.attracts)
+        state = found.branch.state
+        return replace(
+            cycle,
+            branch=found.branch.name,
+            forced_multiplier=found.multiplier,
+            motion=None if state is None else ForcedMotion(state(found.s, w), y * a),
+        )
+
+    def _cycle(self, crossing: Crossing, notes=(), motion=None, beside=None, attracts=True) -> LimitCycle:
+        """Assess a crossing; `motion` (harmonics, regime) where it is not the one of the method."""
         a, w = crossing.amplitude, crossing.omega
-        omega = np.array([w]) if self.method.needs_omega else None
-        y, regime, _ = self.method.harmonics(np.array([a]), omega, self.orders)
-        y, regime = y[0, 0], str(regime[0, 0])
+        y, regime = self._named_motion(a, w) if motion is None else motion
         notes = list(notes)
         distortion, beyond = self._distortion(y, w)
         if beyond:
@@ -78,12 +119,13 @@ class Assessor:
                 (1, f"H is not measured at {beyond} and above: its last value stood in for the harmonics")
             )
         sense = sensitivity(crossing.jacobian)
-        spread, found, remark = self._spread(crossing, distortion, sense, regime)
+        # only the motion that the method names can be asked how it answers returned harmonics
+        spread, found, remark = self._spread(crossing, distortion, sense, regime, motion is None)
         notes += remark
-        stable = loeb(crossing.jacobian)
+        stable = loeb(crossing.jacobian) if attracts else False
         if self.method.name == "memory":
             notes.append((1, "the block keeps its own memory and could only be sampled"))
-        if self._neighbour(crossing):
+        if self._neighbour(crossing, self.named if beside is None else beside):
             notes.append((1, "another solution lies close by, where the curves nearly touch"))
         bound, remark = mees_bergen(self.method, self.linear, crossing, self.scan.crossings)
         notes.append((0, remark))
@@ -108,6 +150,11 @@ class Assessor:
             bound=bound,
         )
 
+    def _named_motion(self, a, w):
+        omega = np.array([w]) if self.method.needs_omega else None
+        y, regime, _ = self.method.harmonics(np.array([a]), omega, self.orders)
+        return y[0, 0], str(regime[0, 0])
+
     def _distortion(self, y, w):
         """Sum over k >= 2 of |Y_k H(jk omega)| / a, and from which frequency on H had to be guessed."""
         k = np.arange(2, y.size)
@@ -117,13 +164,13 @@ class Assessor:
         guessed = outside & (size > 1e-6)
         return float(size.sum()), f"{k[guessed][0] * w:.3g} rad/s" if guessed.any() else ""
 
-    def _spread(self, crossing, distortion, sense, regime):
+    def _spread(self, crossing, distortion, sense, regime, named):
         """Logarithmic half widths of the bands, the corrected solution where there is one, and notes."""
         a, w = crossing.amplitude, crossing.omega
         c1, c2 = DYNAMIC_ERROR if self.method.name in ("friction", "backlash", "orbit") else MEMORYLESS_ERROR
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
-        if self.answer is None or regime in ("aperiodic", "subharmonic"):
+        if self.answer is None or not named or regime in ("aperiodic", "subharmonic"):
             return spread, Balance(None), []
         respond, count = self.answer
         found = balance(respond, count, self.linear, a, w, crossing.jacobian)
@@ -136,10 +183,10 @@ class Assessor:
         shift = abs(math.log(found.solution[0] / a)), abs(math.log(found.solution[1] / w))
         return tuple(SAFETY * s + FLOOR for s in shift), found, []
 
-    def _neighbour(self, crossing) -> bool:
+    def _neighbour(self, crossing, others) -> bool:
         step_a = np.diff(self.log_a).max(initial=0)
         step_w = np.diff(self.log_w).max(initial=0)
-        for other in self.scan.crossings:
+        for other in others:
             if other is crossing:
                 continue
             near_a = abs(math.log(other.amplitude / crossing.amplitude)) < 3 * step_a

@@ -109,7 +109,8 @@ class OrbitFinder:
         if wanted is None and self.parts is not None:
             gain = abs(complex(describing_function(self.parts.block, amplitude, omega)))
             wanted = gain * amplitude if np.isfinite(gain) else None
-        start = harmonic_start(self.loop, amplitude, omega, wanted)
+        motion = getattr(guess, "motion", None)
+        start = harmonic_start(self.loop, amplitude, omega, wanted, motion)
         if self.by_simulation:
             return self._from_simulation(start)
         orbit = self._from_state(start, 2 * np.pi / omega)
@@ -203,7 +204,16 @@ class OrbitFinder:
             return None
         if status is not Status.CONVERGED and best > 1e-7:
             return None
+        lap, period = self._single(start, period, lap, size, beside)
         return self._finished(start, period, lap, size, Status.CONVERGED if best < 1e-7 else status)
+
+    def _single(self, start, period, lap, size, beside):
+        """Return the lap and period of an orbit that may have been closed after going round several times."""
+        for parts in (4, 3, 2):
+            short = self.tracer.lap(start, period / parts, differentiate=False)
+            if short.status.ok and np.max(np.abs(beside @ ((short.end.x - start.x) / size))) < 1e-7:
+                return self.tracer.lap(start, period / parts, size=size), period / parts
+        return lap, period
 
     def _free_state(self, x0, period) -> tuple[Any, Any]:
         """Move along the orbit to the middle of its longest stretch free of sticking and contact."""

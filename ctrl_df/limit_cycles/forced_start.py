@@ -14,7 +14,7 @@ from ..simulate.sampled import Sampled
 _PERIODS = 40  # of forced motion before it is measured
 
 
-def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None) -> np.ndarray:
+def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, motion=None) -> np.ndarray:
     """State of a loop at t = 0 when its block is driven by ``amplitude cos(omega t)``.
 
     Parameters
@@ -27,6 +27,8 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None) ->
         [rad/s].
     output_amplitude : float, optional
         Of several coexisting motions the one nearest to it is taken; default the largest.
+    motion : ForcedMotion, optional
+        The block's motion, where it is known; no simulation would find one that repels.
 
     Raises
     ------
@@ -39,7 +41,7 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None) ->
             "give a state instead, or no guess."
         )
     U = np.array([0.0, amplitude], complex) if np.ndim(amplitude) == 0 else np.asarray(amplitude, complex)
-    x_block, Y = _forced_motion(loop, U, omega, output_amplitude)
+    x_block, Y = motion if motion is not None else _forced_motion(loop, U, omega, output_amplitude)
     controller = loop.syslist[0]
     nc = controller.nstates or 0
     x_control = np.zeros(nc)

@@ -26,9 +26,19 @@ class Sensitivity(NamedTuple):
     omega: float
 
 
+class ForcedMotion(NamedTuple):
+    """Motion of the block under ``a cos(omega t)``: its state at t = 0, and Y_k of the output from k = 0."""
+
+    state: np.ndarray
+    harmonics: np.ndarray
+
+
 @dataclass(frozen=True)
 class LimitCycle:
     """One solution of 1 + N(a, omega) H(j omega) = 0, and how far to trust it.
+
+    N is the describing function or, where `branch` names a motion, that of this motion: under the same force
+    a block may have several, and each may balance the loop.
 
     Attributes
     ----------
@@ -40,8 +50,8 @@ class LimitCycle:
         [rad/s].
     stable : bool or None
         Loeb's criterion: whether a slightly larger oscillation decays. A quasi-static heuristic, not a
-        proof; None where the curves are nearly tangent. The exact verdict is the Floquet multipliers of the
-        orbit.
+        proof; None where the curves are nearly tangent. False also where the block leaves the motion of
+        `branch` under the force alone. The exact verdict is the Floquet multipliers of the orbit.
     residual : float
         |1 + N H| that remains.
     sensitivity : Sensitivity
@@ -62,6 +72,13 @@ class LimitCycle:
         (amplitude, omega) with the fed-back harmonics taken into account, for memoryless blocks.
     bound : tuple or None
         ((a low, a high), (omega low, omega high)) proven after Mees & Bergen, where the theorem applies.
+    branch : str
+        Empty where N is the describing function; else the motion of the block it stands for, one that the
+        describing function does not name there (it repels, or another one attracts beside it).
+    forced_multiplier : float
+        Of a motion known as a branch: its largest multiplier over a period of the force, alone; NaN else.
+    motion : ForcedMotion or None
+        That motion, where `branch` names one and it is known.
     """
 
     amplitude: float
@@ -79,6 +96,9 @@ class LimitCycle:
     corrected: tuple[float, float] | None = None
     waveform: np.ndarray | None = field(default=None, repr=False, compare=False)
     bound: tuple[tuple[float, float], tuple[float, float]] | None = None
+    branch: str = ""
+    forced_multiplier: float = math.nan
+    motion: ForcedMotion | None = field(default=None, repr=False, compare=False)
 
     @property
     def period(self) -> float:

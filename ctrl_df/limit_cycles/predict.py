@@ -14,6 +14,7 @@ from ..df.family import Family, minus_inverse
 from ..df.work import progress_bar
 from ..drawing import draw
 from .assess import Assessor
+from .branches import branch_crossings
 from .crossings import Scan, find_crossings
 from .grade import LimitCycle
 from .linear import LinearPart
@@ -30,7 +31,9 @@ class DescribingFunctionResponse(_PythonControlResponse):
     Attributes
     ----------
     limit_cycles : list of LimitCycle
-        All solutions in the box, by rising amplitude; empty if there is none.
+        All solutions in the box, by rising amplitude; empty if there is none. Those on a known motion that N
+        does not name (unstable under the force alone, or attracting beside another one) have it in
+        ``.branch``.
     status : str
         What was scanned and what was left out.
     family : Family
@@ -171,8 +174,8 @@ def describing_function_response(
     with progress_bar(None, progress, "refining crossings", "point") as bar:
         D = defect(method, linear, bar)
         scan = find_crossings(D, log_a, log_w, values, refine)
-    assessor = Assessor(method, linear, F, D, (log_a, log_w), scan, family, orders)
-    cycles = assessor.cycles()
+        branched = branch_crossings(method, linear, family, (log_a, log_w), values, scan.crossings, refine)
+    cycles = Assessor(method, linear, F, D, (log_a, log_w), scan, family, orders, branched).cycles()
     return DescribingFunctionResponse(
         nyquist,
         N_vals,
@@ -207,6 +210,10 @@ def _status(scan: Scan, cycles, A, w, zeros) -> str:
         return f"nothing scanned: {box} spans no area; give at least two amplitudes and two frequencies"
     number = {0: "no solution", 1: "1 solution"}.get(len(cycles), f"{len(cycles)} solutions")
     parts = [f"scanned {box} ({scan.cells} cells): {number}"]
+    for name in dict.fromkeys(c.branch for c in cycles if c.branch):
+        mine = [c for c in cycles if c.branch == name]
+        how = "unstable under the force alone" if mine[0].forced_multiplier >= 1 else "not the one N names"
+        parts.append(f"{len(mine)} of them on the {name}, {how}")
     if zeros:
         parts.append("zero amplitudes and frequencies were left out: no cycle can be there")
     if scan.missing:

@@ -20,6 +20,7 @@ def defect(method: Method, linear: LinearPart, bar=None):
 
     `bar`, a progress bar, counts the points asked.
     """
+    method = method.brief()
 
     def D(p, q):
         a, w = np.exp(p), np.exp(q)

@@ -18,6 +18,8 @@ NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "
 
 DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simulation judges."
 
+_UNHELD = "Newton from the motion it stands on closes no orbit near"
+
 # Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle,
 # shifted.
 CONFIRMED_WITHIN = 0.05
@@ -40,7 +42,8 @@ class Row:
     verdict : str
         ``confirmed``, ``shifted``, ``no such orbit``, ``missed by the describing function``, ``not tested``.
     why : str
-        What the verdict rests on where there is no exact orbit to rest on.
+        What the verdict rests on where there is no exact orbit to rest on: of a prediction on a further
+        motion of the block (``predicted.branch``) the search from that motion.
     motion : Orbit or None
         Where the simulation alone judges (a pure delay): the motion it settles to, averaged over its swings.
     """
@@ -218,7 +221,7 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     for cycle in cycles:
         match = partner.get(id(cycle))
         if match is None:
-            rows.append(Row(cycle, None, None, NONE))
+            rows.append(Row(cycle, None, None, NONE, _UNHELD if cycle.branch else ""))
         else:
             rows.append(Row(cycle, match, simulated(finder, match), _verdict(cycle, match)))
     paired = {id(orbit) for orbit in partner.values()}

@@ -46,7 +46,8 @@ def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **k
     second form runs `describing_function_response`. A memoryless block has one -1/N curve, drawn over
     python-control's Nyquist plot. A block with dynamics has a family: solid at constant amplitude, dashed at
     constant frequency; H is then drawn over the frequencies scanned (continuous Nyquist contours clip and
-    shift what an improper H has to show).
+    shift what an improper H has to show). Crossings are dots, filled where the cycle is predicted stable; an
+    open diamond is a solution on a motion of the block that N does not name, see `LimitCycle.branch`.
 
     Parameters
     ----------
@@ -159,7 +160,10 @@ def _name_curve(ax, curve, name):
 
 
 def _mark(ax, response, point_label):
-    """Mark the crossings: filled where Loeb calls the cycle stable, open otherwise."""
+    """Mark the crossings: filled where Loeb calls the cycle stable, open otherwise.
+
+    Open diamonds stand on a motion that N does not name; the curves drawn do not pass through them.
+    """
     force = units(response.family)[0]
     if force and point_label == _POINT_LABEL:
         point_label = f"%.4g{force} @ %.4g rad/s"
@@ -168,25 +172,35 @@ def _mark(ax, response, point_label):
         ((p.real - left) / (right - left), (p.imag - bottom) / (top - bottom)) for p in response.positions
     ]
     for (x, y), position, cycle in zip(places, response.positions, response.limit_cycles, strict=True):
-        fill = CROSSING_COLOR if cycle.stable else "white"
-        ax.plot(position.real, position.imag, "o", ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
+        fill = CROSSING_COLOR if cycle.stable and not cycle.branch else "white"
+        shape = "D" if cycle.branch else "o"
+        ax.plot(position.real, position.imag, shape, ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
         if not point_label:
             continue
         # of two that lie together the lower one's label goes below
         shift = -16 if any(abs(x - u) < 0.25 and 0 < v - y < 0.1 for u, v in places) else 6
+        below = cycle.branch != "" and shift < 0  # two lines hang from the crossing
         aside = (-8, "right") if x > 0.72 else (8, "left")
         ax.annotate(
-            (point_label % (cycle.amplitude, cycle.omega)).strip(),
+            (point_label % (cycle.amplitude, cycle.omega)).strip() + _standing(cycle),
             (position.real, position.imag),
-            xytext=(aside[0], shift),
+            xytext=(aside[0], 2 if below else shift),
             textcoords="offset points",
             ha=aside[1],
+            va="top" if below else "baseline",
             color=CROSSING_COLOR,
             fontsize=10,
-            fontweight="bold",
+            fontweight="normal" if cycle.branch else "bold",
             bbox=dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85),
             zorder=7,
         )
+
+
+def _standing(cycle) -> str:
+    """Say beside a crossing that it stands on a motion which N does not name."""
+    if not cycle.branch:
+        return ""
+    return "\n(unstable motion)" if cycle.forced_multiplier >= 1 else "\n(coexisting motion)"
 
 
 def _keep_in_view(ax, positions):

@@ -1,0 +1,116 @@
+"""Initial states of a window: what the data say of them, corrected by what a fit finds, and back.
+
+Position and speed of the body that is measured are estimated from the record; the corrections of these, and all
+that is hidden (where the other body stands in a gap, how far a joint or the bristles are bent), are nuisance
+parameters of each window.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..blocks.core import ELASTIC, IMPACT, level
+
+
+def names(core) -> tuple[str, ...]:
+    """Return the names of the initial states of a mechanism, in the order of the corrections."""
+    found = ["x", "v"]
+    if core.joint == IMPACT:
+        found += ["slack", "slack_rate"]
+    elif core.joint == ELASTIC:
+        found += ["stretch", "stretch_rate"]
+    if core.bristle is not None:
+        found.append("bristle")
+    return tuple(found)
+
+
+def reach(core, known, windows) -> np.ndarray:
+    """Return how far each initial state may be from its estimate, (nw, number of states).
+
+    `known`: `windows.facts` of the record.
+    """
+    if core is None:
+        return np.zeros((len(windows), 0))
+    one = np.ones(len(windows))
+    table = {
+        "x": 5 * windows.x_error + 0.02 * known.spread,
+        "v": 2 * windows.v_error + 0.01 * known.speed,
+        "slack": one,
+        "slack_rate": 0.7 * known.speed * one,
+        "bristle": 0.5 * one,
+    }
+    if core.joint == ELASTIC:
+        bend = known.force / max(core.stiffness, 1e-300)
+        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
+        table["stretch"] = 0.3 * bend * one
+        table["stretch_rate"] = 0.3 * bend * math.sqrt(core.stiffness / mass) * one
+    return np.column_stack([table[name] for name in names(core)])
+
+
+def fill(states, core, given: Mapping[str, float], usual, speed: float) -> None:
+    """Write the states of a mechanism: `usual` is position, speed and acceleration of the body measured.
+
+    `given` holds corrections by name; `speed` [m/s] is typical of the record.
+    """
+    x, v, a = (float(s) for s in usual)
+    x, v = x + given.get("x", 0.0), v + given.get("v", 0.0)
+    if core.stop is not None:
+        low, high = core.stop.span
+        x = min(max(x, low), high)
+    stretch, rate = _joint(core, a)
+    if core.joint == IMPACT:
+        stretch = min(max(given.get("slack", stretch / core.gap), 0.0), 1.0) * core.gap
+        rate = given.get("slack_rate", 0.0)
+    elif core.joint == ELASTIC:
+        stretch, rate = stretch + given.get("stretch", 0.0), given.get("stretch_rate", 0.0)
+    if core.bodies == 2 and core.measured == 1:
+        states[2], states[3] = x, v
+        states[0], states[1] = x - stretch, v - rate
+    else:
+        states[0], states[1] = x, v
+        if core.bodies == 2:
+            states[2], states[3] = x + stretch, v + rate
+    if core.bodies == 2 and core.stop is not None:
+        low, high = core.stop.span
+        beyond = min(max(states[2], low), high) - states[2]
+        states[2] += beyond
+        states[0] += beyond
+    if core.bristle is not None:
+        slip, full = _bristles(states, core)
+        share = math.tanh(3 * slip / speed) + given.get("bristle", 0.0)
+        states[core.bristle_state] = min(max(share, -1.0), 1.0) * full
+
+
+def corrections(states, core, usual, speed: float) -> dict[str, float]:
+    """Return the corrections by name that `fill` makes these states of."""
+    x, v, a = (float(s) for s in usual)
+    at = 2 if core.bodies == 2 and core.measured == 1 else 0
+    found = {"x": states[at] - x, "v": states[at + 1] - v}
+    if core.bodies == 2:
+        stretch, rate = states[2] - states[0], states[3] - states[1]
+        found |= {"slack": stretch / core.gap if core.gap else 0.0, "slack_rate": rate}
+        found |= {"stretch": stretch - _joint(core, a)[0], "stretch_rate": rate}
+    if core.bristle is not None:
+        slip, full = _bristles(states, core)
+        found["bristle"] = states[core.bristle_state] / full - math.tanh(3 * slip / speed)
+    return found
+
+
+def _joint(core, acceleration) -> tuple[float, float]:
+    """Return how far a joint is bent by the load that it accelerates, and at what rate."""
+    if core.joint == IMPACT:
+        return (core.gap if acceleration > 0 else 0.0), 0.0
+    if core.joint == ELASTIC:
+        pull = core.masses[0] * acceleration
+        return pull / core.stiffness + (core.gap if pull > 0 else 0.0), 0.0
+    return 0.0, 0.0
+
+
+def _bristles(states, core) -> tuple[float, float]:
+    """Return the speed over the bristles, and their full deflection [m]."""
+    slip = float(states[2 * core.driven + 1])
+    full = level(core.friction[core.driven], 1.0, math.copysign(1.0, slip), abs(slip)) + core.bristle.level
+    return slip, full / core.bristle.stiffness
