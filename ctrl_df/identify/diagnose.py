@@ -11,10 +11,11 @@ import numpy as np
 from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.mechanism import Mechanism
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
+from .evidence import ROUNDED
 from .explain import explain, find_regions
 from .lack_of_fit import lacks
 from .records import as_records, has_tables
-from .study import ROUNDED, Study
+from .study import Study
 from .trial import Trial
 from .variables import default_free
 from .windows import facts

@@ -8,10 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
+from .evidence import ranked
 from .ladder import Found, Study, climb, last_diagnosis, outcome
 from .records import as_records, has_tables
 from .study import Study as Fits
-from .study import ranked
 from .trial import Trial
 
 

@@ -17,7 +17,6 @@ import numpy as np
 from ..blocks import effects as library
 from ..blocks.core import level
 from .attach import attach
-from .regression import ripple_turns
 
 if TYPE_CHECKING:
     from .screen import Screen
@@ -158,13 +157,10 @@ def _quantization(screen):
 
 
 def _ripple(screen):
-    """Try wavelengths over the stroke: sine and cosine are two small changes, fitted together."""
+    """Try long waves: sine and cosine are two small changes, fitted together (`WaveSearch` finds the short ones)."""
     s = screen.scales
     span = float(np.ptp(screen.motion.x))
-    # as many turns as pass slowly enough to be sampled five times each
-    most = min(0.2 * span / (s.speed * screen.motion.dt * screen.data.thin), 90.0)
-    turns = [*np.geomspace(0.6, 6.0, 20), *np.arange(6.5, most, 0.5)]
-    turns += ripple_turns(screen.full_motion, s)
+    turns = np.geomspace(0.6, 6.0, 20)
     amplitude = 0.01 * s.force
     total = float(screen.residual @ screen.residual)
     scored = []

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..blocks import effects as library
 from ..blocks.effect import Effect
+from .ripple_search import WaveSearch
 from .trial import Scales
 from .windows import facts
 
@@ -76,25 +77,19 @@ def _stribeck(screen, names):
 
 
 def _ripple(screen, names):
-    s, m = screen.scales, screen.full_motion
-    span = float(np.ptp(m.x))
-    scored = []
-    for turn in ripple_turns(m, s):
-        for near in turn + np.linspace(-0.6, 0.6, 13):
-            k = 2 * math.pi * max(near, 0.3) / span
-            weights, left = force_regression(m, s, names, [-np.sin(k * m.x), -np.cos(k * m.x)])
-            scored.append((left, k, weights))
-    scored.sort(key=lambda x: x[0])
-    chosen: list[float] = []
-    for _, k, w in scored:
-        values = _values(w, names, s)
-        if values is None or any(abs(k - other) < 4 * math.pi / span for other in chosen):
-            continue
-        chosen.append(k)
-        effect = library.PositionRipple(math.hypot(w[3], w[4]), 2 * math.pi / k, math.atan2(w[4], w[3]))
+    view, _ = screen.data.whole or (screen.view, None)
+    if not all(r.regular for r in view.records):
+        return
+    ripples = [e for e in screen.block.effects if e.id == "position_ripple"]
+    search = WaveSearch(view.records, view.windows, [2 * math.pi / e.wavelength for e in ripples])
+    # where friction wanders the fit over windows knows the mass better than whitened forces do
+    plain = all(e.id in ("coulomb", "viscous", "constant_force") for e in screen.block.effects)
+    plain = plain and not screen.data.forced
+    for wave in search.best(3):
+        weights = (wave.mass, wave.coulomb, wave.viscous)
+        values = (_values(weights, names, screen.scales) if plain else None) or {}
+        effect = library.PositionRipple(wave.amplitude, wave.wavelength, wave.phase)
         yield Start(effect, 0.0, tuple(values.items()))
-        if len(chosen) == 2:
-            return
 
 
 def _values(weights, names, s):
@@ -132,42 +127,3 @@ def force_regression(motion: Motion, scales: Scales, names, extra=()):
     size[size == 0] = 1.0
     weights = np.linalg.lstsq(matrix / size, force, rcond=None)[0] / size
     return weights, float(np.mean((force - matrix @ weights) ** 2))
-
-
-def ripple_turns(m: Motion, scales: Scales, count: int = 5) -> list[float]:
-    """Return the strongest periods of the force residual over position, as turns over the stroke.
-
-    The force that motion demands minus the force given, cleaned of mass, friction and offset by least squares
-    where the mass moves; its spectrum is taken over position, not time.
-    """
-    span = float(np.ptp(m.x))
-    moving = np.abs(m.v) > 0.2 * scales.speed
-    if np.count_nonzero(moving) < 100 or span == 0:
-        return []
-    x, v, u = m.x[moving], m.v[moving], m.u[moving]
-    columns = np.column_stack(
-        [m.a[moving], np.sign(v), v, np.abs(v), np.ones(len(v)), x, x * x, v * np.abs(v)]
-    )
-    columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)
-    w, *_ = np.linalg.lstsq(columns, u, rcond=None)
-    left = u - columns @ w
-    # as fine as the places visited are apart, at most 4000 to the stroke
-    bins = int(min(4000, max(64, span / (2 * float(np.median(np.abs(v))) * m.dt))))
-    at = np.clip(((x - x.min()) / span * bins).astype(int), 0, bins - 1)
-    counts = np.bincount(at, minlength=bins)
-    mean = np.bincount(at, left, minlength=bins) / np.maximum(counts, 1)
-    power = np.abs(np.fft.rfft(mean, 8 * bins)) ** 2
-    turns = np.arange(len(power)) / 8
-    # forces of nature have more power at long waves: what stands out is judged against its neighbours
-    from scipy.ndimage import median_filter
-
-    ratio = power / (median_filter(power, 201, mode="nearest") + 1e-300)
-    ratio[turns < 0.5] = 0.0
-    tops = []
-    for _ in range(count):
-        i = int(np.argmax(ratio))
-        if ratio[i] == 0:
-            break
-        tops.append(float(turns[i]))
-        ratio[max(i - 10, 0) : i + 11] = 0.0
-    return tops

@@ -34,7 +34,6 @@ class Screen:
         self.base, self.data = base, data
         self.view = data.train
         self.motion = motion_of(data.train, data.thin)
-        self.full_motion = motion_of(data.train, 1)
         self.tangent = base.tangent
         self.residual = self.project(base.residual)
         self.simulators = [Simulator(base.model, r, thin=data.thin) for r in self.view.records]

@@ -9,19 +9,17 @@ import numpy as np
 
 from .attach import applicable, attach
 from .equivalence import indistinguishable, whitened_power, whitener
+from .evidence import ROUNDED, ranked
 from .proposals import proposals
 from .regression import Start, force_regression, motion_of
-from .residual_tests import NoiseModel
-from .rounding import rounding_evidence
 from .screen import Screen, starts_for
 from .simulator import feasible
-from .trial import SHORTEST, Data, Trial, prepare
+from .trial import FORCED, Data, Trial, prepare
 from .valleys import centred, hopped, rough
 
 CONFIRMED = 6
 """Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
 
-_LEVELS = (SHORTEST, 4, 1)
 # Best error over windows four times as long that still counts as the same.
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
@@ -29,8 +27,6 @@ _CLOSE = 60.0
 # Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain;
 # error over the best candidate's beyond which it is not worth another try.
 _FLOOR, _HOPELESS = 1.03, 4.0
-
-ROUNDED = "sensor_quantization"
 
 # Effects whose error has many valleys over long windows: short ones first.
 _CURVED = frozenset(
@@ -55,9 +51,16 @@ class Study:
         self.free = free
         data = prepare(block, records, held)
         self.nominal = {k: p.value for k, p in block.parameters.items()}
-        self.levels = [data.level(f) for f in _LEVELS]
-        self.data = self.levels[1]
+        self._look_at(data, 1)
         self.base = self._baseline(block)
+        # friction that wanders drowns all else over longer windows
+        if self.levels[0].moved(self.base.train).rmse > FORCED * data.noise:
+            self._look_at(data.shorter, 0)
+            self.base = self._baseline(self.base.block)
+
+    def _look_at(self, data: Data, which: int):
+        self.levels = data.levels
+        self.data = self.levels[which]
 
     def _baseline(self, block) -> Trial:
         """Fit the baseline from its own values and from a regression of the force on motion; keep the better."""
@@ -81,7 +84,7 @@ class Study:
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
         plain = not found or found[0].train.rmse > 0.97 * base.rmse
-        if plain and longest.moved(base).rmse > _GROWTH * base.rmse:
+        if plain and not self.data.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
             base, found = self._look(classes, executor, longest)
         if found:
@@ -96,8 +99,7 @@ class Study:
         kinds = [c for c in classes if applicable(c, screen.block)]
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
         jobs = [(cls, screen, self.levels[0].sampled, self.free, nominal) for cls in kinds]
-        span = float(np.ptp(screen.motion.x))
-        found = [t for t in run(_try, jobs) if t is not None and _periodic_enough(t, span)]
+        found = [t for t in run(_try, jobs) if t is not None]
         return base, ranked(Trial("", base), found)[0]
 
     def _rebase(self, found):
@@ -113,17 +115,11 @@ class Study:
 
     def confirm(self, found) -> list[Trial]:
         """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
-        shortest, middle, longest = self.levels
         found = _promising(found)
-        fits = [middle.moved(t.train) for t in (self.base, *found)]
-        short = [shortest.moved(f) for f in fits]
-        # Over short windows nearly every model follows the data: how far a fit can come at best.
-        floor, least = _FLOOR * min(f.rmse for f in short), min(f.rmse for f in fits)
-        fits = [hopped(f, middle.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
-        stages = [short, fits, [longest.moved(f) for f in fits]]
+        stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         # An error of whole steps of the sensor is averaged out by long windows, and followed by short ones.
         rounds = bool(found) and found[0].key == ROUNDED
-        at = 2 if rounds else _longest_coherent([[f.rmse for f in stage] for stage in stages])
+        at = len(stages) - 1 if rounds else _longest_coherent([[f.rmse for f in stage] for stage in stages])
         self.data = self.levels[at]
         fine = self.data.fine
         best = [
@@ -132,6 +128,9 @@ class Study:
         ]
         self.base = best[0]
         chosen, _ = ranked(self.base, best[1:])
+        if self.data.forced:
+            chosen, self.noise = self._also_longer(chosen)
+            return chosen
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right valley.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
@@ -141,6 +140,20 @@ class Study:
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
         chosen, self.noise = ranked(self.base, chosen)
         return chosen
+
+    def _stages(self, fits):
+        """Return the fits in windows of every length that may be judged by, the shortest first, and their floor.
+
+        The floor is the error that a fit can come down to at best: over short windows nearly every model follows.
+        """
+        shortest, middle, longest = self.levels
+        if self.data.forced:
+            return [[shortest.moved(f) for f in fits]], 0.0
+        fits = [middle.moved(f) for f in fits]
+        short = [shortest.moved(f) for f in fits]
+        floor, least = _FLOOR * min(f.rmse for f in short), min(f.rmse for f in fits)
+        fits = [hopped(f, middle.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
+        return [short, fits, [longest.moved(f) for f in fits]], floor
 
     def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
         """Return a candidate fitted to the end: exactly, and in the best valley unless nothing better is possible."""
@@ -157,6 +170,19 @@ class Study:
         begun = [_begun_at(t, best, fine) for best in those for t in chosen if t is not best]
         judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
+
+    def _also_longer(self, chosen):
+        """Take the evidence where each shows most: slow effects in long windows, quick ones in short ones."""
+        trials = [self.base, *chosen]
+        _, noise = ranked(self.base, chosen)
+        for longer in (level.fine for level in self.levels[1:]):
+            runs = [longer.judged(replace(t, train=longer.run(t.block))) for t in trials]
+            more = {t.key: t for t in ranked(runs[0], runs[1:])[0]}
+            for i, t in enumerate(chosen):
+                m = more[t.key]
+                if m.evidence > t.evidence:
+                    chosen[i] = replace(t, evidence=m.evidence, evidence_held=m.evidence_held)
+        return sorted(chosen, key=lambda t: -t.evidence), noise
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise."""
@@ -201,61 +227,22 @@ def _longest_coherent(errors) -> int:
 
     `errors`: rms errors per level, short windows first, the baseline's and then the candidates'. Where the best
     grows with the length (motion that is sensitive to its start, force noise in a real machine, an effect
-    outside the library) short windows are clearer, provided that they show what is missing at all.
+    outside the library) short windows are clearer, provided that they show what is missing as well as long ones do.
     """
     base, best = [e[0] for e in errors], [min(e) for e in errors]
     at = 0
     while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:
         at += 1
-    if at + 1 < len(errors) and best[at] > 0.8 * base[at]:
+    if at + 1 < len(errors) and best[at] > 0.8 * base[at] and _left(base, best, at) > _left(base, best, -1):
         return len(errors) - 1
     return at
 
 
-def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
-    """Return the trials with their evidence over the baseline, best first, and the noise by which it was judged.
-
-    Residuals are whitened by the noise model of the best one's.
-    """
-    best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
-    noise = whitener(best.residuals)
-    before = _powers(base, noise)
-    judged = []
-    for t in trials:
-        gain, gain_held = _rounded_gains(base, t) if t.key == ROUNDED else _gains(before, _powers(t, noise))
-        # nothing was fitted to the windows to be judged by but their starts: their gain also stands alone
-        price = 0.5 * t.extra * math.log(sum(n for _, n in before))
-        judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
-    return sorted(judged, key=lambda t: -t.evidence), noise
-
-
-def _powers(tried: Trial, noise: NoiseModel):
-    """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
-    held = tried.held.residual if tried.held is not None else []
-    return whitened_power(tried.train.residual, noise), whitened_power(held, noise)
-
-
-def _gains(before, after) -> tuple[float, float]:
-    """Return the log likelihood ratio of all windows, and of those to be judged by."""
-    (fitted, n), (held, n_held) = before
-    (fitted_t, _), (held_t, _) = after
-    gain_held = 0.5 * n_held * math.log(held / held_t) if n_held else 0.0
-    return 0.5 * (n + n_held) * math.log((fitted + held) / (fitted_t + held_t)), gain_held
-
-
-def _rounded_gains(base: Trial, tried: Trial) -> tuple[float, float]:
-    """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
-    step = tried.block.effects[-1].step
-    noise = whitener(base.residuals)
-    gains = []
-    for fit, power in zip((base.train, base.held), _powers(base, noise), strict=True):
-        if fit is None:
-            gains.append(0.0)
-            continue
-        plain = -0.5 * power[1] * math.log(2 * math.pi * math.e * power[0] / power[1])
-        measured = [a + b for a, b in zip(fit.simulated, fit.residual, strict=True)]
-        gains.append(rounding_evidence(measured, fit.simulated, step) - plain)
-    return sum(gains), gains[1]
+def _left(base, best, at) -> float:
+    """Return the share of the baseline's error beyond noise that the best model leaves; 1 where there is hardly any."""
+    noise = best[0] ** 2
+    there = base[at] ** 2 - noise
+    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > 0.1 * noise else 1.0
 
 
 def _try(job) -> Trial | None:
@@ -271,7 +258,13 @@ def _try(job) -> Trial | None:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user does.
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
-    return min(found, key=lambda t: t.train.rmse) if found else None
+    span = float(np.ptp(screen.motion.x))
+    found = [t for t in found if _periodic_enough(t, span)]
+    if screen.data.forced:
+        # what a few reversals leave would outweigh what goes on all the time
+        noise = whitener(screen.base.residual)
+        return min(found, key=lambda t: whitened_power(t.train.residual, noise)[0], default=None)
+    return min(found, key=lambda t: t.train.rmse, default=None)
 
 
 def _spread(effects, count):

@@ -10,6 +10,7 @@ import numpy as np
 
 from .candidate import Candidate, fit_windows
 from .measurement import Measurement
+from .ripple_phase import rephased
 from .simulator import Simulator
 from .windows import Windows, cut, facts, split
 
@@ -19,11 +20,20 @@ SAMPLES = 2500
 SHORTEST = 16
 """How many times as many the shortest windows are as the longest."""
 
+SHORTER = 4
+"""Still more windows, where forces that no model has (friction that wanders) outweigh the noise of the sensor."""
+
+FORCED = 50.0
+"""Error over the noise, in the shortest windows, that only such forces make."""
+
 FAR = 12.0
 """Factor by which the model's own parameters may be off: beyond it a fit explains with them what they are not."""
 
 LEAST = 50
 """Samples of the shortest window."""
+
+STEPS = 25
+"""Steps of the input in such a window, at least."""
 
 PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
@@ -120,6 +130,7 @@ class Data:
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
+    factors: tuple[int, int, int] = (SHORTEST, 4, 1)  # windows to the longest, of the three lengths looked at
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -127,9 +138,31 @@ class Data:
         return replace(self, train=train.shorter(factor), held=held.shorter(factor), whole=(train, held))
 
     @property
+    def noise(self) -> float:
+        """Noise floor of the records to learn from."""
+        return math.sqrt(float(np.mean([facts(r).noise ** 2 for r in self.train.records])))
+
+    @property
+    def levels(self) -> list[Data]:
+        """The same in windows of three lengths, the shortest first."""
+        return [self.level(f) for f in self.factors]
+
+    @property
+    def forced(self) -> bool:
+        """Whether forces that no model has outweigh the noise of the sensor."""
+        return self.factors[0] > SHORTEST
+
+    @property
+    def shorter(self) -> Data:
+        """The same to be looked at in windows of a quarter, the input in finer steps."""
+        factors = tuple(SHORTER * f for f in self.factors)
+        least = min(int(np.min(w.ends - w.begins)) for w in self.level(factors[0]).train.windows)
+        return replace(self, factors=factors, thin=min(self.thin, max(least // STEPS, 1)))
+
+    @property
     def sampled(self) -> Data:
-        """The same with every second window to learn from: enough for a first look."""
-        return replace(self, train=self.train.every(2))
+        """The same with every second window to learn from, or every fourth of many: enough for a first look."""
+        return replace(self, train=self.train.every(SHORTER if self.forced else 2))
 
     @property
     def fine(self) -> Data:
@@ -157,6 +190,10 @@ class Data:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
         return replace(tried, held=self._ran(tried.block, "held"))
 
+    def run(self, model) -> Candidate:
+        """Run a model over the windows to learn from, from initial states fitted to them."""
+        return self._ran(model, "train")
+
     def errors(self, model) -> tuple[float, float]:
         """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
         ran = {name: self._ran(model, name).rmse for name in ("train", "held")}
@@ -165,7 +202,11 @@ class Data:
     def _ran(self, model, name) -> Candidate:
         """Fit the initial states alone: those of short windows are found without fail, the others begin there too."""
         rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
-        near = rough.fit(model, (), view=getattr(self.level(SHORTEST), name), iterations=4, tolerance=2e-2)
+        short = getattr(self.level(self.factors[0]), name)
+        near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
+        if name == "held" and view.records is not self.train.records:
+            near = rephased(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
+            model = near.model
         near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
         return self.fit(model, (), view=view, starts=near.starts, iterations=1)
 
