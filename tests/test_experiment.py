@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import control as ct
 import numpy as np
 import pytest
 import rig_physics as physics
@@ -11,7 +12,7 @@ import test_frequency as tables
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.experiment import next_experiment
+from ctrl_df.identify.experiment import _fastest_gain, next_experiment
 
 
 def left_open(found):
@@ -97,3 +98,13 @@ def test_tables_ask_for_sines():
     after = diagnose(tables.user_block(), [data, *new], candidates=pair)
     assert after.best.id == "cubic_spring"
     assert after.verdict == "effect"
+
+
+def test_the_noise_a_controller_passes_on():
+    continuous, dt = cdf.pid(100.0, 0.0, 3.0, 0.01), 1e-3
+    s = 1j * np.pi / dt
+    assert _fastest_gain(continuous, dt) == pytest.approx(abs(100 + 3 * s / (1 + 0.01 * s)), rel=1e-9)
+    # a difference quotient over 10 ms, on its own ticks: (1 - 1/z) / 0.01 is 200 at z = -1
+    assert _fastest_gain(ct.tf([1, -1], [0.01, 0], 0.01), dt) == pytest.approx(200.0)
+    assert _fastest_gain(ct.ss([], [], [], [[7.0]], 0.01), dt) == pytest.approx(7.0)
+    assert _fastest_gain(cdf.pid(100.0, 0.0, 3.0), dt) == 0.0

@@ -121,6 +121,42 @@ def test_a_hidden_effect_is_named_from_its_print(name, added):
     assert found.best.effect in found.best.model.effects
 
 
+@functools.cache
+def lower(**added):
+    """Return a table that reaches below breakaway: 0 where nothing moved."""
+    forces = np.geomspace(4.5, 40.0, 6)
+    numbers = physics.numbers(**TRUE, **added)
+    N = np.array([[stepped_sine(numbers, a, w) for w in OMEGA] for a in forces])
+    N[np.abs(N) < 1e-9 * np.abs(N).max()] = 0.0
+    rng = np.random.default_rng(4)
+    scatter = rng.standard_normal(N.shape) + 1j * rng.standard_normal(N.shape)
+    return cdf.FrequencyMeasurement(forces, OMEGA, N * (1 + 0.003 / np.sqrt(2) * scatter))
+
+
+def test_standing_still_is_told_by_zeros():
+    data = lower(STATIC=8.5)
+    assert np.count_nonzero(data.N == 0) == 2 * len(OMEGA)
+    found = diagnose(user_block(), data, candidates=("stiction", "linear_spring", "quadratic_drag"))
+    assert found.best is not None and found.best.id == "stiction"
+    # 8.5 lies between the largest force that moved nothing and the least that did
+    assert data.A[1] < found.best.parameters["level"] < data.A[2]
+    drawn = compare(found.best.model, data).plot()
+    plt.close(drawn.figure)
+
+
+def test_a_gap_is_named_although_one_point_is_of_another_motion():
+    data = table(JOINT=physics.IMPACT, LOAD=4.0, GAP=2e-3, RESTITUTION=0.3)
+    N = np.array(data.N)
+    N[2, 4] *= 1.8 - 0.9j
+    spoilt = cdf.FrequencyMeasurement(A, OMEGA, N)
+    found = diagnose(
+        user_block(), spoilt, candidates=("backlash", "compliance", "quadratic_drag", "input_lag")
+    )
+    assert found.verdict == "effect" and found.best.id == "backlash", found.explanation
+    assert found.best.parameters["gap"] == pytest.approx(2e-3, rel=0.1)
+    assert "of 30 points err" in found.explanation
+
+
 def test_delays_are_one_class():
     found = diagnose(user_block(), table(DELAY=0.012), candidates=FEW)
     assert {found.best.id, *found.best.equivalents} == {"input_delay", "sensor_delay"}

@@ -1,8 +1,9 @@
 """What the measurement flow accepts: loops for blocks, executors, effects of the user's own."""
 
+import importlib
+import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import ClassVar
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,28 +44,13 @@ def test_an_executor_changes_nothing(rig, records, pool):
 
 
 @pytest.fixture
-def magnetic_brake():
-    """Register an effect of the user's own, for one test."""
-
-    @cdf.register_effect
-    @dataclass(frozen=True)
-    class MagneticBrake(cdf.Effect):
-        """Drag ``F = -2 peak (v/vc) / (1 + (v/vc)^2)``."""
-
-        peak: float = cdf.parameter("N", meaning="greatest drag")
-        velocity: float = cdf.parameter("m/s", strict=True, default=0.1, meaning="speed of the greatest drag")
-
-        role: ClassVar[str] = "force"
-        shows: ClassVar[str] = "drag that falls again at high speed"
-        source: ClassVar[str] = "Smythe (1942)"
-
-        @staticmethod
-        def law(t, x, v, z, p, dz):
-            ratio = v / p[1]
-            return -2.0 * p[0] * ratio / (1.0 + ratio * ratio)
-
-    yield MagneticBrake
-    registry._LIBRARY.pop("magnetic_brake")
+def eddy_brake(monkeypatch):
+    """Register the effect of examples/own_effect.py, for one test."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "examples"))
+    monkeypatch.setattr(sys, "argv", ["own_effect.py"])
+    yield importlib.import_module("own_effect").EddyBrake
+    registry._LIBRARY.pop("eddy_brake")
+    del sys.modules["own_effect"]
 
 
 def brake_record(seed, dt=2e-3, n=4000):
@@ -85,15 +71,16 @@ def brake_record(seed, dt=2e-3, n=4000):
     return cdf.Measurement(t, u, x + 1e-3 * np.std(x) * rng.standard_normal(n))
 
 
-def test_an_effect_of_the_users_own_is_found(magnetic_brake):
+def test_an_effect_of_the_users_own_is_found(eddy_brake):
     start = cdf.Mass(2.4, [cdf.Viscous(2.5)])
-    candidates = ("magnetic_brake", "quadratic_drag", "coulomb", "linear_spring")
+    candidates = ("eddy_brake", "quadratic_drag", "coulomb", "linear_spring")
     found = diagnose(start, brake_record(1), holdout=brake_record(2), candidates=candidates)
     assert found.verdict == "effect", found.explanation
-    assert found.best.id == "magnetic_brake"
+    assert found.best.id == "eddy_brake"
     assert found.best.parameters["peak"] == pytest.approx(5.0, rel=0.05)
     assert found.best.parameters["velocity"] == pytest.approx(0.12, rel=0.05)
-    assert "magnetic brake" in found.explanation and "falls again" in found.explanation
+    assert isinstance(found.best.effect, eddy_brake)
+    assert "eddy brake" in found.explanation and "falls again" in found.explanation
 
 
 def test_a_loop_is_accepted_for_its_block():

@@ -210,13 +210,13 @@ class OrbitSolver(OrbitSearch):
             state = self._follow(self._nudged(state), 40)
             orbit = self._periodic(state, orders=orders)
         if self.gap and orbit is not None and not self.kinds & TOUCH and self._given is None:
-            mirrored = self.mirrored
+            mirrored, within = self.mirrored, orbit[0]
             touching, state = self._touching(orders)
             if touching is not None or state is not None:
                 orbit = touching
             else:
-                self.mirrored = mirrored
-                orbit = self._periodic(orbit[0], orders=orders)
+                self.mirrored, state = mirrored, within
+                orbit = self._periodic(within, orders=orders)
         if orbit is None:
             return self._unperiodic(state, orders)
         self.previous = orbit[0]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from .candidate import window_lengths
+from .compared import Compared
 from .derivatives import automatic_cutoff, derivative
 from .measurement import Measurement
+from .records import as_records, has_tables
 from .residual_tests import InputTest, Whiteness, fit_percent, input_residual_test, nrmse, rmse, whiteness
 from .shooting import Problem
 from .simulator import Simulator
@@ -113,29 +113,14 @@ class RecordComparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Compared):
     """Outcome of `compare`: the sum over all records, and each by itself in `records`.
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and
     `where` are those of the record with the largest error.
     """
 
-    model: Any
     records: tuple[RecordComparison, ...]
-
-    def _each(self, name):
-        values = tuple(getattr(r, name) for r in self.records)
-        return values[0] if len(values) == 1 else values
-
-    @property
-    def simulated(self):
-        """Simulated output at the record's samples."""
-        return self._each("simulated")
-
-    @property
-    def residual(self):
-        """Measured minus simulated."""
-        return self._each("residual")
 
     @property
     def rmse(self) -> float:
@@ -152,16 +137,6 @@ class Comparison:
         return math.sqrt(
             error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in self.records)
         )
-
-    @property
-    def fit_percent(self) -> float:
-        """MATLAB's fit, ``100 (1 - nrmse)``."""
-        return 100 * (1 - self.nrmse)
-
-    @property
-    def worst(self) -> RecordComparison:
-        """The record with the largest nrmse."""
-        return max(self.records, key=lambda r: r.nrmse)
 
     @property
     def white(self) -> Whiteness:
@@ -265,9 +240,9 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    from .frequency_compare import compare_frequency, has_tables
-
     if has_tables(data):
+        from .frequency_compare import compare_frequency
+
         return compare_frequency(model, data)  # pyright: ignore[reportReturnType]
     records = as_records(data)
     lengths = window_lengths(
@@ -286,17 +261,3 @@ def comparison_of(model, records, windows: list[Windows], starts, fitted: int = 
         simulated = Simulator(model, record).run(w, None, start, rounded=True)
         rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
     return Comparison(model, tuple(rows))
-
-
-def as_records(data) -> list[Measurement]:
-    """Return the records as a list; TypeError for anything that is none."""
-    records = (
-        [data] if isinstance(data, Measurement) else list(data) if isinstance(data, Iterable) else [data]
-    )
-    bad = [r for r in records if not isinstance(r, Measurement)]
-    if bad or not records:
-        got = type(bad[0]).__name__ if bad else "an empty sequence"
-        raise TypeError(
-            f"compare and refit need a Measurement or several; got {got}. Use ctrl_df.Measurement(t, u, y)."
-        )
-    return records

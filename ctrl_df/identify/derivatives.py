@@ -95,7 +95,8 @@ def thinned(y: np.ndarray, factor: int) -> np.ndarray:
     """Return every `factor`-th sample after a zero-phase low-pass at 70 % of the new Nyquist frequency."""
     from scipy.signal import cheby1, sosfiltfilt
 
-    # Flat within 1e-4 (odd order: exact at 0 Hz), 49 dB down at the new Nyquist frequency, both ways together.
+    # Flat within 1e-4 (odd order: exact at 0 Hz), 49 dB down at the new Nyquist frequency, both ways
+    # together.
     sos = cheby1(9, 5e-4, 0.7 / factor, output="sos")
     pad = min(len(y) - 1, 40 * factor)
     return sosfiltfilt(sos, y, padtype="odd", padlen=pad)[::factor]

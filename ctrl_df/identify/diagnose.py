@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagno
 from .evidence import ROUNDED
 from .explain import explain, find_regions
 from .lack_of_fit import lacks
-from .measurement import Measurement
+from .records import as_records, has_tables
 from .study import Study
 from .trial import Trial
 from .variables import default_free
@@ -69,8 +68,6 @@ def diagnose(
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     began = time.perf_counter()
-    from .frequency_compare import has_tables
-
     if has_tables(data):
         from .frequency_diagnosis import diagnose_frequency
 
@@ -86,20 +83,6 @@ def diagnose(
     return verdict_of(study, found, began, limits)
 
 
-def as_records(data, name) -> tuple:
-    """Return records as a tuple; TypeError for anything else."""
-    from .frequency_measurement import FrequencyMeasurement
-
-    kinds = (Measurement, FrequencyMeasurement)
-    records = (data,) if isinstance(data, kinds) else data
-    if not isinstance(records, Sequence) or not records or not all(isinstance(r, kinds) for r in records):
-        raise TypeError(
-            f"{name} must be a Measurement or a sequence of them; got {data!r}. "
-            "Wrap arrays: ctrl_df.Measurement(t, u, y)."
-        )
-    return tuple(records)
-
-
 def block_of(model) -> Mechanism:
     """Return the mechanism of a block or of a closed loop."""
     if isinstance(model, Mechanism):
@@ -108,7 +91,8 @@ def block_of(model) -> Mechanism:
     if isinstance(part, Mechanism):
         return part
     raise TypeError(
-        f"diagnose needs a block made of an inertia and effects, or a closed_loop of one; got {type(model).__name__}. "
+        "diagnose needs a block made of an inertia and effects, or a closed_loop of one; got "
+        f"{type(model).__name__}. "
         "Effects can only be added to ctrl_df.Mass and ctrl_df.TwoMass."
     )
 
@@ -139,7 +123,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     chosen = study.confirm(found)
     base = study.base
     best = chosen[0] if chosen else base
-    # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not rounded.
+    # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not
+    # rounded.
     rounds = best.key == ROUNDED
     missed = lacks(base if rounds else best, study.data, study.noise)
     base_errors = _errors(base, study)
@@ -154,8 +139,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         ranking.append(_entry(t, study, float(weight), same))
     ranking += [_entry(t, study, 0.0, ()) for t in found if t.key not in keys]
     first = ranking[0] if ranking else None
-    # On records held out the errors of all parameters show, and an idle effect may make up for them by chance:
-    # those fitted have to speak for themselves.
+    # On records held out the errors of all parameters show, and an idle effect may make up for them by
+    # chance: those fitted have to speak for themselves.
     significant = first is not None and first.evidence_fitted > SIGNIFICANT and first.evidence_holdout > HELD
     noise, structure, share = _left(best, base, missed, study)
     if rounds:
@@ -183,8 +168,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
 def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float, float]:
     """Return the noise, the structure that the best candidate leaves (rms), and its share of what was there.
 
-    Structure shows on the windows fitted by what free forces explain, and on those held out by an error beyond
-    the noise: that of the fitted windows, times what the records' own noise floors say of the two.
+    Structure shows on the windows fitted by what free forces explain, and on those held out by an error
+    beyond the noise: that of the fitted windows, times what the records' own noise floors say of the two.
     """
     structure = missed[0].rms if missed and missed[0].evidence > SIGNIFICANT else 0.0
     noise = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))

@@ -23,7 +23,8 @@ class CandidateEffect:
     id : str
         Canonical id.
     nrmse, nrmse_holdout : float
-        Error of the block with this effect on training and on held-out data, over the rms of the centred output.
+        Error of the block with this effect on training and on held-out data, over the rms of the centred
+        output.
     evidence : float
         Log likelihood ratio [nats] over the refitted baseline, less the price of its parameters (Schwarz).
     probability : float
@@ -69,7 +70,8 @@ class Diagnosis:
     Attributes
     ----------
     verdict : {'effect', 'ambiguous', 'none', 'unknown'}
-        One effect (or one class of equivalent effects); several that remain; nothing; something outside the library.
+        One effect (or one class of equivalent effects); several that remain; nothing; something outside the
+        library.
     ranking : tuple of CandidateEffect
         Best first.
     baseline : CandidateEffect-like
@@ -121,7 +123,8 @@ class Diagnosis:
             values = ", ".join(f"{k} {v:.4g}" for k, v in c.parameters.items())
             name = c.id + (" = " + ", ".join(c.equivalents) if c.equivalents else "")
             lines.append(
-                f"{name:<22} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} {c.probability:>6.1%}  {values}"
+                f"{name:<22} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
+                f"{c.probability:>6.1%}  {values}"
             )
         return "\n".join(lines)
 

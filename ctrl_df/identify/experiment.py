@@ -65,8 +65,8 @@ def next_experiment(
     diagnosis : Diagnosis
         Of records over time, or of frequency tables: the input is then a sequence of sines.
     force, stroke : float or None
-        Limits [N], [m] about the start; None: those of the diagnosis, else what the records reached, and twice
-        the stroke of the first.
+        Limits [N], [m] about the start; None: those of the diagnosis, else what the records reached, and
+        twice the stroke of the first.
     duration, dt : float or None
         [s]; None: as the first record (tables: what the sines need).
     loop : loop of `ctrl_df.closed_loop` or None
@@ -103,7 +103,8 @@ def next_experiment(
     duration, dt = float(duration or record.duration), float(dt or record.dt)
     if not (force > 0 and reach > 0 and duration > 20 * dt):
         raise ValueError(
-            f"next_experiment needs force > 0, stroke > 0 and duration > 20 dt; got {force}, {reach}, {duration}, {dt}."
+            f"next_experiment needs force > 0, stroke > 0 and duration > 20 dt; got {force}, {reach}, "
+            f"{duration}, {dt}."
         )
     t = dt * np.arange(int(round(duration / dt)))
     play = (
@@ -121,13 +122,15 @@ def next_experiment(
             if not np.isfinite(far) or far > _MARGIN * reach * 1.0001 or asked > force:
                 continue
             separation = min(gaps) / max(diagnosis.noise, 1e-300)
-            # A record in which nothing may move teaches one bit; where all candidates move it teaches their shape.
+            # A record in which nothing may move teaches one bit; where all candidates move it teaches their
+            # shape.
             moves = min(float(np.ptp(y)) for y in ys) > 0.2 * max(float(np.ptp(y)) for y in ys)
             if best is None or (moves, separation) > (best_moves, best.separation):
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
     if best is None:
         raise ValueError(
-            f"every input tried leaves the stroke of {reach:g} m or asks more than {force:g} N: the candidates drift. "
+            f"every input tried leaves the stroke of {reach:g} m or asks more than {force:g} N: the "
+            "candidates drift. "
             "Allow more stroke, or give loop= (a closed_loop whose controller holds the drive in place)."
         )
     words = " and ".join(n.replace("_", " ") for n in (names if len(names) > 1 else ("no effect", *names)))
@@ -161,8 +164,9 @@ class _Free:
 class _Loop:
     """Plays a reference on the loop of every model with the given controller.
 
-    A good controller hides the differences of the models in their positions; they are in the force. What counts is
-    therefore how far one model, driven by the force that another would be given, is from the other's position.
+    A good controller hides the differences of the models in their positions; they are in the force. What
+    counts is therefore how far one model, driven by the force that another would be given, is from the
+    other's position.
     """
 
     def __init__(self, models, loop, record, t, centre, noise):
@@ -171,7 +175,8 @@ class _Loop:
         parts = getattr(loop, "parts", None)
         if parts is None:
             raise TypeError(
-                f"loop must come from ctrl_df.closed_loop; got {type(loop).__name__}. Build it from a controller "
+                f"loop must come from ctrl_df.closed_loop; got {type(loop).__name__}. Build it from a "
+                "controller "
                 "and the block."
             )
         self.models, self.record, self.centre = models, record, centre
@@ -179,10 +184,7 @@ class _Loop:
         self.t = t[:: max(1, len(t) // 2500)]
         self.thin = max(1, len(t) // 2500)
         # The controller passes the noise of the sensor on to the drive.
-        gain = (
-            abs(complex(parts.controller(1j * math.pi / (t[1] - t[0])))) if _proper(parts.controller) else 0.0
-        )
-        self.tremor = 4 * noise * gain
+        self.tremor = 4 * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 
     def __call__(self, u):
         from ..simulate.response import event_response
@@ -194,7 +196,7 @@ class _Loop:
                 found = event_response(loop, self.t, (u - self.centre)[:: self.thin])
             except (ValueError, RuntimeError):
                 return [np.full(2, np.inf)], math.inf, [0.0]
-            labels = list(found.output_labels or ())
+            labels: list[str] = list(found.output_labels or ())
             outputs = dict(zip(labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
             ys.append(self.centre + outputs["x"])
             forces.append(outputs["F"])
@@ -206,6 +208,16 @@ class _Loop:
             runs = [free_run(m, played, position=self.centre) for m in self.models]
             gaps += [_rms(y - runs[i]) for k, y in enumerate(runs) if k != i]
         return ys, max(float(np.max(np.abs(f))) for f in forces) + self.tremor, gaps
+
+
+def _fastest_gain(controller, dt: float) -> float:
+    """Return a controller's gain at the highest frequency that samples `dt` [s] apart hold; 0 if improper.
+
+    A discrete controller has ticks of its own: its highest frequency is z = exp(j pi) = -1.
+    """
+    if not _proper(controller):  # its derivative acts on the velocity, whose noise is not stated
+        return 0.0
+    return abs(complex(controller(-1.0 if controller.isdtime(strict=True) else 1j * math.pi / dt)))
 
 
 def _proper(controller) -> bool:
@@ -257,5 +269,8 @@ def _shapes(t, record):
     )
     triangle = 2 / math.pi * np.arcsin(np.cos(2 * math.pi * 0.4 * f0 * t))
     return {
-        "multisine": sum_of_sines / np.max(np.abs(sum_of_sines)), "chirp": chirp, "steps": pulses, "triangle": triangle,
-    }  # fmt: skip
+        "multisine": sum_of_sines / np.max(np.abs(sum_of_sines)),
+        "chirp": chirp,
+        "steps": pulses,
+        "triangle": triangle,
+    }

@@ -72,6 +72,7 @@ def explain(diagnosis, missed) -> str:
     others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
     names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
     return (
-        f"An effect is missing, and these data do not tell which: {names}. The first reduces the error from {size}."
+        f"An effect is missing, and these data do not tell which: {names}. The first reduces the error from "
+        f"{size}."
         f"{same} next_experiment gives an input that would separate them."
     )

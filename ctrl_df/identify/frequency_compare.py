@@ -1,17 +1,17 @@
-"""A model beside measured tables N(A, omega): how far off, whether by more than scatter, and where on the plane."""
+"""A model beside measured tables N(A, omega): how far off, whether beyond scatter, and where on the plane."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from .frequency_fit import Points, points_of, relative_error, rms, simulate_table
+from .compared import Compared
+from .frequency_fit import Points, counted, points_of, relative_error, rms, simulate_table
 from .frequency_measurement import FrequencyMeasurement
+from .records import as_tables
 from .where import Region, Regions
 
 
@@ -60,28 +60,13 @@ class TableComparison:
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyComparison:
+class FrequencyComparison(Compared):
     """Outcome of `compare` for tables: all points together in the figures, each table in `records`.
 
     Errors are relative to ``|N|``. `simulated` and `residual` are arrays for one table, tuples for several.
     """
 
-    model: Any
     records: tuple[TableComparison, ...]
-
-    def _each(self, name):
-        values = tuple(getattr(r, name) for r in self.records)
-        return values[0] if len(values) == 1 else values
-
-    @property
-    def simulated(self):
-        """N of the model on the grid of the table."""
-        return self._each("simulated")
-
-    @property
-    def residual(self):
-        """Measured minus the model's N [output unit over input unit]."""
-        return self._each("residual")
 
     @property
     def relative(self):
@@ -98,16 +83,6 @@ class FrequencyComparison:
         """Rms of the relative errors of all points."""
         return rms(np.concatenate([r.relative[np.isfinite(r.relative)] for r in self.records]))
 
-    @property
-    def fit_percent(self) -> float:
-        """``100 (1 - nrmse)``."""
-        return 100 * (1 - self.nrmse)
-
-    @property
-    def worst(self) -> TableComparison:
-        """The table with the largest error."""
-        return max(self.records, key=lambda r: r.nrmse)
-
     @cached_property
     def white(self) -> Scatter:
         """Whether what remains is scatter: true if neighbours on the plane err independently."""
@@ -117,9 +92,7 @@ class FrequencyComparison:
     def where(self) -> Regions:
         """Amplitudes and frequencies ranked by their share of the error."""
         points = points_of([r.record for r in self.records])
-        error = np.concatenate(
-            [r.relative[np.isfinite(r.record.N) & (r.record.N != 0)] for r in self.records]
-        )
+        error = np.concatenate([r.relative[counted(r.record)] for r in self.records])
         return plane_regions(points, error)
 
     def report(self) -> str:
@@ -143,7 +116,7 @@ class FrequencyComparison:
         return text + "."
 
     def plot(self, record=None, **keywords):
-        """Draw measured and model's N over frequency, and the error on the plane; returns a ct.ControlPlot."""
+        """Draw measured and model's N, and the error on the plane; returns a ``ct.ControlPlot``."""
         from ..plot.table import table_comparison_plot
 
         return table_comparison_plot(self, record, **keywords)
@@ -173,7 +146,7 @@ def comparison_of_tables(model, records) -> FrequencyComparison:
     for record in records:
         points = points_of([record])
         found = simulate_table(model, points)
-        where = np.isfinite(record.N) & (record.N != 0)
+        where = counted(record)
         simulated = np.full(record.N.shape, np.nan + 0j)
         relative = simulated.copy()
         simulated[where], relative[where] = found, relative_error(found, points)
@@ -184,26 +157,6 @@ def comparison_of_tables(model, records) -> FrequencyComparison:
 def inner_block(model):
     """Return the block of a closed loop, or the model itself."""
     return getattr(getattr(model, "parts", None), "block", model)
-
-
-def has_tables(data) -> bool:
-    """Whether the data are, or contain, tables over frequency."""
-    if isinstance(data, FrequencyMeasurement):
-        return True
-    return isinstance(data, Sequence) and any(isinstance(r, FrequencyMeasurement) for r in data)
-
-
-def as_tables(data, name: str = "data") -> tuple[FrequencyMeasurement, ...]:
-    """Return tables as a tuple; TypeError for anything else, records over time among them included."""
-    records = (data,) if isinstance(data, FrequencyMeasurement) else tuple(data)
-    bad = [r for r in records if not isinstance(r, FrequencyMeasurement)]
-    if bad or not records:
-        got = f"also {type(bad[0]).__name__}" if bad else "an empty sequence"
-        raise TypeError(
-            f"{name} must hold frequency tables only (FrequencyMeasurement), or records over time only; got {got}. "
-            "Study them in two calls, the second with the model of the first."
-        )
-    return records
 
 
 # --- the plane ------------------------------------------------------------------------------------
@@ -260,7 +213,8 @@ def plane_regions(points: Points, error) -> Regions:
         p = min(p * (len(found) - i), 1.0)
         what = "amplitudes" if kind == "amplitude" else "frequencies"
         sentence = (
-            f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the points"
+            f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the "
+            "points"
             f" (p {'< 1e-6' if p < 1e-6 else f'= {p:.2g}'})."
         )
         regions.append(Region(kind, label, share, expected, p, bias, 1.0, span, sentence))

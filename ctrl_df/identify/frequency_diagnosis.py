@@ -1,8 +1,8 @@
 """Which effect is missing, from measured tables N(A, omega): each effect leaves its print on the plane.
 
-The course is that of the diagnosis over time: refit the model, try every effect of the library from start values
-of several magnitudes, confirm the best on all points, and say what remains. Points of a table are taken to err
-independently; what neighbours have in common is structure.
+The course is that of the diagnosis over time: refit the model, try every effect of the library from start
+values of several magnitudes, confirm the best on all points, and say what remains. Points of a table are
+taken to err independently; what neighbours have in common is structure.
 """
 
 from __future__ import annotations
@@ -16,30 +16,36 @@ import numpy as np
 from .attach import applicable
 from .diagnose import block_of, effect_classes, free_names
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
-from .frequency_compare import as_tables, plane_regions
+from .frequency_candidate import FOLLOWED, SLOW, fit_either, try_effect
+from .frequency_compare import plane_regions
+from .frequency_explain import explain_tables
 from .frequency_fit import (
     QUICK,
     FittedTable,
     Points,
+    counted,
     fit_table,
+    log_density,
+    outlying,
     points_of,
     relative_error,
     rms,
     simulate_table,
+    slopes_of,
     table_scales,
 )
 from .frequency_refit import uncertainty
-from .frequency_starts import best_starts
-from .trial import Scales
+from .records import as_tables
 
 SIGNIFICANT = 12.0
-"""Evidence [nats] an effect needs; fewer shapes are tried than over time, and points err independently."""
+"""Evidence [nats] an effect needs on the points fitted; fewer shapes are tried than over time."""
 
-_SCREEN = 30  # points while screening
+HELD = 2.0
+"""Evidence [nats] it needs on the points held out; there are few of them."""
+
+_SCREEN = 20  # points while screening, those where the model errs most in their part of the plane
 _ROUGH = 10  # of effects whose orbits take many times as long
-_SLOW = frozenset({"position_ripple", "sensor_quantization"})
-_SLOWER = _SLOW | {"backlash", "compliance", "bristle", "input_lag"}
-_CONFIRM = 4
+_CONFIRM = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +110,7 @@ class _Tried:
     errors: np.ndarray
     table: np.ndarray
     evidence: float = 0.0
+    held: float = 0.0  # of it on the points held out
     confirmed: bool = False
 
     @property
@@ -120,7 +127,8 @@ class FrequencyStudy:
         self.train = _train_mask(self.points, len(records), bool(held))
         if np.count_nonzero(self.train) <= len(self.free) // 2 + 1:
             raise ValueError(
-                f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to fit "
+                f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to "
+                "fit "
                 f"{len(self.free)} parameters. Measure more, or name fewer in free."
             )
         self.scales = table_scales(block, self.points)
@@ -128,12 +136,13 @@ class FrequencyStudy:
         self.found: list[_Tried] = []
 
     def _fit_base(self) -> FittedTable:
-        """Fit from the model's values, and from the mass that the highest frequency suggests; keep the better."""
+        """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
         inside = self.points.take(self.train)
         begins = [self.block]
         if "mass" in self.free:
-            top = inside.omega >= np.quantile(inside.omega, 0.8)
-            mass = float(np.median(1 / (np.abs(inside.N[top]) * inside.omega[top] ** 2)))
+            moved = inside.take(inside.N != 0)
+            top = moved.omega >= np.quantile(moved.omega, 0.8)
+            mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
             begins.append(self.block.with_parameters({"mass": mass}))
         fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
@@ -145,14 +154,18 @@ class FrequencyStudy:
     def screen(self, classes, executor):
         """Try every effect, roughly on some points, the best then on all of them."""
         inside = self.points.take(self.train)
-        few, fewer = inside.thinned(_SCREEN), inside.thinned(_ROUGH)
+        size = np.abs(inside.weight * self.base.errors[self.train])
+        few, fewer = inside.thinned(_SCREEN, size), inside.thinned(_ROUGH, size)
         kinds = [c for c in classes if applicable(c, self.base.fitted.block)]
-        jobs = [
-            (c, self.base.fitted.block, fewer if c.id in _SLOWER else few, self.free, self.scales)
-            for c in kinds
-        ]
+        block, slopes = self.base.fitted.block, {}
+        for some in (few, fewer):
+            slopes[len(some)] = slopes_of(block, some, self.free, self.scales, QUICK)
+        jobs = []
+        for c in kinds:
+            some = fewer if c.id in SLOW else few
+            jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
-        rough = [self._tried(*r, work=QUICK) for r in run(_try, jobs) if r is not None]
+        rough = [self._tried(*r, work=QUICK) for r in run(try_effect, jobs) if r is not None]
         self._judge(rough)
         rough.sort(key=lambda t: -t.evidence)
         # what explains next to nothing of a few points will not explain all of them
@@ -165,9 +178,12 @@ class FrequencyStudy:
         self.found = [*best, *(t for t in rough if t.id not in done)]
 
     def _confirmed(self, tried, inside):
-        iterations = 3 if tried.id in _SLOW else 12
+        iterations = 3 if tried.id in SLOW else 12
         names = (*self.free, *tried.extra)
-        fitted = fit_table(tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=80)
+        work = QUICK if tried.id in FOLLOWED else None
+        fitted = fit_either(
+            tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=120, work=work
+        )
         again = self._tried(tried.id, fitted, tried.extra)
         again.confirmed = True
         return again
@@ -186,22 +202,31 @@ class FrequencyStudy:
             ):
                 self.base = self._tried("", again, ())
 
-    def _power(self, tried) -> float:
-        return float(np.sum(np.abs(self.points.weight * tried.errors) ** 2))
+    def _likelihood(self, tried) -> tuple[np.ndarray, float]:
+        return log_density(self.points.weight * tried.errors, self._floor())
+
+    def evidence(self, better, worse) -> float:
+        """Return the log likelihood ratio [nats] at all points."""
+        return float(np.sum(self._likelihood(better)[0] - self._likelihood(worse)[0]))
+
+    def refitted(self, block, names) -> _Tried:
+        """Return a block with these parameters refitted to the points of the fit."""
+        inside = self.points.take(self.train)
+        return self._tried("", fit_table(block, inside, names, self.scales, iterations=12), ())
 
     def _judge(self, tried):
         """Set the evidence: likelihood ratio of independent complex errors, less Schwarz's price."""
-        n = len(self.points)
-        least = self._floor(n)
-        base = max(self._power(self.base), least)
+        price = 0.5 * math.log(2 * len(self.points))
+        base = self._likelihood(self.base)[0]
         for t in tried:
-            power = max(self._power(t), least)
-            t.evidence = n * math.log(base / power) - 0.5 * len(t.extra) * math.log(2 * n)
+            gain = self._likelihood(t)[0] - base
+            t.held = float(np.sum(gain[~self.train]))
+            t.evidence = float(np.sum(gain)) - len(t.extra) * price
 
-    def _floor(self, n):
-        """Return the power below which no model gets: the stated noise, or the accuracy of the orbits."""
+    def _floor(self) -> float:
+        """Return the variance below which no model gets: by the stated noise, or by how exact orbits are."""
         stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
-        return n * max(0.5 * stated, 1e-6) ** 2
+        return max(0.5 * stated, 1e-6) ** 2
 
     # --- what it comes to -----------------------------------------------------------------------------
 
@@ -225,9 +250,7 @@ class FrequencyStudy:
         noise, structure = self._split(best)
         _, structure0 = self._split(self.base)
         errors = self._errors(self.base)
-        significant = (
-            first is not None and best.evidence > SIGNIFICANT and first.nrmse_holdout < 0.995 * errors[1]
-        )
+        significant = first is not None and worth(first)
         if self._unexplained(best if significant else self.base, noise, structure, structure0):
             verdict = UNKNOWN
         elif first is None or not significant:
@@ -241,11 +264,14 @@ class FrequencyStudy:
         before = comparison_of_tables(self.base.fitted.block, tables)
         after = before if best is self.base else comparison_of_tables(best.fitted.block, tables)
         result = FrequencyDiagnosis(
-            verdict, tuple(ranking), self.base.fitted.block, self.block, *errors, noise, structure, "", where.kinds,
-            where, tuple(self.records), tuple(self.held), time.perf_counter() - began, dict(limits or {}),
+            verdict, tuple(ranking), self.base.fitted.block, self.block, *errors, noise, structure, "",
+            where.kinds, where, tuple(self.records), tuple(self.held), time.perf_counter() - began,
+            dict(limits or {}),
             before=before, after=after,
         )  # fmt: skip
-        object.__setattr__(result, "explanation", _explain(result))
+        object.__setattr__(
+            result, "explanation", explain_tables(result, before if verdict == NONE else after)
+        )
         return result
 
     def _entry(self, t, probability, alike):
@@ -254,16 +280,17 @@ class FrequencyStudy:
         names = {f"{k}": e for k, e in uncertainty(t.fitted)[1].items()} if t.confirmed else {}
         errors = {n.rpartition(".")[2]: names[n] for n in t.extra if n in names}
         return CandidateEffect(
-            effect, t.id, *self._errors(t), t.evidence, probability, values, alike, t.fitted.block, t.confirmed,
-            (t.table,), errors,
+            effect, t.id, *self._errors(t), t.evidence, probability, values, alike, t.fitted.block,
+            t.confirmed, (t.table,), errors, t.held,
         )  # fmt: skip
 
     def _errors(self, t) -> tuple[float, float]:
-        return rms(t.errors[self.train]), rms(t.errors[~self.train])
+        good = ~outlying(t.errors)
+        return rms(t.errors[self.train & good]), rms(t.errors[~self.train & good])
 
     def _split(self, t) -> tuple[float, float]:
         """Split the relative error into scatter and what neighbours on the plane have in common."""
-        e, p = t.errors, self.points
+        p, e = self.points, np.where(outlying(t.errors), 0.0, t.errors)
         differences = []
         for record in np.unique(p.record):
             at = np.flatnonzero(p.record == record)
@@ -289,7 +316,8 @@ class FrequencyStudy:
         grid = [np.where(np.isfinite(r.N), 0, np.nan).astype(complex) for r in [*self.records, *self.held]]
         for i, table in enumerate(grid):
             record = [*self.records, *self.held][i]
-            table[np.isfinite(record.N) & (record.N != 0)] = t.errors[self.points.record == i]
+            here = self.points.record == i
+            table[counted(record)] = np.where(outlying(t.errors)[here], np.nan, t.errors[here])
         return not scatter(grid)
 
     def _alike(self, a, b) -> bool:
@@ -297,9 +325,14 @@ class FrequencyStudy:
         both = np.isfinite(a.table) & np.isfinite(b.table)
         if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
             return False
-        sigma2 = max(min(self._power(a), self._power(b)), self._floor(len(self.points))) / len(self.points)
-        gap = self.points.weight * np.abs(a.table - b.table) / np.abs(self.points.N)
+        sigma2 = min(self._likelihood(a)[1], self._likelihood(b)[1])
+        gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
         return float(np.sum(gap[both] ** 2)) / sigma2 < 6.0
+
+
+def worth(candidate: CandidateEffect) -> bool:
+    """Whether the points fitted speak for an effect, and those held out by themselves too."""
+    return candidate.evidence_fitted > SIGNIFICANT and candidate.evidence_holdout > HELD
 
 
 def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:
@@ -310,60 +343,3 @@ def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:
     k = np.searchsorted(np.unique(points.omega), points.omega)
     mask = (i + k) % 3 != 2
     return mask if 0 < np.count_nonzero(mask) < len(mask) else np.arange(len(points)) % 3 != 2
-
-
-def _try(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
-    """Fit one effect class from its best starts (a job of its own, for executors)."""
-    cls, block, points, free, scales = job
-    scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
-    best = None
-    for grown in best_starts(cls, block, points, scales, keep=1 if cls.id in _SLOW else 2):
-        own = tuple(k for k in grown.parameters if k not in block.parameters and grown.parameters[k].free)
-        iterations = 3 if cls.id in _SLOW else 5
-        fitted = fit_table(
-            grown, points, (*free, *own), scales, iterations=iterations, tolerance=1e-2, work=QUICK
-        )
-        if best is None or float(fitted.weighted @ fitted.weighted) < float(
-            best[1].weighted @ best[1].weighted
-        ):
-            best = cls.id, fitted, own
-    return best
-
-
-# --- in words -------------------------------------------------------------------------------------
-
-
-def _explain(d: FrequencyDiagnosis) -> str:
-    from .explain import named, values_of
-
-    first = d.ranking[0] if d.ranking else None
-    if d.verdict == NONE:
-        return (
-            f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%} of |N| (held out "
-            f"{d.nrmse_holdout:.2%}), which is scatter. No effect of the library improves on it beyond chance."
-        )
-    places = " ".join(r.sentence for r in d.where.significant[:2])
-    if d.verdict == UNKNOWN or first is None:
-        tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
-        return (
-            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%} of |N|; {tried}"
-            f"Neighbouring points err alike: {d.structure:.2%} beside {d.noise:.2%} of scatter. "
-            f"Look here: {places or 'the error is spread over the whole plane.'}"
-        )
-    size = f"{d.nrmse:.2%} to {first.nrmse:.2%} of |N| (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
-    same = ""
-    if first.equivalents:
-        names = ", ".join(e.replace("_", " ") for e in first.equivalents)
-        same = f" On these data the same map as {names}."
-    if d.verdict == EFFECT:
-        sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
-        return (
-            f"Missing: {named(first.effect)} ({values_of(first.effect)}). With it the error falls from {size}; "
-            f"probability {sure:.1%}.{same}" + (f" Before, {places}" if places else "")
-        )
-    others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
-    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
-    return (
-        f"An effect is missing, and these tables do not tell which: {names}. The first reduces the error from {size}."
-        f"{same} next_experiment gives the points of the plane that would separate them."
-    )

@@ -61,7 +61,8 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     i, k = np.unravel_index(order[separation.ravel()[order] > 0], separation.shape)
     if len(i) == 0:
         raise ValueError(
-            f"no sine of up to {force:g} N within {reach:g} m separates {' and '.join(names)}. Allow more force or "
+            f"no sine of up to {force:g} N within {reach:g} m separates {' and '.join(names)}. Allow more "
+            "force or "
             "stroke, or record a run over time."
         )
     chosen = sorted(zip(A[i].tolist(), omega[k].tolist(), strict=True), key=lambda p: (p[1], p[0]))
@@ -79,9 +80,11 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     least, stroke_used = float(separation[i, k].min()), float(far[i, k].max())
     points = ", ".join(f"{a:.3g} N at {w:.3g} rad/s" for a, w in chosen)
     reason = (
-        f"sines of {points}: there {words} differ by {least:.2g} to {float(separation[i, k].max()):.2g} times the "
+        f"sines of {points}: there {words} differ by {least:.2g} to {float(separation[i, k].max()):.2g} "
+        "times the "
         f"scatter, within {stroke_used:.3g} m of swing."
     )
     return Experiment(
-        dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for a, _ in chosen)
+        dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for
+        a, _ in chosen)
     )  # fmt: skip

@@ -1,8 +1,8 @@
 """A block beside measured tables N(A, omega): relative errors, and their least squares.
 
-N of a drive falls by decades over frequency, and a stepped sine is as good, relative to what it measures, at one
-end as at the other: errors are relative to ``|N|``, weighted by the stated standard errors where there are any.
-Where the block has no periodic answer or stands still, its N counts as zero.
+N of a drive falls by decades over frequency, and a stepped sine is as good, relative to what it measures, at
+one end as at the other: errors are relative to ``|N|``, weighted by the stated standard errors where there
+are any. Where the block has no periodic answer or stands still, its N counts as zero.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..blocks.core import level
 from .frequency_measurement import FrequencyMeasurement
 from .simulator import feasible
 from .trial import Scales
@@ -35,8 +36,9 @@ class Points:
     record : (n,) array of int
         Which table a point belongs to.
     scale : (n,) array
-        What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point is less
-        (a mass about to stick, an antiresonance: there the scatter does not shrink with N).
+        What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point
+        is less (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with
+        N).
     """
 
     A: np.ndarray
@@ -56,8 +58,12 @@ class Points:
         parts = {k: getattr(self, k)[where] for k in ("A", "omega", "N", "weight", "record", "scale")}
         return replace(self, **parts)
 
-    def thinned(self, count: int) -> Points:
-        """Return about `count` points spread over the plane: every one belongs to a cell of equal logarithmic size."""
+    def without(self, where) -> Points:
+        """Return the same points, some of them of no weight."""
+        return replace(self, weight=np.where(where, 0.0, self.weight))
+
+    def thinned(self, count: int, size) -> Points:
+        """Return up to `count` points: that of largest `size` in every cell of the logarithmic plane."""
         if len(self) <= count:
             return self
         side = max(int(math.sqrt(count)), 2)
@@ -66,19 +72,24 @@ class Points:
             place = np.log(axis)
             width = max(float(np.ptp(place)), 1e-12)
             cell = cell * side + np.minimum((side * (place - place.min()) / width).astype(int), side - 1)
-        _, first = np.unique(cell, return_index=True)
-        return self.take(np.sort(first))
+        order = np.argsort(-np.asarray(size), kind="stable")
+        _, first = np.unique(cell[order], return_index=True)
+        return self.take(np.sort(order[first]))
 
 
 def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
-    """Return the measured points of several tables in a row; points with N = 0 say nothing and are left out."""
+    """Return the measured points of several tables in a row.
+
+    N = 0 says that the mass stood still. At frequencies where nothing moved there is no scale to measure by:
+    those points are left out, see `counted`.
+    """
     rows, sigmas, numbers = [], [], []
     for i, r in enumerate(records):
-        a, w, n = r.points
-        keep = n != 0
-        rows.append((a[keep], w[keep], n[keep]))
-        sigmas.append(r.noise_of_points[keep])
-        numbers.append(np.full(int(keep.sum()), i))
+        keep = counted(r)
+        row, column = np.nonzero(keep)
+        rows.append((r.A[row], r.omega[column], r.N[keep]))
+        sigmas.append(r.noise_of_points[keep[np.isfinite(r.N)]])
+        numbers.append(np.full(len(row), i))
     a, w, n = (np.concatenate(column) for column in zip(*rows, strict=True))
     sigma, known = np.concatenate(sigmas), np.concatenate(sigmas)
     if np.all(np.isfinite(known)):
@@ -89,22 +100,57 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
         noise, weight = math.nan, np.ones(len(a))
     scale = np.abs(n)
     for value in np.unique(w):
-        scale[w == value] = np.maximum(scale[w == value], 0.1 * np.median(np.abs(n[w == value])))
+        here = w == value
+        scale[here] = np.maximum(scale[here], 0.1 * np.median(np.abs(n[here & (n != 0)])))
     return Points(a, w, n, weight, noise, np.concatenate(numbers), scale)
 
 
-# Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for ever.
-QUICK = {"max_steps": 4_000, "averages": 8}
-CAREFUL = {"max_steps": 30_000, "averages": 16}
+def counted(record: FrequencyMeasurement) -> np.ndarray:
+    """Return which cells (na, nw) of a table count: measured, where some amplitude moved the mass."""
+    measured = np.isfinite(record.N)
+    return measured & np.any(measured & (record.N != 0), axis=0)
+
+
+# Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for
+# ever.
+ROUGH = {"max_steps": 4_000, "averages": 8}
+QUICK = {"max_steps": 25_000, "averages": 8}
+CAREFUL = {"max_steps": 60_000, "averages": 16}
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
-    """Return N of the model at the points; NaN where it has no periodic answer, or none within the work allowed."""
+    """Return N of the model at the points; NaN where it has no answer within the work allowed."""
+    N = np.empty(len(points), complex)
+    rigid = _rigid(model, points, RIGID[1] if work in (None, CAREFUL) else RIGID[0])
+    for some, block in ((rigid, model.without_effect("bristle") if rigid.any() else model), (~rigid, model)):
+        if some.any():
+            N[some] = _described(block, points.A[some], points.omega[some], work or CAREFUL)
+    return N
+
+
+def _described(model, A, omega, work) -> np.ndarray:
     from ..df.describing import describing_function
     from ..df.dispatch import method_for
 
-    options: dict[str, Any] = dict(work or CAREFUL) if method_for(model).name == "orbit" else {}
-    return np.asarray(describing_function(model, points.A, points.omega, **options))
+    options: dict[str, Any] = dict(work) if method_for(model).name == "orbit" else {}
+    return np.asarray(describing_function(model, A, omega, **options))
+
+
+RIGID = (2e-3, 3e-4)  # share of the swing, when quick and when careful
+
+
+def _rigid(model, points: Points, share: float) -> np.ndarray:
+    """Return where the bristles of a model yield over next to nothing of the measured swing.
+
+    There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by
+    less than that share.
+    """
+    bristles = [e for e in getattr(model, "effects", ()) if e.id == "bristle" and e.level == 0]
+    if not bristles:
+        return np.zeros(len(points), bool)
+    friction = [e for e in model.effects if e.role == "friction" and e.side == "motor"]
+    bend = level(friction, 0.0, 1.0, 0.0) / bristles[0].stiffness
+    return bend < share * points.A * np.abs(points.N)
 
 
 def relative_error(simulated, points: Points) -> np.ndarray:
@@ -119,6 +165,46 @@ def relative_error(simulated, points: Points) -> np.ndarray:
 def rms(error) -> float:
     """Return the root mean square of complex errors."""
     return math.sqrt(float(np.mean(np.abs(error) ** 2))) if len(error) else math.nan
+
+
+def outlying(error) -> np.ndarray:
+    """Return which points err by ten times the median: one in sixteen (two) at most, else none.
+
+    Motions coexist (backlash, ripple): where the drive was found in another one than the model, or was
+    measured badly, the two differ by as much as N itself, and say nothing of the rest of the plane.
+    """
+    size = np.abs(error)
+    far = size > np.maximum(10 * np.median(size), 1e-3) if len(size) else np.zeros(0, bool)
+    return far if np.count_nonzero(far) <= max(len(size) // 16, 2) else np.zeros(len(size), bool)
+
+
+_GROSS = 0.02  # share of points expected to err by as much as N itself
+
+
+def log_density(error, least: float) -> tuple[np.ndarray, float]:
+    """Return the log density [nats] of every point's error, and the variance of what is mere scatter.
+
+    Parameters
+    ----------
+    error : (n,) complex array
+        Taken as a mixture: scatter of a variance fitted to them, and a few gross errors about as large as N.
+    least : float
+        The variance is no less.
+    """
+    size = np.abs(error) ** 2
+    gross = _GROSS * np.exp(-np.minimum(size, 700.0))
+    best = (np.full(len(size), -np.inf), least)
+    for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
+        variance = max(variance, least)
+        for _ in range(30):
+            usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+            share = usual / (usual + gross)
+            variance = max(float(share @ size) / max(float(share.sum()), 1e-300), least)
+        usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+        density = np.log(usual + gross)
+        if density.sum() > best[0].sum():
+            best = density, variance
+    return best
 
 
 def table_scales(block, points: Points) -> Scales:
@@ -191,7 +277,7 @@ def fit_table(
     budget : int
         Bound on the tables computed.
     work : mapping or None
-        Bounds on the work of one point, `QUICK` or `CAREFUL` (the default).
+        Bounds on the work of one point, `ROUGH`, `QUICK` or `CAREFUL` (the default).
     """
     table = block.parameters
     job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)
@@ -224,9 +310,16 @@ def fit_table(
             converged = True
             break
     model = job.model(z)
-    n = len(points)
-    error = (e[:n] + 1j * e[n:]) / points.weight
+    error = relative_error(simulate_table(model, points, work), points)
     return FittedTable(model, tuple(names), error, e, jacobian, tuple(job.variables), z, job.count, converged)
+
+
+def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.ndarray:
+    """Return the slopes (2 n, p) of the weighted errors by scaled parameters."""
+    table = block.parameters
+    job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)
+    z = np.array([v.q(table[v.name].value) for v in job.variables])
+    return job.slopes(z, job.errors(z)) if len(z) else np.zeros((2 * len(points), 0))
 
 
 class _Job:

@@ -22,14 +22,15 @@ class FrequencyMeasurement:
     omega : array_like, shape (nw,)
         Frequencies [rad/s], > 0, increasing.
     N : array_like, shape (na, nw), complex
-        ``(Y1/A) exp(j phi1)`` for input ``A cos(omega t)``; NaN where nothing was measured.
+        ``(Y1/A) exp(j phi1)`` for input ``A cos(omega t)``; NaN where nothing was measured, 0 where nothing
+        moved.
     name : str
         Shown in tables and pictures.
     input_unit, output_unit : str
         Units of A and of the output behind N; converted to SI.
     noise : float or array_like, shape (na, nw), or None
-        Standard error of N relative to ``|N|``, > 0, where it is known (from repeated runs, say): points weigh
-        by it. None: all points alike.
+        Standard error of N relative to ``|N|``, > 0, where it is known (from repeated runs, say): points
+        weigh by it. None: all points alike.
 
     Raises
     ------
@@ -137,7 +138,7 @@ class FrequencyMeasurement:
 
     @property
     def noise_of_points(self) -> np.ndarray:
-        """Relative standard errors of the measured points, in the order of `points`; NaN where none are stated."""
+        """Relative standard errors in the order of `points`; NaN where none are stated."""
         good = np.isfinite(self.N)
         return np.full(np.count_nonzero(good), np.nan) if self.noise is None else np.asarray(self.noise)[good]
 

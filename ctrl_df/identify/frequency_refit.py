@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from .frequency_compare import as_tables, comparison_of_tables, inner_block
+from .frequency_compare import comparison_of_tables, inner_block
 from .frequency_fit import FittedTable, fit_table, points_of, table_scales
+from .records import as_tables
 
 
 def refit_frequency(model, data, free=None, *, start=None, budget=600, **keywords):
@@ -54,8 +56,9 @@ def refit_frequency(model, data, free=None, *, start=None, budget=600, **keyword
         )
         for k, v in zip(names, found.variables, strict=True)
     }  # fmt: skip
-    return Fit(  # the comparison is of its own kind
-        _as_given(model, found.block), MappingProxyType(parameters), comparison_of_tables(found.block, records),  # pyright: ignore[reportArgumentType]
+    comparison: Any = comparison_of_tables(found.block, records)  # of its own kind
+    return Fit(
+        _as_given(model, found.block), MappingProxyType(parameters), comparison,
         covariance, tuple(doubtful.values()), found.converged, found.evaluations,
     )  # fmt: skip
 

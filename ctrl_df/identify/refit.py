@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from .candidate import Candidate, fit_candidate, fit_windows
-from .compare import Comparison, as_records, comparison_of
+from .compare import Comparison, comparison_of
+from .records import as_records, has_tables
 from .simulator import Simulator
 from .valleys import hopped, rough
 from .variables import default_free
@@ -159,8 +160,6 @@ def refit(
     """
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    from .frequency_compare import has_tables
-
     if has_tables(data):
         from .frequency_refit import refit_frequency
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from string import Template
 
 _PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
 <title>$title</title>
 <style>
 :root { --ink: #1b2430; --soft: #5b6675; --line: #dfe4ea; --blue: #1f4e9c; --paper: #fff; }
@@ -20,8 +21,10 @@ body { font: 16px/1.55 system-ui, "Segoe UI", Arial, sans-serif; color: var(--in
 main { max-width: 60rem; margin: 0 auto; padding: 2.5rem 1.5rem 4rem; background: var(--paper); }
 h1 { font-size: 1.75rem; line-height: 1.2; margin: 0 0 .3rem; }
 h2 { font-size: 1.2rem; margin: 2.4rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
-p.lead { font-size: 1.08rem; border-left: 4px solid var(--blue); padding: .2rem 0 .2rem 1rem; margin: 1.2rem 0; }
-.verdict { display: inline-block; background: var(--blue); color: #fff; border-radius: 3px; padding: .1rem .6rem; }
+p.lead { font-size: 1.08rem; border-left: 4px solid var(--blue); padding: .2rem 0 .2rem 1rem;
+  margin: 1.2rem 0; }
+.verdict { display: inline-block; background: var(--blue); color: #fff; border-radius: 3px;
+  padding: .1rem .6rem; }
 .soft { color: var(--soft); font-size: .92rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: .93rem; font-variant-numeric: tabular-nums; }
@@ -102,15 +105,15 @@ def render(study) -> str:
         lead=html.escape(study.summary().split("\n")[0]),
         next=_next(study),
         how=html.escape(
-            "Each step adds the effect that explains most of what is left, and refits everything. It stays only if the "
-            f"error on data it was not fitted to falls too. Errors are rms {measure}{over}."
+            "Each step adds the effect that explains most of what is left, and refits everything. It stays "
+            f"only if the error on data it was not fitted to falls too. Errors are rms {measure}{over}."
         ),
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
         steps=_steps(study),
         pictures=_pictures(study),
         model=html.escape(
-            "A standard error is how far the value may be off by chance alone; two of them hold 95 % of the time if "
-            "the structure is right."
+            "A standard error is how far the value may be off by chance alone; two of them hold 95 % of the "
+            "time if the structure is right."
         ),
         parameters=_parameters(study, fit),
         doubts="".join(f"<p>{html.escape(s[0].upper() + s[1:])}</p>" for s in fit.unidentifiable)
@@ -118,8 +121,9 @@ def render(study) -> str:
         else "",
         sections="\n".join(_section(i, s) for i, s in enumerate(study.steps)),
         closing=html.escape(
-            "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's price of "
-            f"the parameters; twenty nats are half a billion to one. Computed in {study.seconds:.0f} s."
+            "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's "
+            "price of the parameters; twenty nats are half a billion to one. "
+            f"Computed in {study.seconds:.0f} s."
         ),
     )
 

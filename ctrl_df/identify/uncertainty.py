@@ -1,4 +1,4 @@
-"""How well fitted parameters are known, for residuals of any colour, and which directions are not determined."""
+"""How well fitted parameters are known, for residuals of any colour; directions that are not determined."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from .shooting import Problem, Tangent
 def covariance_of(problem: Problem, tangent: Tangent, jp, js):
     """Return the covariance of the scaled parameters and the directions the data do not determine.
 
-    The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J) H^-1,
-    Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost degrees of
-    freedom are given back.
+    The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
+    H^-1, Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost
+    degrees of freedom are given back.
 
     Returns
     -------

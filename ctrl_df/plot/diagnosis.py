@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import control as ct
-import matplotlib.pyplot as plt
 import numpy as np
+
+from .sheet import finished, sheet
 
 _BEST, _OTHER, _NOTHING = "#1f4e9c", "#9db4d8", "0.75"
 
@@ -20,18 +21,16 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, **keywords) -> ct.ControlPl
     title : str or None
         Over the picture.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    fig = plt.gcf() if not plt.gcf().axes else plt.figure()
-    fig.set_size_inches(8, 1.15 + 0.36 * (min(rows, len(diagnosis.ranking)) + 1))
+    fig = sheet(8, 1.15 + 0.36 * (min(rows, len(diagnosis.ranking)) + 1), keywords)
     ax = fig.add_subplot()
     bars = draw_ranking(ax, diagnosis, rows)
     ax.set_xlabel("Held-out error, rms over rms of the output [%]")
-    fig.suptitle(f"Verdict: {diagnosis.verdict}" if title is None else title, fontsize=11)
-    fig.tight_layout()
-    lines = np.empty(1, dtype=object)
-    lines[0] = list(bars)
-    return ct.ControlPlot(lines, np.array([ax], dtype=object), fig)
+    return finished(fig, [ax], [bars], verdict_title(diagnosis, title))
+
+
+def verdict_title(diagnosis, title) -> str:
+    """Return the title given, or the verdict."""
+    return f"Verdict: {diagnosis.verdict}" if title is None else title
 
 
 def draw_ranking(ax, diagnosis, rows):

@@ -6,7 +6,8 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
-_MODEL, _FADED = "#1f4e9c", "#9db4d8"
+from .diagnosis import draw_ranking, verdict_title
+from .sheet import finished, sheet
 
 
 def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **keywords) -> ct.ControlPlot:
@@ -22,22 +23,18 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **ke
     curves : int
         Amplitudes drawn at most.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    fig = sheet(9.5, 5.2, keywords)
     chosen = comparison.worst if record is None else comparison.records[record]
     data = chosen.record
-    fig = plt.gcf() if not plt.gcf().axes else plt.figure()
-    fig.set_size_inches(9.5, 5.2)
     grid = fig.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.3, 1))
     top = fig.add_subplot(grid[0, 0])
     below = fig.add_subplot(grid[1, 0], sharex=top)
     plane = fig.add_subplot(grid[:, 1])
-    lines = np.empty(3, dtype=object)
-    lines[0], lines[1] = [], []
+    dots, curves_drawn = [], []
     rows = np.unique(np.linspace(0, len(data.A) - 1, min(curves, len(data.A))).astype(int))
     for i in rows:
         shade = plt.get_cmap("viridis")(0.85 * i / max(len(data.A) - 1, 1))
-        good = np.isfinite(data.N[i])
+        good = np.isfinite(data.N[i]) & (data.N[i] != 0)  # what stood still has no place on these axes
         if not np.any(good):
             continue
         w, measured, model = data.omega[good], data.N[i, good], chosen.simulated[i, good]
@@ -45,26 +42,25 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **ke
         phase = np.degrees(np.unwrap(np.angle(measured)))
         phase -= 360 * np.ceil(np.max(phase) / 360 - 0.5)
         step = np.degrees(np.angle(model / measured)) - turn
-        lines[0] += top.loglog(w, np.abs(measured), "o", color=shade, ms=4)
-        lines[1] += top.loglog(w, np.abs(model), "-", color=shade, lw=1.2)
+        dots += top.loglog(w, np.abs(measured), "o", color=shade, ms=4)
+        curves_drawn += top.loglog(w, np.abs(model), "-", color=shade, lw=1.2)
         below.semilogx(w, phase, "o", color=shade, ms=4)
         below.semilogx(w, phase + step, "-", color=shade, lw=1.2)
-        lines[1][-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
+        curves_drawn[-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
     top.legend(frameon=False, fontsize=8, loc="lower left", handlelength=1.2, labelspacing=0.25)
     top.set_ylabel(f"|N| [{data.output_unit}/{data.input_unit}]")
     below.set_ylabel("Phase [deg]")
     below.set_xlabel("Frequency [rad/s]")
     top.set_title(f"error {chosen.nrmse:.2%} of |N| (dots measured, lines model)", loc="left", fontsize=10)
-    lines[2] = [error_plane(fig, plane, data, np.abs(chosen.relative))]
+    cells = error_plane(fig, plane, data, np.abs(chosen.relative))
     for ax in (top, below):
         ax.spines[["top", "right"]].set_visible(False)
         ax.grid(True, which="major", color="0.92", lw=0.7)
     _plain_ticks(below.xaxis)
     top.tick_params(which="both", labelbottom=False)
     plane.set_title("Error over the plane", loc="left", fontsize=10)
-    fig.suptitle(data.name if title is None else title, fontsize=11)
-    fig.tight_layout()
-    return ct.ControlPlot(lines, np.array([top, below, plane], dtype=object), fig)
+    lines = [dots, curves_drawn, [cells]]
+    return finished(fig, [top, below, plane], lines, data.name if title is None else title)
 
 
 def error_plane(fig, ax, data, error, limits=None, bar=True):
@@ -118,12 +114,7 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, **keywords) -> ct
     title : str or None
         Over the picture.
     """
-    from .diagnosis import draw_ranking
-
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    fig = plt.gcf() if not plt.gcf().axes else plt.figure()
-    fig.set_size_inches(9.5, 6.0)
+    fig = sheet(9.5, 6.0, keywords)
     top, bottom = fig.add_gridspec(2, 1, height_ratios=(1, 1.15))
     ax = fig.add_subplot(top)
     bars = draw_ranking(ax, diagnosis, rows)
@@ -142,8 +133,4 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, **keywords) -> ct
     error = diagnosis.ranking[0].nrmse if diagnosis.ranking else diagnosis.nrmse
     right.set_title(f"with {name}, {error:.2%}", loc="left", fontsize=10)
     right.set_ylabel("")
-    fig.suptitle(f"Verdict: {diagnosis.verdict}" if title is None else title, fontsize=11)
-    fig.tight_layout()
-    lines = np.empty(1, dtype=object)
-    lines[0] = list(bars)
-    return ct.ControlPlot(lines, np.array([ax, left, right], dtype=object), fig)
+    return finished(fig, [ax, left, right], [bars], verdict_title(diagnosis, title))

@@ -1,0 +1,46 @@
+"""What comparisons over time and over the (A, omega) plane have in common: several records, one answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A model beside records, each by itself in `records`.
+
+    `simulated` and `residual` are arrays for one record, tuples of arrays for several.
+    """
+
+    model: Any
+    records: tuple
+
+    def _each(self, name):
+        values = tuple(getattr(r, name) for r in self.records)
+        return values[0] if len(values) == 1 else values
+
+    @property
+    def simulated(self):
+        """Output of the model where there are measured values."""
+        return self._each("simulated")
+
+    @property
+    def residual(self):
+        """Measured minus simulated."""
+        return self._each("residual")
+
+    @property
+    def nrmse(self) -> float:
+        """Relative error of all records together."""
+        raise NotImplementedError
+
+    @property
+    def fit_percent(self) -> float:
+        """MATLAB's fit, ``100 (1 - nrmse)``."""
+        return 100 * (1 - self.nrmse)
+
+    @property
+    def worst(self):
+        """The record with the largest nrmse."""
+        return max(self.records, key=lambda r: r.nrmse)

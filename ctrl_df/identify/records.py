@@ -1,0 +1,41 @@
+"""Data as they are handed in: one or several records over time, or one or several tables over (A, omega)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from .frequency_measurement import FrequencyMeasurement
+from .measurement import Measurement
+
+
+def has_tables(data) -> bool:
+    """Whether the data are, or contain, tables over frequency."""
+    if isinstance(data, FrequencyMeasurement):
+        return True
+    return isinstance(data, Sequence) and any(isinstance(r, FrequencyMeasurement) for r in data)
+
+
+def as_tables(data, name: str = "data") -> tuple[FrequencyMeasurement, ...]:
+    """Return tables as a tuple; TypeError for anything else, records over time among them included."""
+    records = (data,) if isinstance(data, FrequencyMeasurement) else tuple(data)
+    bad = [r for r in records if not isinstance(r, FrequencyMeasurement)]
+    if bad or not records:
+        got = f"also {type(bad[0]).__name__}" if bad else "an empty sequence"
+        raise TypeError(
+            f"{name} must hold frequency tables only (FrequencyMeasurement), or records over time only; got "
+            f"{got}. "
+            "Study them in two calls, the second with the model of the first."
+        )
+    return records
+
+
+def as_records(data, name: str = "data") -> tuple[Measurement, ...]:
+    """Return records over time as a tuple; TypeError for anything else."""
+    records = tuple(data) if isinstance(data, Iterable) else (data,)
+    bad = [r for r in records if not isinstance(r, Measurement)]
+    if bad or not records:
+        got = type(bad[0]).__name__ if bad else "an empty sequence"
+        raise TypeError(
+            f"{name} must be a Measurement or several; got {got}. Wrap arrays: ctrl_df.Measurement(t, u, y)."
+        )
+    return records
