@@ -99,6 +99,13 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     return found
 
 
+def at_rest(core, usual, speed: float) -> dict[str, float]:
+    """Return the corrections by name of a mechanism that stands still, nothing bent, at the position measured."""
+    states = np.zeros(4 + (core.bristle_state + 1 if core.bristle is not None else 0))
+    states[[0, 2]] = float(usual[0])
+    return corrections(states, core, usual, speed)
+
+
 def _joint(core, acceleration) -> tuple[float, float]:
     """Return how far a joint is bent by the load that it accelerates, and at what rate."""
     if core.joint == IMPACT:

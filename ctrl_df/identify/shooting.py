@@ -246,7 +246,7 @@ class Problem:
                 continue
             column, windows, starts = simulator.nuisances.index("v"), self.windows[k], self.nuisance[k]
             rms = np.array([math.sqrt(float(np.mean(self.last[k][w] ** 2))) for w in windows.slices])
-            bad = (rms > 1.5 * np.median(rms)) & (rms > 2 * self.noise)
+            bad = (rms > 1.5 * np.quantile(rms, 0.25)) & (rms > 2 * self.noise)
             if not bad.any():
                 continue
             some = windows.only(bad)
@@ -255,7 +255,10 @@ class Problem:
             reach, chosen = self.priors[k][bad, column], starts[bad].copy()
             before = simulator.carried_on(windows, values, starts)[bad]
             before = np.where(np.isfinite(before), before, starts[bad])
-            tries: list[tuple[Any, Any]] = [(slice(None), before)]
+            tries: list[tuple[Any, Any]] = [
+                (slice(None), before),
+                (slice(None), simulator.at_rest(some, values)),
+            ]
             tries += [(column, f * reach) for f in _SPEEDS]
             if "slack" in simulator.nuisances:
                 at = simulator.nuisances.index("slack")

@@ -188,6 +188,14 @@ class Simulator:
             )
         return out
 
+    def at_rest(self, windows: Windows, values) -> np.ndarray:
+        """Return the initial states (nw, number of nuisances) with which every window begins at rest."""
+        part, rows = self._prepare(values), []
+        for w in range(len(windows)):
+            given = initial_states.at_rest(part.core, self._usual(part, windows, w), self.facts.speed)
+            rows.append([given[name] for name in self.nuisances])
+        return np.array(rows)
+
     def carried_on(self, windows: Windows, values, start: np.ndarray) -> np.ndarray:
         """Return the initial states that let every window go on where the one before it ends.
 
@@ -203,8 +211,7 @@ class Simulator:
                 continue
             run = self._window(part, drive, windows, w, start, record.t[[windows.begins[w], windows.ends[w]]])
             if run.status.ok and part.core is not None:
-                shift, drift = self._ramps(part, int(windows.begins[w + 1]))
-                usual = windows.x[w + 1] - shift, windows.v[w + 1] - drift, windows.a[w + 1]
+                usual = self._usual(part, windows, w + 1)
                 states = run.states[-1][part.offset :]
                 given = initial_states.corrections(states, part.core, usual, self.facts.speed)
                 found[w + 1] = [given[name] for name in self.nuisances]
@@ -312,19 +319,20 @@ class Simulator:
             return engine.start(x0, time)
         given = dict(zip(self.nuisances, start, strict=True)) if start is not None else {}
         i = int(windows.begins[w])
-        shift, drift = self._ramps(part, i)
-        usual = windows.x[w] - shift, windows.v[w] - drift, windows.a[w]
+        usual = self._usual(part, windows, w)
         states = x0[part.offset :]
         initial_states.fill(states, core, given, usual, self.facts.speed)
         for state, samples in part.lags:
             states[state] = samples[i]
         return engine.start(x0, time)
 
-    def _ramps(self, part, i) -> tuple[float, float]:
-        """Return what sensors add at sample i, and its rate."""
-        ramps = [(p, later) for p, later in part.output if isinstance(p, Ramp)]
-        shift = sum(p.offset + p.rate * (self.record.t[i] - later) for p, later in ramps)
-        return shift, sum(p.rate for p, _ in ramps)
+    def _usual(self, part, windows, w) -> tuple[float, float, float]:
+        """Return position, speed and acceleration with which a window begins, without what sensors add."""
+        ramps = [
+            (p, self.record.t[windows.begins[w]] - later) for p, later in part.output if isinstance(p, Ramp)
+        ]
+        shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
+        return windows.x[w] - shift, windows.v[w] - drift, windows.a[w]
 
 
 def free_run(
