@@ -1,9 +1,9 @@
 """Hidden-effect tests as a table: python benchmarks/diagnosis.py [--first 1000] [--seeds 4] [--jobs 2] [--peers] [--save FILE].
 
-Every rig is drawn anew (excitation, SNR, colour of noise, loop open or closed follow from the seed), diagnosed,
-and scored. Beside it: the true structure refitted (the best anyone can do), standard errors, and the peers a
-user would take today: a LASSO on the inverse-dynamics residual (scikit-learn) and SINDy (pysindy), where
-installed. A line of the saved file is one rig; a second run goes on from there.
+Every rig is drawn anew (excitation, SNR, colour of noise, loop open or closed follow from the seed),
+diagnosed, and scored. Beside it: the true structure refitted (the best anyone can do), standard errors, and
+the peers a user would take today: a LASSO on the inverse-dynamics residual (scikit-learn) and SINDy
+(pysindy), where installed. A line of the saved file is one rig; a second run goes on from there.
 """
 
 from __future__ import annotations

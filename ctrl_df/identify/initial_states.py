@@ -1,8 +1,8 @@
 """Initial states of a window: what the data say of them, corrected by what a fit finds, and back.
 
-Position and speed of the body that is measured are estimated from the record; the corrections of these, and all
-that is hidden (where the other body stands in a gap, how far a joint or the bristles are bent), are nuisance
-parameters of each window.
+Position and speed of the body that is measured are estimated from the record; the corrections of these, and
+all that is hidden (where the other body stands in a gap, how far a joint or the bristles are bent), are
+nuisance parameters of each window.
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
         found |= {"stretch": stretch - _joint(core, a)[0], "stretch_rate": rate}
     if core.bristle is not None:
         slip, full = _bristles(states, core)
-        found["bristle"] = states[core.bristle_state] / full - math.tanh(3 * slip / speed)
+        share = states[core.bristle_state] / full if full > 0 else 0.0
+        found["bristle"] = share - math.tanh(3 * slip / speed)
     return found
 
 

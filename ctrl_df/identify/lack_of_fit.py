@@ -1,9 +1,9 @@
 """What a fitted model still misses, by free forces: over time, place, speed, load, after reversals, at one frequency.
 
-Each kind adds forces of no particular law (bumps along the record, along the stroke, ...). Their effect on the
-output is simulated, what the model's own parameters and initial states could do is projected out, and the
-residual is regressed on the rest, whitened. A kind that explains more than chance tells that something is
-missing, and where.
+Each kind adds forces of no particular law (bumps along the record, along the stroke, ...). Their effect on
+the output is simulated, what the model's own parameters and initial states could do is projected out, and
+the residual is regressed on the rest, whitened. A kind that explains more than chance tells that something
+is missing, and where.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Start values by regression of the force on the motion: for an effect and the model's own parameters together.
 
-The refitted baseline has bent its own parameters towards the truth as far as it could; where an effect is strong
-the right start lies elsewhere for all parameters at once.
+The refitted baseline has bent its own parameters towards the truth as far as it could; where an effect is
+strong the right start lies elsewhere for all parameters at once.
 """
 
 from __future__ import annotations
@@ -111,7 +111,8 @@ def force_regression(motion: Motion, scales: Scales, names, extra=()):
     Returns
     -------
     weights : array
-        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for those not in `names`.
+        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for those not in
+        `names`.
     left : float
         Mean squared force that remains [N^2].
     """

@@ -1,14 +1,15 @@
 """The wavelength of a force ripple, sought in the motion as it was measured.
 
-A simulation that does not know the ripple yet is soon a wavelength away from the place where the mass really is:
-short ripples are lost in it. Here the measured place stands in the ripple's argument, and the equation of motion
-is integrated twice,
+A simulation that does not know the ripple yet is soon a wavelength away from the place where the mass
+really is: short ripples are lost in it. Here the measured place stands in the ripple's argument, and the
+equation of motion is integrated twice,
 
     y = x0 + v0 t + 1/m (u - friction + a sin kx + b cos kx), integrated twice,
 
-which is linear in all but k. Second differences take x0 and v0 out. What is left over has noise of two kinds, of the
-sensor and of forces; each frequency weighs by what is left at and around it (Whittle's likelihood), so that either
-may prevail. Then k is scanned, from the stroke down to what the smoothed position resolves.
+which is linear in all but k. Second differences take x0 and v0 out. What is left over has noise of two
+kinds, of the sensor and of forces; each frequency weighs by what is left at and around it (Whittle's
+likelihood), so that either may prevail. Then k is scanned, from the stroke down to what the smoothed
+position resolves.
 """
 
 from __future__ import annotations

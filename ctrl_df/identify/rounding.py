@@ -1,8 +1,9 @@
 """Evidence that a sensor rounds: the values keep to a grid, and the model tells which of its lines comes next.
 
-The error of a rounded signal is no noise: it is the distance to the next line of the grid. A model that is right to
-a few hundredths of a step still errs by a whole one wherever the motion passes the middle between two lines, so the
-size of its residual says little. What is compared here is how probable the recorded values are.
+The error of a rounded signal is no noise: it is the distance to the next line of the grid. A model that is
+right to a few hundredths of a step still errs by a whole one wherever the motion passes the middle between
+two lines, so the size of its residual says little. What is compared here is how probable the recorded
+values are.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ def rounding_evidence(measured, simulated, step: float) -> float:
     Returns
     -------
     float
-        In nats, with the spread about the lines and the model's own error at their likeliest values; -inf where
-        the model is further off than rounding explains.
+        In nats, with the spread about the lines and the model's own error at their likeliest values; -inf
+        where the model is further off than rounding explains.
     """
     from scipy.optimize import minimize_scalar
 

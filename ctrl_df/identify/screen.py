@@ -1,8 +1,8 @@
 """Start values and first evidence for every effect of the library, from the residual of the refitted baseline.
 
 What a candidate would change in the output is simulated; what the baseline's own parameters and starts could
-explain is projected out of that and of the residual first. The share of the residual that remains explained is
-the screening evidence, and the values that explain most are where the refit begins.
+explain is projected out of that and of the residual first. The share of the residual that remains explained
+is the screening evidence, and the values that explain most are where the refit begins.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ class Screen:
     Parameters
     ----------
     base : Candidate
-        The baseline fitted to windows that are short: there even a strong effect changes the output nearly linearly.
+        The baseline fitted to windows that are short: there even a strong effect changes the output nearly
+        linearly.
     data : Data
         In those windows.
     """

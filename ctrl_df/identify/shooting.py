@@ -15,13 +15,11 @@ from typing import Any
 import numpy as np
 
 from .simulator import Simulator, feasible
+from .start_search import rescue, scan_slack
 from .variables import variables_of
 from .windows import Windows, facts
 
 Signals = list[np.ndarray]
-
-# Speeds to begin a window with, over how far the estimate may be off.
-_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
 
 
 def _power(signals: Signals) -> float:
@@ -69,8 +67,8 @@ class Tangent:
 class Problem:
     """Records, windows and free parameters of one fit.
 
-    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the initial
-    states, `slopes` the derivatives of the last step.
+    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the
+    initial states, `slopes` the derivatives of the last step.
     """
 
     def __init__(self, model, records, names, budget, limits=None):
@@ -162,13 +160,13 @@ class Problem:
     def solve(self, theta, iterations, tolerance, robust):
         """Levenberg-Marquardt from `theta`; the initial states go along."""
         if self.fresh:
-            self._scan_slack(theta)
+            scan_slack(self, theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
         again = max(iterations // 2, 3)
         # without parameters a window found lets the next one go on where it ends
         for _ in range(1 if self.names else 4):
-            if not self._rescue_starts(theta):
+            if not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
         if self.names and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
@@ -178,11 +176,12 @@ class Problem:
     def _without_the_lost(self, theta, iterations, tolerance, robust):
         """Let the windows that fit decide the parameters, then find where the others begin; keep what is better.
 
-        A window whose start lies in a wrong valley pulls the parameters to where it can never leave that valley.
+        A window whose start lies in a wrong valley pulls the parameters to where it can never leave that
+        valley.
         """
         kept = theta, self.nuisance, self.last, self.slopes, self.converged
         trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
-        self._rescue_starts(trial)
+        rescue(self, trial)
         trial = self._descend(trial, iterations, tolerance, robust)
         if _power(self.last) < _power(kept[2]):
             return trial
@@ -233,78 +232,10 @@ class Problem:
         self.nuisance, self.last = nuisance, residual
         return theta
 
-    def _rescue_starts(self, theta) -> bool:
-        """Try other starts where single windows err far more than the rest; whether any was better.
-
-        Stick and slip make the error of a window a rough function of the speed it begins with, and so does a gap
-        of where in it and how fast the other body is: a start that is estimated badly may lie in another valley.
-        What the window before ends with is tried first.
-        """
-        found, values = False, self.values(theta)
-        for k, simulator in enumerate(self.simulators):
-            if "v" not in simulator.nuisances:
-                continue
-            column, windows, starts = simulator.nuisances.index("v"), self.windows[k], self.nuisance[k]
-            rms = np.array([math.sqrt(float(np.mean(self.last[k][w] ** 2))) for w in windows.slices])
-            bad = (rms > 1.5 * np.quantile(rms, 0.25)) & (rms > 2 * self.noise)
-            if not bad.any():
-                continue
-            some = windows.only(bad)
-            measured, least = self.records[k].y[some.samples], 0.7 * rms[bad] ** 2
-            self.priors[k][bad, column] *= 3
-            reach, chosen = self.priors[k][bad, column], starts[bad].copy()
-            before = simulator.carried_on(windows, values, starts)[bad]
-            before = np.where(np.isfinite(before), before, starts[bad])
-            tries: list[tuple[Any, Any]] = [
-                (slice(None), before),
-                (slice(None), simulator.at_rest(some, values)),
-            ]
-            tries += [(column, f * reach) for f in _SPEEDS]
-            if "slack" in simulator.nuisances:
-                at = simulator.nuisances.index("slack")
-                tries += [(slice(at, at + 2), pair) for pair in self._slacks(k)]
-            for which, value in tries:
-                trial = starts[bad].copy()
-                trial[:, which] = value
-                e = measured - simulator.run(some, values, trial)
-                for w, where in enumerate(some.slices):
-                    shift = 0.0 if simulator.tied else float(np.mean(e[where]))
-                    power = float(np.mean((e[where] - shift) ** 2))
-                    if power < least[w]:
-                        least[w], chosen[w], found = power, trial[w], True
-                        chosen[w, 0] += shift
-            starts[bad] = chosen
-            self._count(len(tries) * len(some) / len(windows))
-        return found
-
-    def _scan_slack(self, theta):
-        """Find where in its gap each window begins, and how fast it crosses it (the cost has several minima)."""
-        for k, simulator in enumerate(self.simulators):
-            if "slack" not in simulator.nuisances:
-                continue
-            at = simulator.nuisances.index("slack")
-            windows, chosen = self.windows[k], self.nuisance[k].copy()
-            least, values, tries = np.full(len(windows), np.inf), self.values(theta), self._slacks(k)
-            for place, rate in tries:
-                trial = self.nuisance[k].copy()
-                trial[:, at], trial[:, at + 1] = place, rate
-                e = self.measured[k] - simulator.run(windows, values, trial)
-                errors = np.array([np.sum((e[w] - e[w].mean()) ** 2) for w in windows.slices])
-                better = errors < least
-                chosen[better], least = trial[better], np.minimum(least, errors)
-            self.nuisance[k] = chosen
-            self._count(len(tries) / len(self.simulators))
-
-    def _count(self, runs):
+    def count(self, runs):
         """Count simulations that seek initial states: bounded by themselves, they leave the budget to the descent."""
         self.nfev += runs
         self.budget += runs
-
-    def _slacks(self, k) -> list[tuple[float, float]]:
-        """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a window with."""
-        speed = self.known[k].speed
-        rates = [f * speed for f in (0.0, -0.2, 0.2, -0.7, 0.7)]
-        return [(p, r) for p in (0.02, 0.25, 0.5, 0.75, 0.98) for r in rates]
 
     def jacobian(self, theta, nuisance, base, central=False):
         """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""

@@ -7,7 +7,6 @@ rounding act on the output's samples.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +19,7 @@ from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ..simulate.engine import Engine, State, sampled_drive
 from ..simulate.loop import closed_loop
 from . import initial_states
+from .drive import lagged, thinned
 from .measurement import Measurement
 from .windows import Windows, facts
 
@@ -154,8 +154,9 @@ class Simulator:
             Parameters that differ from the model's.
         start : (nw, number of nuisances) array or None
             Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
-            slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its stretch [m]
-            and rate [m/s] beyond the steady one, for bristles the share of full deflection beyond the steady one.
+            slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its stretch
+            [m] and rate [m/s] beyond the steady one, for bristles the share of full deflection beyond the
+            steady one.
         rounded : bool
             Whether an encoder of the model rounds the output. Fits leave it out: its steps have no slope.
 
@@ -298,7 +299,7 @@ class Simulator:
         signal = held
         for primitive, state in core.input_channel:
             if isinstance(primitive, Lag) and record.input_hold == "zoh":
-                signal = _lagged(t, signal, primitive.time_constant)
+                signal = lagged(t, signal, primitive.time_constant)
                 lags.append((state, signal))
             elif isinstance(primitive, Lag):
                 lags.append((state, signal))
@@ -306,7 +307,7 @@ class Simulator:
                 signal = primitive.value(signal)
         hold = record.input_hold
         if self.thin > 1:
-            time, value, hold = _thinned(t, held, self.thin)
+            time, value, hold = thinned(t, held, self.thin)
             time, value = self._before(time, value)
         return _Parts(Engine(inner), core, 0, time + input_delay, value, float(sum(delays)), output, [
             (state, np.interp(t - input_delay, t, s)) for state, s in lags
@@ -378,57 +379,3 @@ def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
             if values.get(name, current[name].value) < kinetic:
                 values[name] = kinetic
     return values
-
-
-def _lagged(t, u, time_constant):
-    """Return the output of a first-order lag at the samples of a held input, started at its steady value."""
-    from scipy.signal import lfilter
-
-    steps = np.diff(t)
-    if np.ptp(steps) <= 0.02 * np.mean(steps):
-        a = math.exp(-float(np.mean(steps)) / time_constant)
-        rest, _ = lfilter([1 - a], [1.0, -a], u[:-1], zi=np.array([a * u[0]]))
-        return np.concatenate(([u[0]], rest))
-    out = np.array(u, dtype=float)
-    for i, step in enumerate(steps):
-        a = math.exp(-step / time_constant)
-        out[i + 1] = a * out[i] + (1 - a) * u[i]
-    return out
-
-
-def _thinned(t, u, factor):
-    """Return times and values of a held input in fewer steps, and how to join them: "zoh" or "linear".
-
-    An input that changes seldom is given as it is, at the times when it changes. Of another one it is the knots of
-    a broken line whose second integral is that of the input at every knot.
-
-    A mass moved by either passes the same places at the knots: (s[k-1] + 4 s[k] + s[k+1]) T^2/6 equals the
-    second difference of the place.
-    """
-    from scipy.linalg import solve_banded
-
-    changes = np.flatnonzero(np.diff(u) != 0) + 1
-    if len(changes) <= len(u) // factor:
-        at = np.unique(np.concatenate(([0], changes, [len(u) - 1])))
-        return t[at], u[at], "zoh"
-    dt = float(t[-1] - t[0]) / (len(t) - 1)
-    count = (len(t) - 1) // factor
-    knots = np.arange(count + 1) * factor
-    speed = np.concatenate(([0.0], np.cumsum(u[:-1]) * dt))
-    place = np.concatenate(([0.0], np.cumsum(speed[:-1] * dt + 0.5 * dt * dt * u[:-1])))
-    step = dt * factor
-    right = np.empty(count + 1)
-    # ends: the place after the first interval, and the speed and place over the last one
-    right[1:-1] = (place[knots[2:]] - 2 * place[knots[1:-1]] + place[knots[:-2]]) * 6 / step**2
-    right[0] = place[knots[1]] * 6 / step**2
-    last = place[knots[-1]] - place[knots[-2]]
-    right[-1] = (speed[knots[-1]] * step - last) * 6 / step**2
-    bands = np.ones((3, count + 1))
-    bands[1] = 4.0
-    bands[1, 0] = bands[1, -1] = 2.0
-    values = solve_banded((1, 1), bands, right)
-    time = t[0] + knots * dt
-    rest = len(t) - 1 - int(knots[-1])
-    if rest:
-        time, values = np.append(time, t[-1]), np.append(values, u[-1])
-    return time, values, "linear"

@@ -15,7 +15,7 @@ from .regression import Start, force_regression, motion_of
 from .screen import Screen, starts_for
 from .simulator import feasible
 from .trial import FORCED, Data, Trial, prepare
-from .valleys import THRESHOLDS, hopped, open_range, rough
+from .valleys import all_hopped, begun_at, hopped, rough, settled
 
 CONFIRMED = 6
 """Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
@@ -24,9 +24,8 @@ CONFIRMED = 6
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
 _CLOSE = 60.0
-# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain;
-# error over the best candidate's beyond which it is not worth another try.
-_FLOOR, _HOPELESS = 1.03, 4.0
+# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain.
+_FLOOR = 1.03
 
 # Effects whose error has many valleys over long windows: short ones first.
 _CURVED = frozenset(
@@ -144,7 +143,8 @@ class Study:
     def _stages(self, fits):
         """Return the fits in windows of every length that may be judged by, the shortest first, and their floor.
 
-        The floor is the error that a fit can come down to at best: over short windows nearly every model follows.
+        The floor is the error that a fit can come down to at best: over short windows nearly every model
+        follows.
         """
         shortest, middle, longest = self.levels
         if self.data.forced:
@@ -152,8 +152,8 @@ class Study:
         fits = [middle.moved(f) for f in fits]
         short = [shortest.moved(f) for f in fits]
         floor = _FLOOR * min(f.rmse for f in short)
-        fits = _all_hopped(fits, middle, floor)
-        return [short, fits, _all_hopped([longest.moved(f) for f in fits], longest, floor)], floor
+        fits = all_hopped(fits, middle, floor)
+        return [short, fits, all_hopped([longest.moved(f) for f in fits], longest, floor)], floor
 
     def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
         """Return a candidate fitted to the end: exactly, and in the best valley unless nothing better is possible."""
@@ -162,12 +162,12 @@ class Study:
             fit = fine.moved(fit, 8, 1e-6)
         if rough(fit) and fit.rmse > floor:
             fit = hopped(fit, fine.fit)
-        return _settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
+        return settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
 
     def _again(self, chosen, those) -> list[Trial]:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
         fine = self.data.fine
-        begun = [_begun_at(t, best, fine) for best in those for t in chosen if t is not best]
+        begun = [begun_at(t, best, fine) for best in those for t in chosen if t is not best]
         judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 
@@ -189,56 +189,6 @@ class Study:
         return indistinguishable(a.outputs, b.outputs, self.noise)
 
 
-def _all_hopped(fits, data: Data, floor: float) -> list:
-    """Return fits in their best valleys: those that are neither at the floor nor far behind the best."""
-    least = min(f.rmse for f in fits)
-    return [hopped(f, data.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
-
-
-def _begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
-    """Fit a candidate again from where the best one ended: it may be that one's limit (stiction, a narrow Stribeck bump).
-
-    The cost of stick and slip is rough: of two fits of one law each may end in its own valley.
-    """
-    table, mine, its = tried.block.parameters, list(tried.block._keys)[-1], list(best.block._keys)[-1]
-    values = {}
-    for name, p in best.block.parameters.items():
-        name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
-        if name in table and table[name].unit == p.unit:
-            values[name] = p.value
-    frictions = {t.block.effects[-1].role for t in (tried, best)} == {"friction"}
-    if not frictions or not any(name.startswith(f"{mine}.") for name in values):
-        return None
-    block = tried.block.with_parameters(feasible(tried.block, values))
-    near = data.fit(block, (), starts=best.train.starts, iterations=4)
-    fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
-    return _settled(data.judged(replace(tried, train=fitted)), data)
-
-
-def _settled(tried: Trial, data: Data) -> Trial:
-    """Choose thresholds by the windows to be judged by, within what the windows fitted leave open."""
-    for name in THRESHOLDS:
-        if name not in tried.train.names:
-            continue
-        low, high = open_range(tried.train, data.fit, name)
-        for _ in range(2 if high > low else 0):
-            values = np.geomspace(low, high, 7)
-            runs = [_with_level(tried, name, v, data) for v in values]
-            i = min(range(len(runs)), key=lambda k: runs[k].held_rmse)
-            if runs[i].held_rmse < tried.held_rmse:
-                tried = runs[i]
-            low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
-        tried = replace(
-            tried, train=data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
-        )
-    return tried
-
-
-def _with_level(tried: Trial, name, value, data: Data) -> Trial:
-    block = tried.block.with_parameters(feasible(tried.block, {name: value}))
-    return data.judged(replace(tried, train=replace(tried.train, model=block)))
-
-
 def _periodic_enough(tried: Trial, span) -> bool:
     """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
@@ -255,9 +205,10 @@ def _promising(found) -> list[Trial]:
 def _longest_coherent(errors) -> int:
     """Return the level to judge at: the longest windows over which the best model's error does not grow.
 
-    `errors`: rms errors per level, short windows first, the baseline's and then the candidates'. Where the best
-    grows with the length (motion that is sensitive to its start, force noise in a real machine, an effect
-    outside the library) short windows are clearer, provided that they show what is missing as well as long ones do.
+    `errors`: rms errors per level, short windows first, the baseline's and then the candidates'. Where the
+    best grows with the length (motion that is sensitive to its start, force noise in a real machine, an
+    effect outside the library) short windows are clearer, provided that they show what is missing as well
+    as long ones do.
     """
     base, best = [e[0] for e in errors], [min(e) for e in errors]
     at = 0
@@ -285,7 +236,8 @@ def _try(job) -> Trial | None:
             break
         found += _fitted(start, screen, shortest, free)
     if cls.id in _CURVED or screen.block.core.bodies == 2:
-        # The baseline may have bent far from the truth to make up for what is missing: begin where the user does.
+        # The baseline may have bent far from the truth to make up for what is missing: begin where the user
+        # does.
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     span = float(np.ptp(screen.motion.x))

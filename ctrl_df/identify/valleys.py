@@ -1,18 +1,23 @@
 """Laws with events make the cost rough: a fit is begun again from either side of where it ended.
 
-An impact more or less, a mass that sticks or breaks away: each changes the output by a jump, so that the cost over
-a gap, a restitution or a static level has many valleys side by side. The next ones are a hop away.
+An impact more or less, a mass that sticks or breaks away: each changes the output by a jump, so that the
+cost over a gap, a restitution or a static level has many valleys side by side. The next ones are a hop
+away.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 from .candidate import Candidate
 from .simulator import feasible
+from .trial import Data, Trial
 
-THRESHOLDS = ("stiction.level", "stribeck.level")
-"""Levels that nothing but breaking away shows: records leave ranges of them open."""
+# levels that nothing but breaking away shows: records leave ranges of them open
+_THRESHOLDS = ("stiction.level", "stribeck.level")
 
 _ROUGH = ("backlash.", "hard_stop.", "stiction.", "stribeck.")
 _HOPS = (0.6, 0.8, 1.25, 1.6)
@@ -26,6 +31,7 @@ _SMALL = (
     1.05,
     1.25,
 )  # static levels: thresholds that single samples pass
+_HOPELESS = 4.0  # error over the best candidate's beyond which another try is not worth it
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
 _REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a threshold that floor is sought
@@ -63,7 +69,57 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
     return found
 
 
-def open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> tuple[float, float]:
+def all_hopped(fits, data: Data, floor: float) -> list:
+    """Return fits in their best valleys: those that are neither at the floor nor far behind the best."""
+    least = min(f.rmse for f in fits)
+    return [hopped(f, data.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
+
+
+def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
+    """Fit a candidate again from where the best one ended: it may be that one's limit (stiction, a narrow Stribeck bump).
+
+    The cost of stick and slip is rough: of two fits of one law each may end in its own valley.
+    """
+    table, mine, its = tried.block.parameters, list(tried.block._keys)[-1], list(best.block._keys)[-1]
+    values = {}
+    for name, p in best.block.parameters.items():
+        name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
+        if name in table and table[name].unit == p.unit:
+            values[name] = p.value
+    frictions = {t.block.effects[-1].role for t in (tried, best)} == {"friction"}
+    if not frictions or not any(name.startswith(f"{mine}.") for name in values):
+        return None
+    block = tried.block.with_parameters(feasible(tried.block, values))
+    near = data.fit(block, (), starts=best.train.starts, iterations=4)
+    fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
+    return settled(data.judged(replace(tried, train=fitted)), data)
+
+
+def settled(tried: Trial, data: Data) -> Trial:
+    """Choose thresholds by the windows to be judged by, within what the windows fitted leave open."""
+    for name in _THRESHOLDS:
+        if name not in tried.train.names:
+            continue
+        low, high = _open_range(tried.train, data.fit, name)
+        for _ in range(2 if high > low else 0):
+            values = np.geomspace(low, high, 7)
+            runs = [_with_level(tried, name, v, data) for v in values]
+            i = min(range(len(runs)), key=lambda k: runs[k].held_rmse)
+            if runs[i].held_rmse < tried.held_rmse:
+                tried = runs[i]
+            low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
+        tried = replace(
+            tried, train=data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
+        )
+    return tried
+
+
+def _with_level(tried: Trial, name, value, data: Data) -> Trial:
+    block = tried.block.with_parameters(feasible(tried.block, {name: value}))
+    return data.judged(replace(tried, train=replace(tried.train, model=block)))
+
+
+def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> tuple[float, float]:
     """Return the least and the largest value of a threshold for which the windows fitted are the same."""
     at, edges = found.parameters[name], []
     for sign in (-1, 1):
