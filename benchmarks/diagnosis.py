@@ -1,4 +1,6 @@
-"""Hidden-effect tests as a table: python benchmarks/diagnosis.py [--first 1000] [--seeds 4] [--jobs 2] [--peers] [--save FILE].
+"""Hidden-effect tests as a table.
+
+    python benchmarks/diagnosis.py [--first 1000] [--seeds 4] [--jobs 2] [--peers] [--save FILE]
 
 Every rig is drawn anew (excitation, SNR, colour of noise, loop open or closed follow from the seed),
 diagnosed, and scored. Beside it: the true structure refitted (the best anyone can do), standard errors, and
@@ -42,9 +44,11 @@ PAIRS = (
 def options(seed):
     """Return the circumstances that follow from a seed."""
     return dict(
-        excitation=rigs.EXCITATIONS[seed % 3], snr_db=(60.0, 40.0)[seed // 3 % 2], noise=rigs.NOISES[seed // 2 % 3],
+        excitation=rigs.EXCITATIONS[seed % 3],
+        snr_db=(60.0, 40.0)[seed // 3 % 2],
+        noise=rigs.NOISES[seed // 2 % 3],
         closed_loop=seed % 4 == 3,
-    )  # fmt: skip
+    )
 
 
 def free_of(rig):
@@ -76,15 +80,19 @@ def single(effect, seed, peers):
     named = [{c.id, *c.equivalents} & right for c in found.ranking]
     model = found.best.model if found.best else found.model
     row = dict(
-        top1=bool(found.verdict in ("effect", "ambiguous") and named[0]), top3=any(named[:3]), verdict=found.verdict,
-        over=over_the_truth(rig, train, held, model), seconds=seconds, named=found.ranking[0].id,
-    )  # fmt: skip
+        top1=bool(found.verdict in ("effect", "ambiguous") and named[0]),
+        top3=any(named[:3]),
+        verdict=found.verdict,
+        over=over_the_truth(rig, train, held, model),
+        seconds=seconds,
+        named=found.ranking[0].id,
+    )
     row["peers"] = {k: bool(right & set(peer(train))) for k, peer in PEERS.items()} if peers else {}
     return row
 
 
 def over_the_truth(rig, train, held, model):
-    """Return the held-out error of a model over that of the true structure refitted, over the same windows."""
+    """Return the held-out error of a model over that of the true structure refitted to the same windows."""
     data = prepare(rig.baseline, [train], [held])
     free = [k for k in default_free(rig.true_block) if k not in rig.known]
     true = data.level(4).moved(data.level(16).fit(rig.true_block, free))

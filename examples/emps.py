@@ -3,8 +3,9 @@
 #
 #     python examples/emps.py FOLDER [REPORT.html]
 #
-# FOLDER holds DATA_EMPS.mat and DATA_EMPS_PULSES.mat of the benchmark of Janot, Gautier & Brunot (2019): a carriage
-# on a ball screw, 24.8 s at 1 kHz, under its own position controller. The data are no part of this repository.
+# FOLDER holds DATA_EMPS.mat and DATA_EMPS_PULSES.mat of the benchmark of Janot, Gautier & Brunot (2019): a
+# carriage on a ball screw, 24.8 s at 1 kHz, under its own position controller. The data are no part of this
+# repository.
 
 # %%
 import math
@@ -22,8 +23,8 @@ import ctrl_df as cdf
 TRAIN, TEST = "DATA_EMPS", "DATA_EMPS_PULSES"
 
 # %% [markdown]
-# Two traps. `vir` is in volts, and the drive makes gtau newtons of each; the pulses of the test record are inside
-# `vir` already and must not be added again.
+# Two traps. `vir` is in volts, and the drive makes gtau newtons of each; the pulses of the test record are
+# inside `vir` already and must not be added again.
 
 
 # %%
@@ -43,9 +44,10 @@ def controller(folder) -> tuple[float, float, float]:
 
 # %% [markdown]
 # Two figures judge a model. **Force error**: the force that the measured motion demands of the model, against
-# the force recorded; once as published, and once counting that a force held over a sample acts half a sample late
-# (at the pulses of the test record that matters). **Free run**: the model alone on the recorded force, from rest at the first sample; nothing
-# holds a mass on a rail in place, so every tenth of a newton adds up over 25 s.
+# the force recorded; once as published, and once counting that a force held over a sample acts half a sample
+# late (at the pulses of the test record that matters). **Free run**: the model alone on the recorded force,
+# from rest at the first sample; nothing holds a mass on a rail in place, so every tenth of a newton adds up
+# over 25 s.
 
 
 # %%
@@ -93,8 +95,8 @@ def line(name, model, train, test) -> str:
 
 
 # %% [markdown]
-# The ladder knows rolling friction only as Coulomb's: full at once. On this screw it rises with speed, over some
-# centimetres a second. No effect of the library is that map; it takes twenty lines to give it one.
+# The ladder knows rolling friction only as Coulomb's: full at once. On this screw it rises with speed, over
+# some centimetres a second. No effect of the library is that map; it takes twenty lines to give it one.
 
 
 # %%
@@ -152,8 +154,8 @@ def main(folder, report=None):
         if effect.id == "position_ripple":
             print(f"The force repeats every {1e3 * effect.wavelength:.4g} mm of travel.\n")
 
-    # one more rung, of our own; a tenth of a second at a time, as the slow wander of friction (a newton from one
-    # record to the other) drowns all else over longer windows
+    # one more rung, of our own; a tenth of a second at a time, as the slow wander of friction (a newton from
+    # one record to the other) drowns all else over longer windows
     friction = study.model.parameters["coulomb.level"].value
     begun = study.model.with_parameters({"coulomb.level": 0.6 * friction}).with_effect(
         RisingFriction(0.4 * friction)
@@ -163,9 +165,8 @@ def main(folder, report=None):
     for name, fit in zip(("refitted, 0.1 s windows", "+ rising friction (ours)"), fits, strict=True):
         print(line(name, fit.model, train, test), flush=True)
         held = cdf.compare(fit.model, test, window=0.1)
-        print(
-            f"    rms over windows of 0.1 s: train {1e6 * fit.comparison.rmse:.2f} um, test {1e6 * held.rmse:.2f} um"
-        )
+        rms = f"train {1e6 * fit.comparison.rmse:.2f} um, test {1e6 * held.rmse:.2f} um"
+        print(f"    rms over windows of 0.1 s: {rms}")
     improved = fits[-1].model
     print("\n" + "\n".join(f"  {p}" for p in fits[-1].parameters.values()))
 

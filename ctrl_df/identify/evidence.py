@@ -1,4 +1,8 @@
-"""Evidence of candidates over the baseline: log likelihood ratios of whitened residuals, less a price of parameters."""
+"""Evidence of candidates over the baseline.
+
+Log likelihood ratios of whitened residuals, less a price of parameters; a sensor that rounds is judged by how
+probable the recorded values are.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +18,9 @@ ROUNDED = "sensor_quantization"
 
 
 def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
-    """Return the trials with their evidence over the baseline, best first, and the noise by which it was judged.
+    """Return the trials with their evidence over the baseline, best first, and the noise that judged it.
 
-    Residuals are whitened by the noise model of the best one's.
+    The noise model is of the residuals of the best one, a sensor that rounds left aside.
     """
     best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
     noise = whitener(best.residuals)

@@ -101,7 +101,7 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
 
 
 def at_rest(core, usual, speed: float) -> dict[str, float]:
-    """Return the corrections by name of a mechanism that stands still, nothing bent, at the position measured."""
+    """Return the corrections, by name, of a mechanism at rest at the measured position, nothing bent."""
     states = np.zeros(4 + (core.bristle_state + 1 if core.bristle is not None else 0))
     states[[0, 2]] = float(usual[0])
     return corrections(states, core, usual, speed)

@@ -1,9 +1,9 @@
-"""What a fitted model still misses, by free forces: over time, place, speed, load, after reversals, at one frequency.
+"""What a fitted model still misses, told by free forces.
 
-Each kind adds forces of no particular law (bumps along the record, along the stroke, ...). Their effect on
-the output is simulated, what the model's own parameters and initial states could do is projected out, and
-the residual is regressed on the rest, whitened. A kind that explains more than chance tells that something
-is missing, and where.
+Each kind adds forces of no particular law: over time, place, speed or load, after reversals, at one
+frequency (bumps along the record, along the stroke, ...). Their effect on the output is simulated, what the
+model's own parameters and initial states could do is projected out, and the residual is regressed on the
+rest, whitened. A kind that explains more than chance tells that something is missing, and where.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class _Scene:
         ]
 
     def response(self, shape) -> list[np.ndarray]:
-        """Return the change of output by a force; `shape` gives it (n,) for one record's motion, of order one."""
+        """Return the change of output by a force: `shape(motion)` (n,) of one record, of order one."""
         changes = []
         for record, windows, start, y, motion in zip(
             self.view.records,
@@ -146,7 +146,7 @@ class _Scene:
         yield "frequency", [_wave(line, np.cos), _wave(line, np.sin)], [(line, line)]
 
     def _line(self) -> float:
-        """Return the frequency [Hz] at which the residual's acceleration stands out most from its neighbours."""
+        """Return the frequency [Hz] at which the residual's acceleration stands out most."""
         from scipy.ndimage import median_filter
 
         i = int(np.argmax([len(e) for e in self.fit.residual]))

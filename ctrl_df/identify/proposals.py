@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 # Effects that vanish as their main parameter goes to zero, in proportion to it.
 PROPORTIONAL = frozenset({
     "viscous", "coulomb", "quadratic_drag", "asymmetric_coulomb", "asymmetric_viscous", "load_friction",
-    "constant_force", "linear_spring", "cubic_spring", "input_dead_zone", "input_delay", "input_lag", "sensor_delay",
-    "sensor_offset", "drift",
+    "constant_force", "linear_spring", "cubic_spring", "input_dead_zone", "input_delay", "input_lag",
+    "sensor_delay", "sensor_offset", "drift",
 })  # fmt: skip
 
 
@@ -41,7 +41,7 @@ def proposals(cls, screen: Screen):
 
 
 def _generic(cls, screen: Screen):
-    """Yield the effect at sizes of the main parameter from small to large, others at default or typical size."""
+    """Yield the effect with its main parameter from small to large, others at default or typical size."""
     values, main = {}, None
     for f in dataclasses.fields(cls):
         spec = f.metadata.get("parameter")
@@ -157,7 +157,10 @@ def _quantization(screen):
 
 
 def _ripple(screen):
-    """Try long waves: sine and cosine are two small changes, fitted together (`WaveSearch` finds the short ones)."""
+    """Try long waves: sine and cosine are two small changes, fitted together.
+
+    `WaveSearch` finds the short ones.
+    """
     s = screen.scales
     span = float(np.ptp(screen.motion.x))
     turns = np.geomspace(0.6, 6.0, 20)

@@ -1,7 +1,8 @@
-"""Start values by regression of the force on the motion: for an effect and the model's own parameters together.
+"""Start values by regression of the force on the motion.
 
-The refitted baseline has bent its own parameters towards the truth as far as it could; where an effect is
-strong the right start lies elsewhere for all parameters at once.
+An effect and the model's own parameters are sought together: the refitted baseline has bent its own
+parameters towards the truth as far as it could, and where an effect is strong the right start lies elsewhere
+for all of them at once.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .windows import facts
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of all records: force [N], reported position [m], smoothed velocity [m/s], acceleration [m/s^2]."""
+    """Samples of all records: force [N], position [m] as reported, velocity and acceleration smoothed."""
 
     u: np.ndarray
     x: np.ndarray
@@ -43,7 +44,7 @@ def motion_of(view, thin: int) -> Motion:
 
 @dataclass(frozen=True)
 class Start:
-    """An effect with start values and the share of the residual it is expected to leave (1: explains nothing)."""
+    """An effect with start values, and the share of the residual it should leave (1: explains nothing)."""
 
     effect: Effect
     left: float

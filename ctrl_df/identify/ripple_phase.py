@@ -1,4 +1,4 @@
-"""The phase of a ripple belongs to the record: where an encoder counts from zero is chosen anew at every start."""
+"""The phase of a ripple belongs to the record: an encoder's zero is chosen anew at every start."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ TRIED = 6
 """Phases from which one is sought."""
 
 WORTH = 50.0
-"""Log likelihood ratio [nats, for white noise] that another phase must bring; the model's own stands otherwise."""
+"""Log likelihood ratio [nats, for white noise] that another phase must bring, or the model's own stands."""
 
 
 def rephased(near: Candidate, fit) -> Candidate:

@@ -1,4 +1,4 @@
-"""Evidence that a sensor rounds: the values keep to a grid, and the model tells which of its lines comes next.
+"""Evidence that a sensor rounds: values keep to a grid, and the model tells which line comes next.
 
 The error of a rounded signal is no noise: it is the distance to the next line of the grid. A model that is
 right to a few hundredths of a step still errs by a whole one wherever the motion passes the middle between
@@ -18,7 +18,7 @@ _COARSE = 0.4  # rms residual over the step up to which rounding can be what mak
 
 
 def rounding_evidence(measured, simulated, step: float) -> float:
-    """Return the log likelihood of values under rounding to a grid of `step`, given what a model says before rounding.
+    """Return the log likelihood of values under rounding, given what a model says before it.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def rounding_evidence(measured, simulated, step: float) -> float:
 
 
 def _lines(distance, error: float) -> float:
-    """Return the log probability of the lines seen, `distance` steps from where the model is, whose error is given."""
+    """Return the log probability of the lines seen, `distance` from a model with that `error`, in steps."""
     from scipy.special import ndtr
 
     sure = ndtr((distance + 0.5) / error) - ndtr((distance - 0.5) / error)

@@ -1,4 +1,4 @@
-"""Start values and first evidence for every effect of the library, from the residual of the refitted baseline.
+"""Start values and first evidence for every effect, from the residual of the refitted baseline.
 
 What a candidate would change in the output is simulated; what the baseline's own parameters and starts could
 explain is projected out of that and of the residual first. The share of the residual that remains explained
@@ -20,7 +20,7 @@ from .trial import Data, Scales, carried
 
 
 class Screen:
-    """The refitted baseline seen as a linear map: its residual, and all that refitting could change projected out.
+    """The refitted baseline as a linear map: its residual, what refitting could change projected out.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Screen:
         ]
 
     def change(self, block) -> list[np.ndarray] | None:
-        """Return the change of output that `block` makes against the baseline; None if it cannot be simulated."""
+        """Return the change of output from the baseline to `block`; None if it cannot be simulated."""
         change = []
         for record, windows, start, y in zip(
             self.view.records, self.view.windows, self.starts(block), self.base.simulated, strict=True

@@ -120,7 +120,7 @@ class Problem:
         return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.windows, nuisance, strict=True)]
 
     def round(self, theta):
-        """Let an encoder of the model round the outputs of the solution (fits leave it out: it has no slope)."""
+        """Let an encoder of the model round the solution's outputs (fits leave it out: it has no slope)."""
         if "sensor_quantization" not in getattr(self.block, "_keys", ()):
             return
         values = self.values(theta)
@@ -174,10 +174,10 @@ class Problem:
         return theta
 
     def _without_the_lost(self, theta, iterations, tolerance, robust):
-        """Let the windows that fit decide the parameters, then find where the others begin; keep what is better.
+        """Let the windows that fit decide the parameters, then find where the others begin.
 
         A window whose start lies in a wrong valley pulls the parameters to where it can never leave that
-        valley.
+        valley. What is better is kept.
         """
         kept = theta, self.nuisance, self.last, self.slopes, self.converged
         trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
@@ -189,7 +189,7 @@ class Problem:
         return theta
 
     def _trusts(self) -> Signals:
-        """Return weights of the samples (n,): 1 in windows that err like the rest, little in those that err more."""
+        """Return weights of the samples (n,): 1 in windows that err like the rest, less in worse ones."""
         trusts = []
         for windows, e in zip(self.windows, self.last, strict=True):
             power = np.array([float(np.mean(e[w] ** 2)) for w in windows.slices])
@@ -233,7 +233,7 @@ class Problem:
         return theta
 
     def count(self, runs):
-        """Count simulations that seek initial states: bounded by themselves, they leave the budget to the descent."""
+        """Count simulations that seek initial states: bounded by themselves, outside the descent's budget."""
         self.nfev += runs
         self.budget += runs
 
@@ -268,7 +268,7 @@ class Problem:
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
     def _by_start(self, k, theta, nuisance, base) -> np.ndarray:
-        """Return the derivatives (n, ns) of one record's output by its initial states, all windows at once."""
+        """Return derivatives (n, ns) of one record's output by its initial states, all windows at once."""
         simulator, windows, rows = self.simulators[k], self.windows[k], []
         values = self.values(theta)
         for j, name in enumerate(simulator.nuisances):

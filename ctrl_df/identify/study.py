@@ -18,7 +18,7 @@ from .trial import FORCED, Data, Trial, prepare
 from .valleys import all_hopped, begun_at, hopped, rough, settled
 
 CONFIRMED = 6
-"""Candidates that are refitted at the full rate, at most: two, and all that the first look left near the best."""
+"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
 
 # Best error over windows four times as long that still counts as the same.
 _GROWTH = 1.35
@@ -62,7 +62,7 @@ class Study:
         self.data = self.levels[which]
 
     def _baseline(self, block) -> Trial:
-        """Fit the baseline from its own values and from a regression of the force on motion; keep the better."""
+        """Fit the baseline from its own values and from a regression of the force; keep the better."""
         shortest, data = self.levels[:2]
         begins, table = [block], block.parameters
         names = {"mass", "coulomb.level", "viscous.coefficient"}
@@ -91,7 +91,7 @@ class Study:
         return found
 
     def _look(self, classes, executor, data: Data):
-        """Fit every effect over one set of windows; return the baseline there, and the effects, best first."""
+        """Fit every effect over one set of windows; return the baseline there and the effects, best first."""
         base = data.moved(self.base.train, 3)
         screen = Screen(base, data)
         run = map if executor is None else executor.map
@@ -113,7 +113,10 @@ class Study:
     # --- the best, carefully --------------------------------------------------------------------------
 
     def confirm(self, found) -> list[Trial]:
-        """Refit the baseline and the best candidates at the full rate, in windows of the right length; best first."""
+        """Refit baseline and best candidates at the full rate; return these candidates, best first.
+
+        The windows are of the length that suits these data (`_longest_coherent`).
+        """
         found = _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         # An error of whole steps of the sensor is averaged out by long windows, and followed by short ones.
@@ -141,7 +144,7 @@ class Study:
         return chosen
 
     def _stages(self, fits):
-        """Return the fits in windows of every length that may be judged by, the shortest first, and their floor.
+        """Return the fits in windows of every length that may judge, the shortest first, and their floor.
 
         The floor is the error that a fit can come down to at best: over short windows nearly every model
         follows.
@@ -156,7 +159,10 @@ class Study:
         return [short, fits, all_hopped([longest.moved(f) for f in fits], longest, floor)], floor
 
     def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
-        """Return a candidate fitted to the end: exactly, and in the best valley unless nothing better is possible."""
+        """Return a candidate in its best valley, unless nothing better is possible.
+
+        `exactly`: iterated to the end first.
+        """
         fine, fit = self.data.fine, tried.train
         if exactly:
             fit = fine.moved(fit, 8, 1e-6)
@@ -195,7 +201,7 @@ def _periodic_enough(tried: Trial, span) -> bool:
 
 
 def _promising(found) -> list[Trial]:
-    """Return the candidates to confirm: the first two, and all near the best by evidence or by plain error."""
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by error."""
     close = sorted(found, key=lambda t: t.train.rmse)[:3]
     close = [t for t in close if t.train.rmse < 1.5 * close[0].train.rmse]
     likely = found[:2] + [t for t in found[2:CONFIRMED] if t.evidence > 0.2 * found[0].evidence]
@@ -220,7 +226,7 @@ def _longest_coherent(errors) -> int:
 
 
 def _left(base, best, at) -> float:
-    """Return the share of the baseline's error beyond noise that the best model leaves; 1 where there is hardly any."""
+    """Return the share of the baseline's error beyond noise that the best leaves; 1 where hardly any is."""
     noise = best[0] ** 2
     there = base[at] ** 2 - noise
     return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > 0.1 * noise else 1.0

@@ -21,13 +21,13 @@ SHORTEST = 16
 """How many times as many the shortest windows are as the longest."""
 
 SHORTER = 4
-"""Still more windows, where forces that no model has (friction that wanders) outweigh the noise of the sensor."""
+"""Still more windows, where forces that no model has (friction that wanders) outweigh the sensor's noise."""
 
 FORCED = 50.0
 """Error over the noise, in the shortest windows, that only such forces make."""
 
 FAR = 12.0
-"""Factor by which the model's own parameters may be off: beyond it a fit explains with them what they are not."""
+"""Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
 
 LEAST = 50
 """Samples of the shortest window."""
@@ -66,7 +66,7 @@ class View:
     windows: tuple[Windows, ...]
 
     def shorter(self, factor: int) -> View:
-        """Return windows up to `factor` times as many, over the same samples; none is shorter than `LEAST` samples."""
+        """Return up to `factor` times as many windows over the same samples, each of `LEAST` or more."""
         pairs = zip(self.records, self.windows, strict=True)
         return View(self.records, tuple(split(r, w, factor, LEAST) for r, w in pairs))
 
@@ -166,7 +166,7 @@ class Data:
 
     @property
     def sampled(self) -> Data:
-        """The same with every second window to learn from, or every fourth of many: enough for a first look."""
+        """The same with every second window to learn from, or every fourth of many, for a first look."""
         return replace(self, train=self.train.every(SHORTER if self.forced else 2))
 
     @property
@@ -184,7 +184,7 @@ class Data:
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
-        """Fit a model found over other windows to these; windows that begin at one sample share initial states."""
+        """Fit a model found over other windows to these; those that begin at one sample share states."""
         starts = same_begins(found, self.train.windows)
         if sum(map(len, self.train.windows)) > sum(map(len, found.windows)):
             # The initial states of new windows first: parameters would bend to make up for them.
@@ -205,7 +205,7 @@ class Data:
         return ran["train"] / self.train.spread, ran["held"] / self.held.spread
 
     def _ran(self, model, name) -> Candidate:
-        """Fit the initial states alone: those of short windows are found without fail, the others begin there too."""
+        """Fit the initial states alone: short windows first, found without fail; the others begin there."""
         rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
         short = getattr(self.level(self.factors[0]), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
@@ -247,7 +247,7 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
 
 
 def _rough(record, thin: int) -> bool:
-    """Whether the input jumps about within the steps of a thinned one: its peaks then decide what breaks away."""
+    """Whether the input jumps about within the steps of a thinned one: its peaks decide what breaks away."""
     u, t = record.u, record.t
     off = np.abs(u - np.interp(t, t[::thin], u[::thin]))
     # single jumps (steps of the force) are no harm: what counts is what most samples do
@@ -269,7 +269,7 @@ def _scales(block, records) -> Scales:
 
 
 def same_begins(found: Candidate, windows) -> list[np.ndarray]:
-    """Return initial states for windows from a fit over others: theirs where both begin at one sample, else none."""
+    """Return initial states from a fit over other windows: theirs where both begin at one sample, else 0."""
     starts = []
     for old, new, states in zip(found.windows, windows, found.starts, strict=True):
         at = np.searchsorted(old.begins, new.begins)
@@ -281,7 +281,7 @@ def same_begins(found: Candidate, windows) -> list[np.ndarray]:
 
 
 def carried(simulator: Simulator, windows: Windows, before: Simulator, starts: np.ndarray) -> np.ndarray:
-    """Return initial states found for one model as those of another: what the first lacks begins at its usual value."""
+    """Return one model's initial states as those of another: what the first lacks begins as usual."""
     given = dict(zip(before.nuisances, starts.T, strict=True))
     columns = []
     for name in simulator.nuisances:

@@ -21,16 +21,7 @@ _THRESHOLDS = ("stiction.level", "stribeck.level")
 
 _ROUGH = ("backlash.", "hard_stop.", "stiction.", "stribeck.")
 _HOPS = (0.6, 0.8, 1.25, 1.6)
-_SMALL = (
-    0.8,
-    0.95,
-    0.985,
-    0.995,
-    1.005,
-    1.015,
-    1.05,
-    1.25,
-)  # static levels: thresholds that single samples pass
+_SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
 _HOPELESS = 4.0  # error over the best candidate's beyond which another try is not worth it
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
@@ -76,9 +67,10 @@ def all_hopped(fits, data: Data, floor: float) -> list:
 
 
 def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
-    """Fit a candidate again from where the best one ended: it may be that one's limit (stiction, a narrow Stribeck bump).
+    """Fit a candidate again from where the best one ended, of which it may be a limit.
 
-    The cost of stick and slip is rough: of two fits of one law each may end in its own valley.
+    Stiction is that of a narrow Stribeck bump. The cost of stick and slip is rough: of two fits of one law
+    each may end in its own valley.
     """
     table, mine, its = tried.block.parameters, list(tried.block._keys)[-1], list(best.block._keys)[-1]
     values = {}
