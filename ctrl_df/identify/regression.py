@@ -22,7 +22,7 @@ from .windows import facts
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of all records: force [N], position [m] as reported, velocity and acceleration smoothed."""
+    """Samples of all records: force u [N], reported x [m], smoothed v [m/s] and a [m/s^2]."""
 
     u: np.ndarray
     x: np.ndarray
