@@ -31,7 +31,8 @@ _SMALL = (
     1.05,
     1.25,
 )  # static levels: thresholds that single samples pass
-_HOPELESS = 4.0  # error over the best candidate's beyond which another try is not worth it
+_HOPELESS = 3.0  # error over the best candidate's beyond which another try is not worth it
+_TRIED = 3  # of the hops along one parameter: those that begin best
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
 _REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a threshold that floor is sought
@@ -55,14 +56,14 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
     """
     for name in rough(found):
         at, best = found.parameters[name], found
+        near = []
         for factor in _SMALL if name.endswith(".level") else _HOPS:
             moved = found.model.with_parameters(
                 feasible(found.model, {name: _within(found, name, factor * at)})
             )
-            near = fit(moved, (), starts=found.starts, iterations=iterations)
-            if near.rmse > 3 * found.rmse:
-                continue
-            tried = fit(moved, found.names, starts=near.starts, iterations=iterations)
+            near.append(fit(moved, (), starts=found.starts, iterations=2))
+        for begun in sorted(near, key=lambda f: f.rmse)[:_TRIED]:
+            tried = fit(begun.model, found.names, starts=begun.starts, iterations=iterations)
             if tried.rmse < _WORTH * best.rmse:
                 best = tried
         found = best
@@ -72,6 +73,8 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
 def all_hopped(fits, data: Data, floor: float) -> list:
     """Return fits in their best valleys: those that are neither at the floor nor far behind the best."""
     least = min(f.rmse for f in fits)
+    if least <= floor:
+        return list(fits)
     return [hopped(f, data.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
 
 
