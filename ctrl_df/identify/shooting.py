@@ -21,6 +21,9 @@ from .windows import Windows, facts
 
 Signals = list[np.ndarray]
 
+# Laws whose events make single windows go lost.
+_ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck"})
+
 
 def _power(signals: Signals) -> float:
     return sum(float(e @ e) for e in signals)
@@ -169,7 +172,8 @@ class Problem:
             if not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
-        if self.names and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
+        rough = _ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names
+        if rough and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
             theta = self._without_the_lost(theta, again, tolerance, robust)
         return theta
 

@@ -137,7 +137,8 @@ class Study:
         # Near equals are told apart by fits that have come to an end, and in the right valley.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
         close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
-        ended = [self._ended(t, t in near and len(near) > 1, floor) for t in close]
+        least = min(t.train.rmse for t in chosen)
+        ended = [self._ended(t, t in near and len(near) > 1, floor, least) for t in close]
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
         chosen, self.noise = ranked(self.base, chosen)
@@ -158,15 +159,15 @@ class Study:
         fits = all_hopped(fits, middle, floor)
         return [short, fits, all_hopped([longest.moved(f) for f in fits], longest, floor)], floor
 
-    def _ended(self, tried: Trial, exactly: bool, floor: float) -> Trial:
+    def _ended(self, tried: Trial, exactly: bool, floor: float, least: float) -> Trial:
         """Return a candidate in its best valley, unless nothing better is possible.
 
-        `exactly`: iterated to the end first.
+        `exactly`: iterated to the end first. `least`: error of the best of all [m].
         """
         fine, fit = self.data.fine, tried.train
         if exactly:
             fit = fine.moved(fit, 8, 1e-6)
-        if rough(fit) and fit.rmse > floor:
+        if rough(fit) and fit.rmse > floor and least > floor:
             fit = hopped(fit, fine.fit)
         return settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
 

@@ -22,7 +22,8 @@ _THRESHOLDS = ("stiction.level", "stribeck.level")
 _ROUGH = ("backlash.", "hard_stop.", "stiction.", "stribeck.")
 _HOPS = (0.6, 0.8, 1.25, 1.6)
 _SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
-_HOPELESS = 4.0  # error over the best candidate's beyond which another try is not worth it
+_HOPELESS = 3.0  # error over the best candidate's beyond which another try is not worth it
+_TRIED = 3  # of the hops along one parameter: those that begin best
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
 _REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a threshold that floor is sought
@@ -46,14 +47,14 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
     """
     for name in rough(found):
         at, best = found.parameters[name], found
+        near = []
         for factor in _SMALL if name.endswith(".level") else _HOPS:
             moved = found.model.with_parameters(
                 feasible(found.model, {name: _within(found, name, factor * at)})
             )
-            near = fit(moved, (), starts=found.starts, iterations=iterations)
-            if near.rmse > 3 * found.rmse:
-                continue
-            tried = fit(moved, found.names, starts=near.starts, iterations=iterations)
+            near.append(fit(moved, (), starts=found.starts, iterations=2))
+        for begun in sorted(near, key=lambda f: f.rmse)[:_TRIED]:
+            tried = fit(begun.model, found.names, starts=begun.starts, iterations=iterations)
             if tried.rmse < _WORTH * best.rmse:
                 best = tried
         found = best
@@ -63,6 +64,8 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
 def all_hopped(fits, data: Data, floor: float) -> list:
     """Return fits in their best valleys: those that are neither at the floor nor far behind the best."""
     least = min(f.rmse for f in fits)
+    if least <= floor:
+        return list(fits)
     return [hopped(f, data.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
 
 
