@@ -24,7 +24,10 @@ SIGNIFICANT = 20.0
 """Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
 
 HELD = 5.0
-"""Evidence [nats] it needs on held-out data alone, to which nothing but initial states is fitted."""
+"""Evidence [nats] it needs on held-out data alone.
+
+To these are fitted initial states, and what the others leave open: a threshold within a range, a ripple's phase.
+"""
 
 _LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
 _NOISIER = 1.4  # error on held-out windows over that on fitted ones that may be chance

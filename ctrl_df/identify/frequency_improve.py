@@ -39,10 +39,11 @@ def improve_frequency(
     start, classes = block_of(model), effect_classes(candidates)
 
     def ask(block, names, search):
+        asked = time.perf_counter()
         study = FrequencyStudy(block, records, held, names)
         if search:
             study.screen(classes, executor)
-        found = study.verdict(time.perf_counter(), None)
+        found = study.verdict(asked, None)
         return Found(
             found,
             bool(found.ranking) and worth(found.ranking[0]),

@@ -53,8 +53,9 @@ def improve(
 
     def ask(block, names, search):
         nonlocal last
+        asked = time.perf_counter()
         last = fits = Fits(block, records, held, names)
-        found = verdict_of(fits, fits.candidates(classes, executor) if search else [], time.perf_counter())
+        found = verdict_of(fits, fits.candidates(classes, executor) if search else [], asked)
         best = found.ranking[0] if found.ranking else None
         worth = best is not None and best.evidence_fitted >= SIGNIFICANT and best.evidence_holdout >= HELD
         return Found(found, worth, lambda block, ids: _without_idle(block, ids, fits, names))

@@ -21,8 +21,8 @@ from .windows import Windows, facts
 
 Signals = list[np.ndarray]
 
-# Laws whose events make single windows go lost.
-_ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck"})
+# Laws whose events make single windows go lost, and the cost a row of valleys.
+ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck"})
 
 
 def _power(signals: Signals) -> float:
@@ -87,6 +87,7 @@ class Problem:
         self.measured: Signals = []
         self.nuisance: list[np.ndarray] = []
         self.priors: list[np.ndarray] = []
+        self.widest: list[np.ndarray] = []
         self.last: Signals = []
         self.slopes: tuple[list, list] | None = None
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
@@ -115,6 +116,7 @@ class Problem:
             self.nuisance = [np.array(a) for a in starts]  # type: ignore[union-attr]
             # Starts that a fit before has found stay within reach.
             self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
+        self.widest = [3 * p for p in self.priors]  # where a start was lost
 
     def simulate(self, theta, nuisance) -> Signals:
         """Return the outputs within the windows."""
@@ -172,7 +174,7 @@ class Problem:
             if not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
-        rough = _ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names
+        rough = ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names
         if rough and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
             theta = self._without_the_lost(theta, again, tolerance, robust)
         return theta

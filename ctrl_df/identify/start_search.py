@@ -32,7 +32,7 @@ def rescue(problem, theta) -> bool:
             continue
         some = windows.only(bad)
         measured, least = problem.records[k].y[some.samples], 0.7 * rms[bad] ** 2
-        problem.priors[k][bad, column] *= 3
+        problem.priors[k][bad, column] = problem.widest[k][bad, column]
         reach, chosen = problem.priors[k][bad, column], starts[bad].copy()
         before = simulator.carried_on(windows, values, starts)[bad]
         before = np.where(np.isfinite(before), before, starts[bad])

@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from .candidate import Candidate
+from .shooting import ROUGH
 from .simulator import feasible
 from .trial import Data, Trial
 
 # levels that nothing but breaking away shows: records leave ranges of them open
 _THRESHOLDS = ("stiction.level", "stribeck.level")
 
-_ROUGH = ("backlash.", "hard_stop.", "stiction.", "stribeck.")
 _HOPS = (0.6, 0.8, 1.25, 1.6)
 _SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
 _HOPELESS = 3.0  # error over the best candidate's beyond which another try is not worth it
@@ -31,7 +31,7 @@ _REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a thresh
 
 def rough(found: Candidate) -> list[str]:
     """Return the free parameters over which the cost has many valleys."""
-    return [name for name in found.names if name.startswith(_ROUGH)]
+    return [name for name in found.names if name.partition(".")[0] in ROUGH]
 
 
 def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4) -> Candidate:
