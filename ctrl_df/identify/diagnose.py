@@ -26,7 +26,8 @@ SIGNIFICANT = 20.0
 HELD = 5.0
 """Evidence [nats] it needs on held-out data alone.
 
-To these are fitted initial states, and what the others leave open: a threshold within a range, a ripple's phase.
+To these are fitted initial states, and what the others leave open: a threshold within a range, the phase of
+a ripple.
 """
 
 _LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
