@@ -54,8 +54,8 @@ class Study:
         self.base = self._baseline(block)
         # friction that wanders drowns all else over longer windows
         if self.levels[0].moved(self.base.train).rmse > FORCED * data.noise:
-            self._look_at(data.shorter, 0)
-            self.base = self._baseline(self.base.block)
+            self._look_at(data.wandering, 0)
+            self.base = Trial("", self.data.moved(self.base.train))
 
     def _look_at(self, data: Data, which: int):
         self.levels = data.levels
@@ -129,10 +129,9 @@ class Study:
             for t, f in zip((self.base, *found), stages[at], strict=True)
         ]
         self.base = best[0]
-        chosen, _ = ranked(self.base, best[1:])
-        if self.data.forced:
-            chosen, self.noise = self._also_longer(chosen)
-            return chosen
+        chosen, self.noise = ranked(self.base, best[1:])
+        if not chosen:
+            return []
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right valley.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
@@ -151,8 +150,6 @@ class Study:
         follows.
         """
         shortest, middle, longest = self.levels
-        if self.data.forced:
-            return [[shortest.moved(f) for f in fits]], 0.0
         fits = [middle.moved(f) for f in fits]
         short = [shortest.moved(f) for f in fits]
         floor = _FLOOR * min(f.rmse for f in short)
@@ -177,19 +174,6 @@ class Study:
         begun = [begun_at(t, best, fine) for best in those for t in chosen if t is not best]
         judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
-
-    def _also_longer(self, chosen):
-        """Take the evidence where each shows most: slow effects in long windows, quick ones in short ones."""
-        trials = [self.base, *chosen]
-        _, noise = ranked(self.base, chosen)
-        for longer in (level.fine for level in self.levels[1:]):
-            runs = [longer.judged(replace(t, train=longer.run(t.block))) for t in trials]
-            more = {t.key: t for t in ranked(runs[0], runs[1:])[0]}
-            for i, t in enumerate(chosen):
-                m = more[t.key]
-                if m.evidence > t.evidence:
-                    chosen[i] = replace(t, evidence=m.evidence, evidence_held=m.evidence_held)
-        return sorted(chosen, key=lambda t: -t.evidence), noise
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise."""

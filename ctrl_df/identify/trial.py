@@ -20,20 +20,17 @@ SAMPLES = 2500
 SHORTEST = 16
 """How many times as many the shortest windows are as the longest."""
 
-SHORTER = 4
-"""Still more windows, where forces that no model has (friction that wanders) outweigh the sensor's noise."""
+LEVELS = (SHORTEST, 4, 1)
+"""How many times as many they are, of the three lengths that are looked at."""
 
 FORCED = 50.0
-"""Error over the noise, in the shortest windows, that only such forces make."""
+"""Error over the sensor's noise, in the shortest windows, that only forces make which no model has."""
 
 FAR = 12.0
 """Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
 
 LEAST = 50
 """Samples of the shortest window."""
-
-STEPS = 25
-"""Steps of the input in such a window, at least."""
 
 PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
@@ -135,7 +132,7 @@ class Data:
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
-    factors: tuple[int, int, int] = (SHORTEST, 4, 1)  # windows to the longest, of the three lengths looked at
+    forced: bool = False  # whether forces that no model has (friction that wanders) outweigh the noise
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -150,24 +147,17 @@ class Data:
     @property
     def levels(self) -> list[Data]:
         """The same in windows of three lengths, the shortest first."""
-        return [self.level(f) for f in self.factors]
+        return [self.level(f) for f in LEVELS]
 
     @property
-    def forced(self) -> bool:
-        """Whether forces that no model has outweigh the noise of the sensor."""
-        return self.factors[0] > SHORTEST
-
-    @property
-    def shorter(self) -> Data:
-        """The same to be looked at in windows of a quarter, the input in finer steps."""
-        factors = tuple(SHORTER * f for f in self.factors)
-        least = min(int(np.min(w.ends - w.begins)) for w in self.level(factors[0]).train.windows)
-        return replace(self, factors=factors, thin=min(self.thin, max(least // STEPS, 1)))
+    def wandering(self) -> Data:
+        """The same for a machine whose own forces wander, with the input in finer steps."""
+        return replace(self, forced=True, thin=max(self.thin // 2, 1))
 
     @property
     def sampled(self) -> Data:
-        """The same with every second window to learn from, or every fourth of many, for a first look."""
-        return replace(self, train=self.train.every(SHORTER if self.forced else 2))
+        """The same with every second window to learn from, for a first look."""
+        return replace(self, train=self.train.every(2))
 
     @property
     def fine(self) -> Data:
@@ -195,10 +185,6 @@ class Data:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
         return replace(tried, held=self._ran(tried.block, "held"))
 
-    def run(self, model) -> Candidate:
-        """Run a model over the windows to learn from, from initial states fitted to them."""
-        return self._ran(model, "train")
-
     def errors(self, model) -> tuple[float, float]:
         """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
         ran = {name: self._ran(model, name).rmse for name in ("train", "held")}
@@ -207,7 +193,7 @@ class Data:
     def _ran(self, model, name) -> Candidate:
         """Fit the initial states alone: short windows first, found without fail; the others begin there."""
         rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
-        short = getattr(self.level(self.factors[0]), name)
+        short = getattr(self.level(SHORTEST), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
         if name == "held" and view.records is not self.train.records:
             near = rephased(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
