@@ -119,9 +119,12 @@ class Study:
         """
         found = _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
-        # An error of whole steps of the sensor is averaged out by long windows, and followed by short ones.
-        rounds = bool(found) and found[0].key == ROUNDED
-        at = len(stages) - 1 if rounds else _longest_coherent([[f.rmse for f in stage] for stage in stages])
+        at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
+        if self.data.forced:
+            at = 0
+        elif found and found[0].key == ROUNDED:
+            # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
+            at = len(stages) - 1
         self.data = self.levels[at]
         fine = self.data.fine
         best = [
