@@ -10,7 +10,7 @@ import numpy as np
 
 from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.mechanism import Mechanism
-from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
+from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from .evidence import ROUNDED
 from .explain import explain, find_regions
 from .lack_of_fit import lacks
@@ -154,8 +154,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     elif first is None or not significant:
         verdict = NONE
     else:
-        others = [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
-        verdict = EFFECT if all(c.id in first.equivalents for c in others) else AMBIGUOUS
+        verdict = EFFECT if all(c.id in first.equivalents for c in rivals(ranking)) else AMBIGUOUS
     where = find_regions(best if verdict == UNKNOWN else base, study.data.train)
     kinds = tuple(where.kinds) if where is not None else ()
     if verdict == UNKNOWN:

@@ -12,6 +12,10 @@ from .measurement import Measurement
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
 
 
+# Evidence [nats] behind the first up to which a candidate is not ruled out.
+_NEAR = 5.0
+
+
 @dataclass(frozen=True, eq=False)
 class CandidateEffect:
     """One effect of the library, fitted to the data.
@@ -61,6 +65,18 @@ class CandidateEffect:
     def evidence_fitted(self) -> float:
         """Evidence of the records fitted alone [nats]."""
         return self.evidence - self.evidence_holdout
+
+
+def rivals(ranking) -> list[CandidateEffect]:
+    """Return the confirmed candidates that the data hardly tell from the first."""
+    first = ranking[0]
+    return [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < _NEAR]
+
+
+def certainty(ranking) -> float:
+    """Return the probability of the first candidate and its equivalents together."""
+    first = ranking[0]
+    return first.probability + sum(c.probability for c in ranking if c.id in first.equivalents)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
     judged = []
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if t.key == ROUNDED else _gains(before, _powers(t, noise))
-        # nothing was fitted to the windows to be judged by but their starts: their gain also stands alone
+        # hardly more than starts was fitted to the windows to be judged by: their gain also stands alone
         price = 0.5 * t.extra * math.log(sum(n for _, n in before))
         judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
     return sorted(judged, key=lambda t: -t.evidence), noise

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from .diagnosis import certainty, rivals
 from .windows import facts
 
 
@@ -63,14 +64,13 @@ def explain(diagnosis, missed) -> str:
             + "."
         )
     if d.verdict == "effect":
-        sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
+        sure = certainty(d.ranking)
         return (
             f"Missing: {named(first.effect)} ({values_of(first.effect)}). It shows as {first.effect.shows}. "
             f"With it the error falls from {size}; probability {sure:.1%}.{same}"
             + (f" Before, {where[0].lower() + where[1:]}" if where else "")
         )
-    others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
-    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
+    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *rivals(d.ranking)])
     return (
         f"An effect is missing, and these data do not tell which: {names}. The first reduces the error from "
         f"{size}."

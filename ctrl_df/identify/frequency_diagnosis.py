@@ -15,7 +15,7 @@ import numpy as np
 
 from .attach import applicable
 from .diagnose import block_of, effect_classes, free_names
-from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis
+from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from .frequency_candidate import FOLLOWED, SLOW, fit_either, try_effect
 from .frequency_compare import plane_regions
 from .frequency_explain import explain_tables
@@ -256,7 +256,7 @@ class FrequencyStudy:
         elif first is None or not significant:
             verdict = NONE
         else:
-            others = [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
+            others = rivals(ranking)
             verdict = EFFECT if all(c.id in first.equivalents for c in others) else AMBIGUOUS
         shown = best if verdict == UNKNOWN else self.base
         where = plane_regions(self.points, shown.errors)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
+from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, certainty, rivals
 from .explain import named, values_of
 from .frequency_fit import counted, outlying
 
@@ -48,14 +48,13 @@ def _verdict(d: Diagnosis) -> str:
         names = ", ".join(e.replace("_", " ") for e in first.equivalents)
         same = f" On these data the same map as {names}."
     if d.verdict == EFFECT:
-        sure = first.probability + sum(c.probability for c in d.ranking if c.id in first.equivalents)
+        sure = certainty(d.ranking)
         return (
             f"Missing: {named(first.effect)} ({values_of(first.effect)}). With it the error falls from "
             f"{size}; "
             f"probability {sure:.1%}.{same}" + (f" Before, {places}" if places else "")
         )
-    others = [c for c in d.ranking[1:] if c.confirmed and first.evidence - c.evidence < 5.0]
-    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *others])
+    names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *rivals(d.ranking)])
     return (
         f"An effect is missing, and these tables do not tell which: {names}. The first reduces the error "
         f"from {size}."

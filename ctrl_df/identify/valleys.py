@@ -49,9 +49,7 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
         at, best = found.parameters[name], found
         near = []
         for factor in _SMALL if name.endswith(".level") else _HOPS:
-            moved = found.model.with_parameters(
-                feasible(found.model, {name: _within(found, name, factor * at)})
-            )
+            moved = _moved(found.model, name, _within(found, name, factor * at))
             near.append(fit(moved, (), starts=found.starts, iterations=2))
         for begun in sorted(near, key=lambda f: f.rmse)[:_TRIED]:
             tried = fit(begun.model, found.names, starts=begun.starts, iterations=iterations)
@@ -110,7 +108,7 @@ def settled(tried: Trial, data: Data) -> Trial:
 
 
 def _with_level(tried: Trial, name, value, data: Data) -> Trial:
-    block = tried.block.with_parameters(feasible(tried.block, {name: value}))
+    block = _moved(tried.block, name, value)
     return data.judged(replace(tried, train=replace(tried.train, model=block)))
 
 
@@ -121,12 +119,16 @@ def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> t
         edge = at
         for reach in _REACH:
             value = (1 + sign * reach) * at
-            moved = found.model.with_parameters(feasible(found.model, {name: value}))
+            moved = _moved(found.model, name, value)
             if fit(moved, (), starts=found.starts, iterations=2).rmse > _SAME * found.rmse:
                 break
             edge = value
         edges.append(edge)
     return edges[0], edges[1]
+
+
+def _moved(model, name, value):
+    return model.with_parameters(feasible(model, {name: value}))
 
 
 def _within(found, name, value):
