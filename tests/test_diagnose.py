@@ -6,9 +6,9 @@ import rigs
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.equivalence import whitener
 from ctrl_df.identify.lack_of_fit import lacks
 from ctrl_df.identify.measurement import Measurement
+from ctrl_df.identify.noise import whitener
 from ctrl_df.identify.simulator import feasible
 from ctrl_df.identify.trial import Trial, prepare
 from ctrl_df.identify.variables import default_free
@@ -52,7 +52,7 @@ def test_free_forces_tell_what_a_model_misses_and_where():
     def most_telling(rig, block):
         data = prepare(rig.baseline, [of(rig)[0]]).level(4)
         found = data.fit(block, default_free(block))
-        return lacks(Trial("", found), data, whitener(found.residual))[0]
+        return lacks(Trial("", found), data, whitener(found.residual_pieces))[0]
 
     rig = rigs.draw("linear_spring", 4, excitation="chirp")
     assert most_telling(rig, rig.true_block).evidence < 0

@@ -9,6 +9,7 @@ from scipy.stats import binom
 
 from ctrl_df.identify import residual_tests as tests
 from ctrl_df.identify import where
+from ctrl_df.identify.noise import noise_model
 
 T = 1e-3 * np.arange(6000)
 
@@ -63,7 +64,7 @@ def test_statistic_is_ljung_and_boxes():
 def test_noise_models_and_effective_samples(pole):
     rng = np.random.default_rng(3)
     r = coloured(rng, pole, 20_000)
-    model = tests.noise_model(r)
+    model = noise_model(r)
     assert model.sigma == pytest.approx(1, rel=0.03)
     assert model.long_run_factor == pytest.approx((1 + pole) / (1 - pole), rel=0.35)
     assert tests.whiteness(model.whiten(r)[model.order :]).p_value > 1e-3

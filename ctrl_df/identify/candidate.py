@@ -74,6 +74,16 @@ class Candidate:
     tangent: Tangent | None = field(repr=False, default=None)
 
     @property
+    def residual_pieces(self) -> list[np.ndarray]:
+        """The residual window by window, of all records."""
+        return _pieces(self.windows, self.residual)
+
+    @property
+    def simulated_pieces(self) -> list[np.ndarray]:
+        """The simulated output window by window, of all records."""
+        return _pieces(self.windows, self.simulated)
+
+    @property
     def parameters(self) -> dict[str, float]:
         """Free parameters by name."""
         return dict(zip(self.names, map(float, self.values), strict=True))
@@ -84,6 +94,10 @@ class Candidate:
         return dict(
             zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True)
         )
+
+
+def _pieces(windows, signals) -> list[np.ndarray]:
+    return [x[where] for w, x in zip(windows, signals, strict=True) for where in w.slices]
 
 
 def window_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
@@ -194,6 +208,7 @@ def fit_windows(
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
     errors: bool = False,
+    chained: bool = False,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage.
 
@@ -214,12 +229,14 @@ def fit_windows(
         Least and largest values of some parameters, within their ranges.
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
+    chained : bool
+        Whether hidden states go on from one window into the next (see `Simulator`).
 
     Returns
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits)
+    problem = Problem(model, records, names, 100_000, limits, chained)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

@@ -2,29 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
-from .residual_tests import NoiseModel, noise_model
-
-
-def whitener(residuals: Sequence[np.ndarray]) -> NoiseModel:
-    """Fit one noise model to the residuals of several records."""
-    longest = max(residuals, key=len)
-    return noise_model(longest - np.mean(longest), max_order=12)
-
-
-def whitened_power(residuals: Sequence[np.ndarray], noise: NoiseModel, masks=None) -> tuple[float, int]:
-    """Return the sum of squares of the whitened residuals, and their number."""
-    total, count = 0.0, 0
-    for i, r in enumerate(residuals):
-        w = noise.whiten(r)[noise.order :]
-        if masks is not None:
-            w = w[masks[i][noise.order :]]
-        total += float(w @ w)
-        count += len(w)
-    return total, count
+from .noise import NoiseModel, whitened_power
 
 
 def indistinguishable(first, second, noise: NoiseModel, *, nats: float = 6.0) -> bool:
@@ -33,7 +11,7 @@ def indistinguishable(first, second, noise: NoiseModel, *, nats: float = 6.0) ->
     Parameters
     ----------
     first, second : sequence of arrays
-        Simulated outputs, one a record.
+        Simulated outputs, one a window.
     noise : NoiseModel
         Of the better one's residual.
     nats : float

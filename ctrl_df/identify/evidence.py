@@ -9,18 +9,21 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from .equivalence import whitened_power, whitener
-from .residual_tests import NoiseModel
+from .noise import NoiseModel, whitened_power, whitener
 from .rounding import rounding_evidence
 from .trial import Trial
 
 ROUNDED = "sensor_quantization"
 
+REFUTED = 20.0
+"""Evidence [nats] of held-out data against a candidate that puts it last."""
+
 
 def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
     """Return the trials with their evidence over the baseline, best first, and the noise that judged it.
 
-    The noise model is of the residuals of the best one, a sensor that rounds left aside.
+    What held-out data speak against comes after all that they do not. The noise model is of the residuals of
+    the best one, a sensor that rounds left aside.
     """
     best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
     noise = whitener(best.residuals)
@@ -31,13 +34,13 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
         # hardly more than starts was fitted to the windows to be judged by: their gain also stands alone
         price = 0.5 * t.extra * math.log(sum(n for _, n in before))
         judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
-    return sorted(judged, key=lambda t: -t.evidence), noise
+    return sorted(judged, key=lambda t: (t.evidence_held < -REFUTED, -t.evidence)), noise
 
 
 def _powers(tried: Trial, noise: NoiseModel):
     """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
-    held = tried.held.residual if tried.held is not None else []
-    return whitened_power(tried.train.residual, noise), whitened_power(held, noise)
+    held = tried.held.residual_pieces if tried.held is not None else []
+    return whitened_power(tried.train.residual_pieces, noise), whitened_power(held, noise)
 
 
 def _gains(before, after) -> tuple[float, float]:

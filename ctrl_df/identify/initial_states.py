@@ -14,10 +14,13 @@ import numpy as np
 
 from ..blocks.core import ELASTIC, IMPACT, level
 
+SEEN: tuple[str, ...] = ("x", "v")
+"""Names of those that the record tells of; all others are hidden."""
+
 
 def names(core) -> tuple[str, ...]:
     """Return the names of the initial states of a mechanism, in the order of the corrections."""
-    found = ["x", "v"]
+    found = list(SEEN)
     if core.joint == IMPACT:
         found += ["slack", "slack_rate"]
     elif core.joint == ELASTIC:
@@ -27,12 +30,12 @@ def names(core) -> tuple[str, ...]:
     return tuple(found)
 
 
-def reach(core, known, windows) -> np.ndarray:
-    """Return how far each initial state may be from its estimate, (nw, number of states).
+def reach(which, core, known, windows) -> np.ndarray:
+    """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
 
     `known`: `windows.facts` of the record.
     """
-    if core is None:
+    if not which:
         return np.zeros((len(windows), 0))
     one = np.ones(len(windows))
     table = {
@@ -47,7 +50,7 @@ def reach(core, known, windows) -> np.ndarray:
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         table["stretch"] = 0.3 * bend * one
         table["stretch_rate"] = 0.3 * bend * math.sqrt(core.stiffness / mass) * one
-    return np.column_stack([table[name] for name in names(core)])
+    return np.column_stack([table[name] for name in which])
 
 
 def fill(states, core, given: Mapping[str, float], usual, speed: float) -> None:

@@ -13,9 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .equivalence import whitener
-from .residual_tests import NoiseModel
-from .simulator import Simulator
+from .noise import NoiseModel, whitener
 from .trial import Data, Trial
 
 # Amplitude of a test force over the rms of the force: linear still, and far above rounding.
@@ -62,23 +60,24 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
         if alive:
             matrix = np.array([columns[i] for i in alive]).T
             tables.append((kind, matrix, [spans[i % len(spans)] for i in alive]))
-    found = [_regressed(k, m, s, residual, noise) for k, m, s in tables]
+    begins = np.cumsum([0, *map(len, tried.train.residual_pieces)])
+    found = [_regressed(k, m, s, residual, noise, begins[:-1]) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
-        noise = whitener([residual - explained])
-        found = [_regressed(k, m, s, residual, noise) for k, m, s in tables]
+        noise = whitener(np.split(residual - explained, begins[1:-1]))
+        found = [_regressed(k, m, s, residual, noise, begins[:-1]) for k, m, s in tables]
     return sorted((f[0] for f in found), key=lambda f: -f.evidence)
 
 
-def _regressed(kind, matrix, spans, residual, noise) -> tuple[Lack, np.ndarray]:
+def _regressed(kind, matrix, spans, residual, noise, begins) -> tuple[Lack, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain."""
-    white = noise.whiten(residual)[noise.order :]
-    filtered = np.array([noise.whiten(c)[noise.order :] for c in matrix.T]).T
+    white, filtered = noise.whiten_windows(residual, begins), noise.whiten_windows(matrix, begins)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
     left = white - filtered @ weights
     # a frequency is found by looking at many
-    extra, count = matrix.shape[1] + (2 if kind == "frequency" else 0), len(white)
+    extra = matrix.shape[1] + (2 if kind == "frequency" else 0)
+    count = len(white) - noise.order * len(begins)
     gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
@@ -121,7 +120,7 @@ class _Scene:
             strict=True,
         ):
             force = record.u + self.size * shape(motion)
-            simulator = Simulator(self.fit.model, record, thin=self.data.thin, force=force)
+            simulator = self.data.simulator(self.fit.model, record, force=force)
             changes.append((simulator.run(windows, None, start) - y) / self.size)
         return changes
 

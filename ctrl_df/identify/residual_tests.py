@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .noise import noise_model
+
 
 def rmse(residual) -> float:
     """Return the rms of the residual, in its unit."""
@@ -105,86 +107,6 @@ def whiteness(residual, lags: int | None = None, *, fitted: int = 0, alpha: floa
 
 
 # --- colour ---------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class NoiseModel:
-    """Autoregressive noise ``e[t] = sum a_i e[t-i] + w[t]`` with white w of rms `sigma`."""
-
-    a: np.ndarray
-    sigma: float
-
-    @property
-    def order(self) -> int:
-        """Number of coefficients."""
-        return len(self.a)
-
-    def whiten(self, x) -> np.ndarray:
-        """Filter a signal by ``1 - sum a_i z^-i``; the residual itself becomes white."""
-        from scipy.signal import lfilter
-
-        return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], _series(x)))
-
-    def spectrum(self, omega_dt) -> np.ndarray:
-        """Return the density at ``omega dt`` [rad a sample]; constant sigma^2 for white noise."""
-        k = np.arange(1, self.order + 1)
-        z = np.exp(-1j * np.multiply.outer(np.asarray(omega_dt, float), k))
-        return self.sigma**2 / np.abs(1 - z @ self.a) ** 2
-
-    @property
-    def long_run_factor(self) -> float:
-        """Variance of the mean over that of white noise of the same rms: samples per independent sample."""
-        impulse = self._impulse()
-        return float(np.sum(impulse) ** 2 / np.sum(impulse**2))
-
-    def _impulse(self):
-        from scipy.signal import lfilter
-
-        n, b = 4096, [1.0]
-        while True:
-            h = np.asarray(lfilter(b, np.concatenate(([1.0], -self.a)), np.r_[1.0, np.zeros(n - 1)]))
-            if n >= 1 << 18 or np.max(np.abs(h[-n // 8 :])) < 1e-6 * np.max(np.abs(h)):
-                return h
-            n *= 4
-
-
-def noise_model(residual, max_order: int = 30) -> NoiseModel:
-    """Fit an autoregressive model by Burg's method, its order chosen by Schwarz's criterion.
-
-    Parameters
-    ----------
-    residual : array_like, shape (n,)
-        Evenly sampled.
-    max_order : int
-        Highest order tried.
-
-    References
-    ----------
-    Burg (1975); Schwarz (1978).
-    """
-    r = _series(residual)
-    n = len(r)
-    f = b = r - r.mean()
-    power = float(np.mean(f * f))
-    a = np.zeros(0)
-    if power <= 0:
-        return NoiseModel(a, 0.0)
-    best = (n * math.log(power), a, power)
-    for order in range(1, min(max_order, n // 4) + 1):
-        forward, backward = f[1:], b[:-1]
-        norm = float(forward @ forward + backward @ backward)
-        if norm <= 0:
-            break
-        k = 2 * float(forward @ backward) / norm
-        f, b = forward - k * backward, backward - k * forward
-        a = np.append(a - k * a[::-1], k)
-        power *= 1 - k * k
-        if power <= 0:
-            break
-        score = n * math.log(power) + order * math.log(n)
-        if score < best[0]:
-            best = (score, a, power)
-    return NoiseModel(best[1], math.sqrt(best[2]))
 
 
 def effective_sample_size(residual) -> float:

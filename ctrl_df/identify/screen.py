@@ -15,7 +15,6 @@ from .attach import attach
 from .candidate import Candidate
 from .proposals import PROPORTIONAL, proposals
 from .regression import Start, motion_of, regressed
-from .simulator import Simulator
 from .trial import Data, Scales, carried
 
 
@@ -37,7 +36,7 @@ class Screen:
         self.motion = motion_of(data.train, data.thin)
         self.tangent = base.tangent
         self.residual = self.project(base.residual)
-        self.simulators = [Simulator(base.model, r, thin=data.thin) for r in self.view.records]
+        self.simulators = [data.simulator(base.model, r) for r in self.view.records]
 
     @property
     def scales(self) -> Scales:
@@ -56,7 +55,7 @@ class Screen:
     def starts(self, block) -> list[np.ndarray]:
         """Return the baseline's initial states as those of a block with an effect more."""
         return [
-            carried(Simulator(block, r, thin=self.data.thin), w, old, start)
+            carried(self.data.simulator(block, r), w, old, start)
             for r, w, old, start in zip(
                 self.view.records, self.view.windows, self.simulators, self.base.starts, strict=True
             )
@@ -68,7 +67,7 @@ class Screen:
         for record, windows, start, y in zip(
             self.view.records, self.view.windows, self.starts(block), self.base.simulated, strict=True
         ):
-            simulator = Simulator(block, record, thin=self.data.thin)
+            simulator = self.data.simulator(block, record)
             change.append(simulator.run(windows, None, start, rounded=True) - y)
         return change if all(np.all(np.isfinite(c)) for c in change) else None
 

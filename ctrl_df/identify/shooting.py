@@ -74,8 +74,9 @@ class Problem:
     initial states, `slopes` the derivatives of the last step.
     """
 
-    def __init__(self, model, records, names, budget, limits=None):
+    def __init__(self, model, records, names, budget, limits=None, chained=False):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
+        self.chained = chained
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -103,7 +104,7 @@ class Problem:
 
     def stage(self, windows: list[Windows], thin, starts=None):
         """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
-        self.simulators = [Simulator(self.model, r, thin=thin) for r in self.records]
+        self.simulators = [Simulator(self.model, r, thin=thin, chained=self.chained) for r in self.records]
         self.windows = windows
         self.measured = [r.y[w.samples] for r, w in zip(self.records, windows, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, windows, strict=True)]

@@ -62,6 +62,9 @@ class Simulator:
         Relative tolerance of the engine.
     force : (n,) array or None
         Input in place of the recorded one.
+    chained : bool
+        Whether hidden states (of a joint, of bristles) go on from one window into the next, so that only
+        what is measured begins anew.
 
     Raises
     ------
@@ -77,8 +80,9 @@ class Simulator:
         thin: int = 1,
         rtol: float = 1e-6,
         force: np.ndarray | None = None,
+        chained: bool = False,
     ):
-        self.model, self.record, self.rtol = model, record, rtol
+        self.model, self.record, self.rtol, self.chained = model, record, rtol, chained
         self.input = np.asarray(record.u if force is None else force)
         self.parts: Any = getattr(model, "parts", None)
         self.closed = self.parts is not None
@@ -123,11 +127,16 @@ class Simulator:
     @property
     def nuisances(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per window."""
-        return initial_states.names(self.block.core) if self.mechanism else ()
+        if not self.mechanism:
+            return ()
+        names = initial_states.names(self.block.core)
+        return tuple(n for n in names if n in initial_states.SEEN) if self.chained else names
 
     def priors(self, windows: Windows) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
-        return initial_states.reach(self.block.core if self.mechanism else None, self.facts, windows)
+        return initial_states.reach(
+            self.nuisances, self.block.core if self.mechanism else None, self.facts, windows
+        )
 
     def with_values(self, values: Mapping[str, float] | None):
         """Return the model with these values; a static level below the kinetic one is raised to it."""
@@ -170,12 +179,18 @@ class Simulator:
         record = self.record
         inside = windows.samples
         out = np.empty(len(inside))
-        drive = self._drive(part)
+        drive, hidden = self._drive(part), {}
+        hides = part.core is not None and len(initial_states.names(part.core)) > len(initial_states.SEEN)
+        on = self._followed(windows) if self.chained and hides else ()
         for w, where in enumerate(windows.slices):
-            run = self._window(part, drive, windows, w, start, record.t[inside[where]])
-            out[where] = run.outputs[:, 0]
+            t, follows = record.t[inside[where]], w in on
+            if follows:
+                t = np.append(t, record.t[windows.begins[w + 1]])
+            run = self._window(part, drive, windows, w, start, t, hidden)
+            out[where] = run.outputs[: where.stop - where.start, 0]
             if not run.status.ok:
                 out[where.start + run.recorded : where.stop] = np.nan
+            hidden = self._hidden(part, windows, w + 1, run) if follows and run.status.ok else {}
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
                 out += primitive.offset + primitive.rate * (record.t[inside] - later)
@@ -188,6 +203,17 @@ class Simulator:
                 np.isfinite(out), np.clip(out, centre - 100 * limit, centre + 100 * limit), centre + limit
             )
         return out
+
+    def _followed(self, windows: Windows) -> set[int]:
+        """Return the windows that another one follows, after a pause no longer than two of them."""
+        pause = windows.begins[1:] - windows.ends[:-1]
+        return set(np.flatnonzero(pause <= 2 * (windows.ends - windows.begins)[:-1]).tolist())
+
+    def _hidden(self, part, windows, w, run) -> dict[str, float]:
+        """Return the hidden states, as corrections by name, in which a run came to the begin of a window."""
+        usual = self._usual(part, windows, w)
+        given = initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
+        return {k: v for k, v in given.items() if k not in initial_states.SEEN}
 
     def at_rest(self, windows: Windows, values) -> np.ndarray:
         """Return the initial states (nw, number of nuisances) with which every window begins at rest."""
@@ -221,10 +247,10 @@ class Simulator:
     def _drive(self, part):
         return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
 
-    def _window(self, part, drive, windows, w, start, t):
+    def _window(self, part, drive, windows, w, start, t, hidden=None):
         """Run one window, recording at the record's times `t`."""
         times = t - part.delay
-        state = self._start(part, windows, w, None if start is None else start[w], times[0])
+        state = self._start(part, windows, w, None if start is None else start[w], times[0], hidden or {})
         state.segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
         steps = 60 * int(windows.ends[w] - windows.begins[w]) + 20_000
         return part.engine.run(
@@ -313,12 +339,12 @@ class Simulator:
             (state, np.interp(t - input_delay, t, s)) for state, s in lags
         ], hold)  # fmt: skip
 
-    def _start(self, part, windows, w, start, time) -> State:
+    def _start(self, part, windows, w, start, time, hidden) -> State:
         engine, core = part.engine, part.core
         x0 = np.zeros(engine.nstates)
         if core is None:
             return engine.start(x0, time)
-        given = dict(zip(self.nuisances, start, strict=True)) if start is not None else {}
+        given = hidden | (dict(zip(self.nuisances, start, strict=True)) if start is not None else {})
         i = int(windows.begins[w])
         usual = self._usual(part, windows, w)
         states = x0[part.offset :]

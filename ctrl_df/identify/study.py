@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from .attach import applicable, attach
-from .equivalence import indistinguishable, whitened_power, whitener
+from .equivalence import indistinguishable
 from .evidence import ROUNDED, ranked
+from .noise import whitened_power, whitener
 from .proposals import proposals
 from .regression import Start, force_regression, motion_of
 from .screen import Screen, starts_for
@@ -117,12 +118,11 @@ class Study:
 
         The windows are of the length that suits these data (`_longest_coherent`).
         """
-        found = _promising(found)
+        # Wandering forces let the first look tell little.
+        found = _promising(found, *((10, 0.0) if self.data.forced else (CONFIRMED, 0.2)))
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
-        if self.data.forced:
-            at = 0
-        elif found and found[0].key == ROUNDED:
+        if found and found[0].key == ROUNDED and not self.data.forced:
             # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
             at = len(stages) - 1
         self.data = self.levels[at]
@@ -150,9 +150,12 @@ class Study:
         """Return the fits in windows of every length that may judge, the shortest first, and their floor.
 
         The floor is the error that a fit can come down to at best: over short windows nearly every model
-        follows.
+        follows. Where forces wander, the shortest windows alone may judge.
         """
         shortest, middle, longest = self.levels
+        if self.data.forced:
+            short = [shortest.moved(f) for f in fits]
+            return [short], _FLOOR * min(f.rmse for f in short)
         fits = [middle.moved(f) for f in fits]
         short = [shortest.moved(f) for f in fits]
         floor = _FLOOR * min(f.rmse for f in short)
@@ -188,11 +191,14 @@ def _periodic_enough(tried: Trial, span) -> bool:
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
 
 
-def _promising(found) -> list[Trial]:
-    """Return the candidates to confirm: the first two, and all near the best by evidence or by error."""
+def _promising(found, most, share) -> list[Trial]:
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
+
+    `most`: of them by evidence, `share` of the best one's that is near.
+    """
     close = sorted(found, key=lambda t: t.train.rmse)[:3]
     close = [t for t in close if t.train.rmse < 1.5 * close[0].train.rmse]
-    likely = found[:2] + [t for t in found[2:CONFIRMED] if t.evidence > 0.2 * found[0].evidence]
+    likely = found[:2] + [t for t in found[2:most] if t.evidence > share * found[0].evidence]
     return likely + [t for t in close if not any(t is o for o in likely)]
 
 
@@ -238,8 +244,8 @@ def _try(job) -> Trial | None:
     found = [t for t in found if _periodic_enough(t, span)]
     if screen.data.forced:
         # what a few reversals leave would outweigh what goes on all the time
-        noise = whitener(screen.base.residual)
-        return min(found, key=lambda t: whitened_power(t.train.residual, noise)[0], default=None)
+        noise = whitener(screen.base.residual_pieces)
+        return min(found, key=lambda t: whitened_power(t.train.residual_pieces, noise)[0], default=None)
     return min(found, key=lambda t: t.train.rmse, default=None)
 
 

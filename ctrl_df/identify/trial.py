@@ -107,13 +107,15 @@ class Trial:
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """Of all windows."""
-        return [*self.train.residual, *(self.held.residual if self.held is not None else ())]
+        """Of all windows, each by itself."""
+        held = self.held.residual_pieces if self.held is not None else ()
+        return [*self.train.residual_pieces, *held]
 
     @property
     def outputs(self) -> list[np.ndarray]:
-        """Simulated, of all windows."""
-        return [*self.train.simulated, *(self.held.simulated if self.held is not None else ())]
+        """Simulated, of all windows, each by itself."""
+        held = self.held.simulated_pieces if self.held is not None else ()
+        return [*self.train.simulated_pieces, *held]
 
     @property
     def size(self) -> float:
@@ -132,7 +134,8 @@ class Data:
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
-    forced: bool = False  # whether forces that no model has (friction that wanders) outweigh the noise
+    forced: bool = False  # whether forces that no model has (friction that wanders) outweigh the noise:
+    #                       hidden states must not make up for them anew in every window
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -165,12 +168,16 @@ class Data:
         longest = max(len(r) for view in (self.train, self.held) for r in view.records)
         return replace(self, thin=min(max(1, round(longest / 12_000)), self.thin), step=self.thin)
 
+    def simulator(self, block, record, **keywords) -> Simulator:
+        """Return a model on one of the records, as these fits run it."""
+        return Simulator(block, record, thin=self.thin, chained=self.forced, **keywords)
+
     def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits, errors=self.step > 0,
+            tolerance=tolerance, limits=self.limits, errors=self.step > 0, chained=self.forced,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .residual_tests import noise_model
+from .noise import noise_model
 from .shooting import Problem, Tangent
 
 

@@ -1,0 +1,125 @@
+"""Noise of any colour: an autoregressive model of residuals, and what is left of them once it is taken out.
+
+Residuals come in pieces, one a window: each begins from an initial state of its own, so nothing ties the
+last sample of one to the first of the next.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+Pieces = Sequence[np.ndarray]
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Autoregressive noise ``e[t] = sum a_i e[t-i] + w[t]`` with white w of rms `sigma`."""
+
+    a: np.ndarray
+    sigma: float
+
+    @property
+    def order(self) -> int:
+        """Number of coefficients."""
+        return len(self.a)
+
+    def whiten(self, x) -> np.ndarray:
+        """Filter signals (n,) or (n, m) by ``1 - sum a_i z^-i``; the residual itself becomes white."""
+        from scipy.signal import lfilter
+
+        x = np.asarray(x, dtype=float)
+        if not self.order or not x.size:
+            return x
+        return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], x, axis=0))
+
+    def whiten_windows(self, x, begins) -> np.ndarray:
+        """Filter signals that begin anew at the rows `begins`; rows that would mix two windows become 0."""
+        out = self.whiten(x)
+        if self.order:
+            rows = (np.asarray(begins)[:, None] + np.arange(self.order)).ravel()
+            out[rows[rows < len(out)]] = 0.0
+        return out
+
+    def spectrum(self, omega_dt) -> np.ndarray:
+        """Return the density at ``omega dt`` [rad a sample]; constant sigma^2 for white noise."""
+        k = np.arange(1, self.order + 1)
+        z = np.exp(-1j * np.multiply.outer(np.asarray(omega_dt, float), k))
+        return self.sigma**2 / np.abs(1 - z @ self.a) ** 2
+
+    @property
+    def long_run_factor(self) -> float:
+        """Variance of the mean over that of white noise of the same rms: samples per independent sample."""
+        impulse = self._impulse()
+        return float(np.sum(impulse) ** 2 / np.sum(impulse**2))
+
+    def _impulse(self):
+        from scipy.signal import lfilter
+
+        n, b = 4096, [1.0]
+        while True:
+            h = np.asarray(lfilter(b, np.concatenate(([1.0], -self.a)), np.r_[1.0, np.zeros(n - 1)]))
+            if n >= 1 << 18 or np.max(np.abs(h[-n // 8 :])) < 1e-6 * np.max(np.abs(h)):
+                return h
+            n *= 4
+
+
+def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseModel:
+    """Fit an autoregressive model by Burg's method, its order chosen by Schwarz's criterion.
+
+    Parameters
+    ----------
+    residual : (n,) array or sequence of such
+        Evenly sampled; in pieces that do not follow each other.
+    max_order : int
+        Highest order tried.
+
+    References
+    ----------
+    Burg (1975); Schwarz (1978).
+    """
+    pieces = [residual] if isinstance(residual, np.ndarray) else residual
+    pieces = [np.asarray(r, dtype=float) for r in pieces]
+    n = sum(map(len, pieces))
+    mean = sum(float(r.sum()) for r in pieces) / n
+    forward = backward = [r - mean for r in pieces]
+    power, a = _power(forward) / n, np.zeros(0)
+    if power <= 0:
+        return NoiseModel(a, 0.0)
+    best = (n * math.log(power), a, power)
+    for order in range(1, min(max_order, min(map(len, pieces)) // 4) + 1):
+        forward, backward = [f[1:] for f in forward], [b[:-1] for b in backward]
+        norm = _power(forward) + _power(backward)
+        if norm <= 0:
+            break
+        k = 2 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / norm
+        forward, backward = (
+            [f - k * b for f, b in zip(forward, backward, strict=True)],
+            [b - k * f for f, b in zip(forward, backward, strict=True)],
+        )
+        a = np.append(a - k * a[::-1], k)
+        power *= 1 - k * k
+        if power <= 0:
+            break
+        score = n * math.log(power) + order * math.log(n)
+        if score < best[0]:
+            best = (score, a, power)
+    return NoiseModel(best[1], math.sqrt(best[2]))
+
+
+def whitener(pieces: Pieces) -> NoiseModel:
+    """Fit the noise model that evidence is judged by: of an order that a diagnosis can afford."""
+    return noise_model(pieces, max_order=12)
+
+
+def whitened_power(pieces: Pieces, noise: NoiseModel) -> tuple[float, int]:
+    """Return the sum of squares of the whitened residuals, and their number."""
+    white = [noise.whiten(r)[noise.order :] for r in pieces]
+    return _power(white), sum(map(len, white))
+
+
+def _power(pieces) -> float:
+    return sum(float(r @ r) for r in pieces)
