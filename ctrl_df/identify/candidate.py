@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .measurement import Measurement
+from .noise import NoiseModel
 from .shooting import Problem, Tangent
 from .simulator import Simulator
 from .uncertainty import covariance_of
@@ -208,7 +209,7 @@ def fit_windows(
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
     errors: bool = False,
-    chained: bool = False,
+    colour: NoiseModel | None = None,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage.
 
@@ -229,14 +230,15 @@ def fit_windows(
         Least and largest values of some parameters, within their ranges.
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
-    chained : bool
-        Whether hidden states go on from one window into the next (see `Simulator`).
+    colour : NoiseModel or None
+        Of the residual where the machine's own forces make it: its whitened squares are made least, and every
+        window begins as the record says, hidden states as the window before ends.
 
     Returns
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, chained)
+    problem = Problem(model, records, names, 100_000, limits, colour)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

@@ -87,7 +87,7 @@ def _without_idle(block, added, fits, names):
         whole = data.judged(
             Trial(key, data.fit(block, full_free, iterations=4), extra=len(full_free) - len(free))
         )
-        if ranked(fits.base, [whole])[0][0].evidence < SIGNIFICANT:
+        if ranked(fits.base, [whole], data.block)[0][0].evidence < SIGNIFICANT:
             block = fits.base.block
             dropped.append(key)
     return block, tuple(dropped)

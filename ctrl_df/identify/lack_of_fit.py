@@ -60,24 +60,26 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
         if alive:
             matrix = np.array([columns[i] for i in alive]).T
             tables.append((kind, matrix, [spans[i % len(spans)] for i in alive]))
-    begins = np.cumsum([0, *map(len, tried.train.residual_pieces)])
-    found = [_regressed(k, m, s, residual, noise, begins[:-1]) for k, m, s in tables]
+    ends = np.cumsum([0, *map(len, tried.train.residual_pieces)])
+    windows = [slice(i, j) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+    found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
-        noise = whitener(np.split(residual - explained, begins[1:-1]))
-        found = [_regressed(k, m, s, residual, noise, begins[:-1]) for k, m, s in tables]
+        left = residual - explained
+        noise = whitener([left[w] for w in windows], noise.step)
+        found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
     return sorted((f[0] for f in found), key=lambda f: -f.evidence)
 
 
-def _regressed(kind, matrix, spans, residual, noise, begins) -> tuple[Lack, np.ndarray]:
+def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain."""
-    white, filtered = noise.whiten_windows(residual, begins), noise.whiten_windows(matrix, begins)
+    white, filtered = noise.seen(residual, windows), noise.seen(matrix, windows)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
     left = white - filtered @ weights
     # a frequency is found by looking at many
     extra = matrix.shape[1] + (2 if kind == "frequency" else 0)
-    count = len(white) - noise.order * len(begins)
+    count = len(white)
     gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,10 +17,14 @@ Pieces = Sequence[np.ndarray]
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Autoregressive noise ``e[t] = sum a_i e[t-i] + w[t]`` with white w of rms `sigma`."""
+    """Autoregressive noise ``e[t] = sum a_i e[t-i] + w[t]`` with white w of rms `sigma`.
+
+    Of the means of every `step` samples where that is more than one.
+    """
 
     a: np.ndarray
     sigma: float
+    step: int = 1
 
     @property
     def order(self) -> int:
@@ -36,13 +40,14 @@ class NoiseModel:
             return x
         return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], x, axis=0))
 
-    def whiten_windows(self, x, begins) -> np.ndarray:
-        """Filter signals that begin anew at the rows `begins`; rows that would mix two windows become 0."""
-        out = self.whiten(x)
-        if self.order:
-            rows = (np.asarray(begins)[:, None] + np.arange(self.order)).ravel()
-            out[rows[rows < len(out)]] = 0.0
-        return out
+    def seen(self, x, windows) -> np.ndarray:
+        """Return what counts of signals (n,) or (n, m) that begin anew in each of `windows` (slices).
+
+        The mean of every `step` samples, whitened; values that would mix two windows are left out.
+        """
+        blocks, begins = averaged(x, windows, self.step)
+        age = np.arange(len(blocks)) - np.repeat(begins, np.diff([*begins, len(blocks)]))
+        return self.whiten(blocks)[age >= self.order]
 
     def spectrum(self, omega_dt) -> np.ndarray:
         """Return the density at ``omega dt`` [rad a sample]; constant sigma^2 for white noise."""
@@ -110,14 +115,51 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseMode
     return NoiseModel(best[1], math.sqrt(best[2]))
 
 
-def whitener(pieces: Pieces) -> NoiseModel:
-    """Fit the noise model that evidence is judged by: of an order that a diagnosis can afford."""
-    return noise_model(pieces, max_order=12)
+def averaged(x, windows, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the means of every `step` samples within each of `windows` (slices), and where each begins."""
+    x = np.asarray(x, dtype=float)
+    counts = [(w.stop - w.start) // step for w in windows]
+    begins = np.cumsum([0, *counts[:-1]])
+    if step == 1:
+        return x, begins
+    parts = [x[w.start : w.start + n * step] for w, n in zip(windows, counts, strict=True)]
+    means = [p.reshape(n, step, *x.shape[1:]).mean(axis=1) for p, n in zip(parts, counts, strict=True)]
+    return np.concatenate(means), begins
+
+
+def force_errors(pieces: Pieces, step: int) -> NoiseModel:
+    """Return the filter that makes accelerations of residuals in position: their second differences.
+
+    Where wandering forces, integrated twice, make the residuals, their slow parts are the largest and tell
+    the least; the forces themselves are level over the frequencies at which machines move.
+
+    Parameters
+    ----------
+    pieces : sequence of (n,) arrays
+    step : int
+        Samples a value; what is faster than twice that does not count.
+    """
+    plain = NoiseModel(np.array([2.0, -1.0]), 1.0, step)
+    power, n = whitened_power(pieces, plain)
+    return replace(plain, sigma=math.sqrt(power / n))
+
+
+def whitener(pieces: Pieces, step: int = 1) -> NoiseModel:
+    """Return the noise model that evidence is judged by.
+
+    `step` > 1: of forces that wander, averaged over so many samples.
+    """
+    if step == 1:
+        return noise_model(pieces, max_order=12)
+    plain = force_errors(pieces, step)
+    left = noise_model([plain.seen(r, [slice(0, len(r))]) for r in pieces], max_order=4)
+    both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
+    return NoiseModel(-both[1:], left.sigma, step)
 
 
 def whitened_power(pieces: Pieces, noise: NoiseModel) -> tuple[float, int]:
     """Return the sum of squares of the whitened residuals, and their number."""
-    white = [noise.whiten(r)[noise.order :] for r in pieces]
+    white = [noise.seen(r, [slice(0, len(r))]) for r in pieces]
     return _power(white), sum(map(len, white))
 
 

@@ -179,7 +179,7 @@ def refit(
     )
     found = fit_candidate(fitted, records, start, names, coarse=start is None, iterations=40, **settings)
     if rough(found):
-        better = hopped(found, _Beside(records, found.windows))
+        better = hopped(found, _Beside(records, found.windows), rough(found))
         if better is not found:
             found = fit_candidate(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings

@@ -74,9 +74,9 @@ class Problem:
     initial states, `slopes` the derivatives of the last step.
     """
 
-    def __init__(self, model, records, names, budget, limits=None, chained=False):
+    def __init__(self, model, records, names, budget, limits=None, colour=None):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.chained = chained
+        self.colour = colour
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -104,7 +104,9 @@ class Problem:
 
     def stage(self, windows: list[Windows], thin, starts=None):
         """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
-        self.simulators = [Simulator(self.model, r, thin=thin, chained=self.chained) for r in self.records]
+        self.simulators = [
+            Simulator(self.model, r, thin=thin, chained=self.colour is not None) for r in self.records
+        ]
         self.windows = windows
         self.measured = [r.y[w.samples] for r, w in zip(self.records, windows, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, windows, strict=True)]
@@ -139,6 +141,8 @@ class Problem:
 
     def cost(self, residual, nuisance, weights) -> float:
         """Return half the weighted sum of squares, initial states weighed by what is known of them."""
+        if self.colour is not None:
+            return 0.5 * _power([self.weighed(k, r) for k, r in enumerate(residual)])
         total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
         known = sum(
             float(np.sum((a - m) ** 2 / p**2))
@@ -146,6 +150,10 @@ class Problem:
         )
         # What is known beforehand counts as much as one sample off by the noise.
         return 0.5 * (total + self.noise**2 * known)
+
+    def weighed(self, k, x) -> np.ndarray:
+        """Return what the cost sees of signals (n,) or (n, m) of one record."""
+        return x if self.colour is None else self.colour.seen(x, self.windows[k].slices)
 
     def means(self):
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
@@ -175,7 +183,7 @@ class Problem:
             if not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
-        rough = ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names
+        rough = ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names and self.colour is None
         if rough and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
             theta = self._without_the_lost(theta, again, tolerance, robust)
         return theta
@@ -208,6 +216,8 @@ class Problem:
         damping, self.converged = 1e-3, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
+        if not self.names and not any(a.size for a in nuisance):
+            iterations = 0
         for iteration in range(iterations):
             if self.nfev >= self.budget:
                 break
@@ -300,6 +310,11 @@ class Problem:
         h, g, pieces = np.zeros((p, p)), np.zeros(p), []
         prior, means = self.noise**2, self.means()
         for k, windows in enumerate(self.windows):
+            if self.colour is not None:
+                a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
+                h += a.T @ a
+                g += a.T @ r
+                continue
             for w, where in enumerate(windows.slices):
                 a, s, r, c = jp[k][where], js[k][where], residual[k][where], weights[k][where]
                 ac = a * c[:, None]

@@ -63,8 +63,8 @@ class Simulator:
     force : (n,) array or None
         Input in place of the recorded one.
     chained : bool
-        Whether hidden states (of a joint, of bristles) go on from one window into the next, so that only
-        what is measured begins anew.
+        Whether windows begin as the record says and hidden states (of a joint, of bristles) go on from one
+        into the next, without corrections of any.
 
     Raises
     ------
@@ -127,10 +127,7 @@ class Simulator:
     @property
     def nuisances(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per window."""
-        if not self.mechanism:
-            return ()
-        names = initial_states.names(self.block.core)
-        return tuple(n for n in names if n in initial_states.SEEN) if self.chained else names
+        return initial_states.names(self.block.core) if self.mechanism and not self.chained else ()
 
     def priors(self, windows: Windows) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""

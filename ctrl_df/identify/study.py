@@ -10,13 +10,12 @@ import numpy as np
 from .attach import applicable, attach
 from .equivalence import indistinguishable
 from .evidence import ROUNDED, ranked
-from .noise import whitened_power, whitener
 from .proposals import proposals
 from .regression import Start, force_regression, motion_of
 from .screen import Screen, starts_for
 from .simulator import feasible
 from .trial import FORCED, Data, Trial, prepare
-from .valleys import all_hopped, begun_at, hopped, rough, settled
+from .valleys import all_hopped, begun_at, hopped, own, settled
 
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
@@ -54,9 +53,10 @@ class Study:
         self._look_at(data, 1)
         self.base = self._baseline(block)
         # friction that wanders drowns all else over longer windows
-        if self.levels[0].moved(self.base.train).rmse > FORCED * data.noise:
-            self._look_at(data.wandering, 0)
-            self.base = Trial("", self.data.moved(self.base.train))
+        near = self.levels[0].moved(self.base.train)
+        if near.rmse > FORCED * data.noise:
+            self._look_at(self.levels[0].wandering(near.residual_pieces), 0)
+            self.base = Trial("", self.data.fit(near.model, self.free))
 
     def _look_at(self, data: Data, which: int):
         self.levels = data.levels
@@ -100,7 +100,7 @@ class Study:
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
         jobs = [(cls, screen, self.levels[0].sampled, self.free, nominal) for cls in kinds]
         found = [t for t in run(_try, jobs) if t is not None]
-        return base, ranked(Trial("", base), found)[0]
+        return base, ranked(Trial("", base), found, self.data.block)[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -108,7 +108,7 @@ class Study:
             values = {k: tried.block.parameters[k].value for k in self.free}
             block = self.base.block
             again = self.data.fit(block.with_parameters(feasible(block, values)), self.free, iterations=8)
-            if again.rmse < self.base.train.rmse:
+            if self.data.size(again) < self.data.size(self.base.train):
                 self.base = Trial("", again)
 
     # --- the best, carefully --------------------------------------------------------------------------
@@ -132,7 +132,7 @@ class Study:
             for t, f in zip((self.base, *found), stages[at], strict=True)
         ]
         self.base = best[0]
-        chosen, self.noise = ranked(self.base, best[1:])
+        chosen, self.noise = ranked(self.base, best[1:], self.data.block)
         if not chosen:
             return []
         chosen = self._again(chosen, chosen[:1])
@@ -143,7 +143,7 @@ class Study:
         ended = [self._ended(t, t in near and len(near) > 1, floor, least) for t in close]
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
-        chosen, self.noise = ranked(self.base, chosen)
+        chosen, self.noise = ranked(self.base, chosen, self.data.block)
         return chosen
 
     def _stages(self, fits):
@@ -170,15 +170,15 @@ class Study:
         fine, fit = self.data.fine, tried.train
         if exactly:
             fit = fine.moved(fit, 8, 1e-6)
-        if rough(fit) and fit.rmse > floor and least > floor:
-            fit = hopped(fit, fine.fit)
+        if own(fit) and fit.rmse > floor and least > floor and not fine.forced:
+            fit = hopped(fit, fine.fit, own(fit))
         return settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
 
     def _again(self, chosen, those) -> list[Trial]:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
         fine = self.data.fine
         begun = [begun_at(t, best, fine) for best in those for t in chosen if t is not best]
-        judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
+        judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)], self.data.block)
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 
     def alike(self, a: Trial, b: Trial) -> bool:
@@ -242,11 +242,7 @@ def _try(job) -> Trial | None:
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     span = float(np.ptp(screen.motion.x))
     found = [t for t in found if _periodic_enough(t, span)]
-    if screen.data.forced:
-        # what a few reversals leave would outweigh what goes on all the time
-        noise = whitener(screen.base.residual_pieces)
-        return min(found, key=lambda t: whitened_power(t.train.residual_pieces, noise)[0], default=None)
-    return min(found, key=lambda t: t.train.rmse, default=None)
+    return min(found, key=lambda t: screen.data.size(t.train), default=None)
 
 
 def _spread(effects, count):

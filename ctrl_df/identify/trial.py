@@ -10,6 +10,7 @@ import numpy as np
 
 from .candidate import Candidate, fit_windows
 from .measurement import Measurement
+from .noise import NoiseModel, force_errors, whitened_power
 from .ripple_phase import rephased
 from .simulator import Simulator
 from .windows import Windows, cut, facts, split
@@ -28,6 +29,9 @@ FORCED = 50.0
 
 FAR = 12.0
 """Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
+
+BLOCKS = 40
+"""Values of the force that the shortest windows show where forces wander."""
 
 LEAST = 50
 """Samples of the shortest window."""
@@ -134,8 +138,7 @@ class Data:
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
-    forced: bool = False  # whether forces that no model has (friction that wanders) outweigh the noise:
-    #                       hidden states must not make up for them anew in every window
+    colour: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -153,9 +156,31 @@ class Data:
         return [self.level(f) for f in LEVELS]
 
     @property
-    def wandering(self) -> Data:
-        """The same for a machine whose own forces wander, with the input in finer steps."""
-        return replace(self, forced=True, thin=max(self.thin // 2, 1))
+    def forced(self) -> bool:
+        """Whether forces that no model has (friction that wanders) outweigh the noise."""
+        return self.colour is not None
+
+    def wandering(self, residual) -> Data:
+        """Return the same for a machine whose own forces wander; `residual`: what they leave, in pieces.
+
+        The slow error that such forces leave would drown all else: what counts are the forces, averaged.
+        """
+        if self.colour is not None:
+            return self
+        thin, length = max(self.thin // 2, 1), float(np.median([len(r) for r in residual]))
+        return replace(self, colour=force_errors(residual, max(thin, round(length / BLOCKS), 2)), thin=thin)
+
+    @property
+    def block(self) -> int:
+        """Samples a value that counts."""
+        return self.colour.step if self.colour is not None else 1
+
+    def size(self, found: Candidate) -> tuple[float, int]:
+        """Return the rms error of a fit by the measure that it makes least, and of how many values."""
+        if self.colour is None:
+            return found.rmse, sum(map(len, found.residual))
+        power, count = whitened_power(found.residual_pieces, self.colour)
+        return math.sqrt(power / count), count
 
     @property
     def sampled(self) -> Data:
@@ -177,7 +202,7 @@ class Data:
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits, errors=self.step > 0, chained=self.forced,
+            tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
@@ -203,7 +228,9 @@ class Data:
         short = getattr(self.level(SHORTEST), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
         if name == "held" and view.records is not self.train.records:
-            near = rephased(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
+            near = rephased(
+                near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i), self.size
+            )
             model = near.model
         near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
         return self.fit(model, (), view=view, starts=near.starts, iterations=1)
@@ -229,7 +256,7 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
     while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
         thin //= 2
-    known = {k: p.value for k, p in block.parameters.items() if p.value > 0}
+    known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
     # A lag much shorter than a sample is none, and a stiff equation.
     limits["input_lag.time_constant"] = (0.05 * min(r.dt for r in records), max(r.duration for r in records))

@@ -42,12 +42,14 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
     inverse = (vectors / np.maximum(eigen, 1e-12 * top)) @ vectors.T / np.outer(size, size)
     middle = np.zeros_like(h)
     for k, e in enumerate(residual):
+        e, columns = problem.weighed(k, e), problem.weighed(k, tangent.parameters[k])
         n = len(e)
         lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.windows[k])
         length = 1 << (n - 1).bit_length()
-        transform = np.fft.rfft(tangent.parameters[k], length, axis=0)
+        transform = np.fft.rfft(columns, length, axis=0)
         omega = np.linspace(0, math.pi, transform.shape[0])
-        density = noise_model(e).spectrum(omega) + 1e-6 * problem.noise**2
+        floor = problem.noise**2 if problem.colour is None else float(np.mean(e * e))
+        density = noise_model(e).spectrum(omega) + 1e-6 * floor
         double = np.full(len(omega), 2.0)
         double[0] = double[-1] = 1.0
         middle += n / max(n - lost, 0.1 * n) * np.real(

@@ -34,7 +34,13 @@ def rough(found: Candidate) -> list[str]:
     return [name for name in found.names if name.partition(".")[0] in ROUGH]
 
 
-def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4) -> Candidate:
+def own(found: Candidate) -> list[str]:
+    """Return the rough parameters of the last effect of a model."""
+    last = list(found.model._keys)[-1] + "."
+    return [name for name in rough(found) if name.startswith(last)]
+
+
+def hopped(found: Candidate, fit: Callable[..., Candidate], names: list[str]) -> Candidate:
     """Return the best of the fits that begin beside `found`, one rough parameter moved at a time; or itself.
 
     Parameters
@@ -42,17 +48,17 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
     found : Candidate
     fit : callable
         ``fit(model, names, starts=, iterations=)`` over the windows of `found`.
-    iterations : int
-        Of each fit.
+    names : list of str
+        Parameters to move.
     """
-    for name in rough(found):
+    for name in names:
         at, best = found.parameters[name], found
         near = []
         for factor in _SMALL if name.endswith(".level") else _HOPS:
             moved = _moved(found.model, name, _within(found, name, factor * at))
             near.append(fit(moved, (), starts=found.starts, iterations=2))
         for begun in sorted(near, key=lambda f: f.rmse)[:_TRIED]:
-            tried = fit(begun.model, found.names, starts=begun.starts, iterations=iterations)
+            tried = fit(begun.model, found.names, starts=begun.starts, iterations=4)
             if tried.rmse < _WORTH * best.rmse:
                 best = tried
         found = best
@@ -60,11 +66,18 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], iterations: int = 4)
 
 
 def all_hopped(fits, data: Data, floor: float) -> list:
-    """Return fits in their best valleys: those that are neither at the floor nor far behind the best."""
+    """Return fits in their best valleys: those that are neither at the floor nor far behind the best.
+
+    The first is the baseline. If it was in its best valley, so are the others in what they share with it.
+    """
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
-    return [hopped(f, data.fit) if floor < f.rmse < _HOPELESS * least else f for f in fits]
+    lost = [floor < f.rmse < _HOPELESS * least for f in fits]
+    base = hopped(fits[0], data.fit, rough(fits[0])) if lost[0] else fits[0]
+    which = own if base is fits[0] else rough
+    others = zip(fits[1:], lost[1:], strict=True)
+    return [base, *(hopped(f, data.fit, which(f)) if is_lost else f for f, is_lost in others)]
 
 
 def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
