@@ -34,10 +34,13 @@ class Candidate:
         Of `values`, for residuals of the colour seen.
     residual, simulated : list of (n,) array
         Per record, measured minus simulated.
-    cost : float
-        Half the sum of squared residuals.
+    count : int
+        Values that the cost is of.
+    unit : float
+        Of these values, where they are not in the unit of `rmse`.
     rmse, nrmse : float
-        Over all records; nrmse over the rms of the centred outputs.
+        Error over all records; nrmse over the rms of the centred outputs. Where the cost is of forces (see
+        `fit_windows`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
     nfev : int
         Simulations of all records together.
     converged : bool
@@ -62,7 +65,8 @@ class Candidate:
     covariance: np.ndarray
     residual: list
     simulated: list
-    cost: float
+    count: int
+    unit: float
     rmse: float
     nrmse: float
     nfev: int
@@ -293,8 +297,8 @@ def _candidate(problem: Problem, theta, central) -> Candidate:
 def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
     values = problem.values(theta) or {}
     residual = problem.last
-    total = sum(float(e @ e) for e in residual)
-    spread = sum(float(np.sum((y - y.mean()) ** 2)) for y in problem.measured)
+    total, count = problem.power(residual)
+    spread, _ = problem.power([y - y.mean() for y in problem.measured])
     return Candidate(
         model=problem.simulators[0].with_values(values),
         names=problem.names,
@@ -302,8 +306,9 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         covariance=covariance,
         residual=residual,
         simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
-        cost=0.5 * total,
-        rmse=math.sqrt(total / sum(len(e) for e in residual)),
+        count=count,
+        unit=problem.unit,
+        rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
         converged=problem.converged,

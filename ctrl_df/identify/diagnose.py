@@ -131,7 +131,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     # rounded.
     rounds = best.key == ROUNDED
     missed = lacks(base if rounds else best, study.data, study.noise)
-    base_errors = _errors(base, study)
+    base_errors = _errors(base)
     keys = {c.key for c in chosen}
     weights = np.exp(
         np.clip([t.evidence - max(best.evidence, 0.0) for t in chosen] + [-max(best.evidence, 0.0)], -700, 0)
@@ -163,6 +163,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     result = Diagnosis(
         verdict, tuple(ranking), base.block, base.block, *base_errors, noise, structure, "", kinds, where,
         study.data.train.records, held, time.perf_counter() - began, dict(limits or {}),
+        "acceleration" if study.data.forced else "output",
     )  # fmt: skip
     object.__setattr__(result, "explanation", explain(result, missed))
     return result
@@ -189,10 +190,9 @@ def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float,
     return noise, max(structure, outside), max(structure / there, outside / there_outside)
 
 
-def _errors(tried: Trial, study: Study) -> tuple[float, float]:
+def _errors(tried: Trial) -> tuple[float, float]:
     """Return nrmse over the windows to learn from and over those to be judged by."""
-    held = tried.held.rmse / study.data.held.spread if tried.held is not None else math.nan
-    return tried.train.rmse / study.data.train.spread, held
+    return tried.train.nrmse, tried.held.nrmse if tried.held is not None else math.nan
 
 
 def _entry(t: Trial, study: Study, probability, same) -> CandidateEffect:
@@ -201,7 +201,7 @@ def _entry(t: Trial, study: Study, probability, same) -> CandidateEffect:
     key = list(t.block._keys)[-1]
     known = t.train.standard_errors if len(t.train.covariance) else {}
     return CandidateEffect(
-        effect, effect.id, *_errors(t, study), t.evidence, probability, values, same, t.block, t.confirmed,
+        effect, effect.id, *_errors(t), t.evidence, probability, values, same, t.block, t.confirmed,
         errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
         evidence_holdout=t.evidence_held,
     )  # fmt: skip

@@ -93,7 +93,10 @@ class Diagnosis:
     baseline : CandidateEffect-like
         The refitted baseline's errors: `nrmse`, `nrmse_holdout`.
     noise, structure : float
-        Of the best candidate's residual: rms of noise and of what the model still misses [output unit].
+        Of the best candidate's residual: rms of noise and of what the model still misses [unit of `measure`].
+    measure : {'output', 'acceleration'}
+        What all errors are of: the output, or (where forces that no model has, such as friction that wanders,
+        outweigh the noise of the sensor) its acceleration, averaged over some samples.
     """
 
     verdict: str
@@ -111,6 +114,7 @@ class Diagnosis:
     holdout: tuple[Measurement, ...]
     seconds: float = 0.0
     limits: Mapping[str, float] = field(default_factory=dict)
+    measure: str = "output"
 
     @property
     def best(self) -> CandidateEffect | None:

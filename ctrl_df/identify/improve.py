@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from typing import Any
@@ -66,10 +65,8 @@ def improve(
     common = last.data.fine
     errors = [common.errors(step.model) for step in steps]
     steps = tuple(replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True))
-    spread = math.sqrt(
-        sum(float((r.y - r.y.mean()) @ (r.y - r.y.mean())) for r in records) / sum(map(len, records))
-    )
-    noise = last_diagnosis(steps).noise / spread
+    base = last.base.train
+    noise = last_diagnosis(steps).noise * base.nrmse / base.rmse
     return Study(
         steps, steps[-1].model, outcome(steps), noise, start, records, held, time.perf_counter() - began
     )

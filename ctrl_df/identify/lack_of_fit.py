@@ -9,7 +9,7 @@ rest, whitened. A kind that explains more than chance tells that something is mi
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class Lack:
     evidence : float
         Log likelihood ratio [nats] less the price of the free forces (Schwarz).
     rms : float
-        Of the output these forces explain, and the model does not [output unit].
+        Of the error these forces explain, and the model does not, in the unit of the fit's `rmse`.
     span : (float, float)
         Where the force found is largest, in the unit of the kind.
     sentence : str
@@ -60,16 +60,19 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
         if alive:
             matrix = np.array([columns[i] for i in alive]).T
             tables.append((kind, matrix, [spans[i % len(spans)] for i in alive]))
-    ends = np.cumsum([0, *map(len, tried.train.residual_pieces)])
-    windows = [slice(i, j) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+    windows = tangent.pieces
+    if data.forced:
+        # the residual is of forces here, as the fits see it
+        noise = whitener([residual[w] for w in windows])
     found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = whitener([left[w] for w in windows], noise.step)
+        noise = whitener([left[w] for w in windows])
         found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
-    return sorted((f[0] for f in found), key=lambda f: -f.evidence)
+    unit = tried.train.unit
+    return sorted((replace(f[0], rms=f[0].rms / unit) for f in found), key=lambda f: -f.evidence)
 
 
 def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.ndarray]:

@@ -13,7 +13,7 @@ WORTH = 50.0
 """Log likelihood ratio [nats, for white noise] that another phase must bring, or the model's own stands."""
 
 
-def rephased(near: Candidate, fit, size) -> Candidate:
+def rephased(near: Candidate, fit) -> Candidate:
     """Return a model with the phases of its ripples as a record has them, where that record says so.
 
     Parameters
@@ -22,8 +22,6 @@ def rephased(near: Candidate, fit, size) -> Candidate:
         The model with its initial states fitted.
     fit : callable
         ``fit(block, names, starts, iterations)`` over the same windows.
-    size : callable
-        ``size(found) -> (error, number of values)`` by the measure that fits make least.
     """
     best = near
     for key in [k for k in near.model._keys if k.startswith("position_ripple")]:
@@ -32,9 +30,8 @@ def rephased(near: Candidate, fit, size) -> Candidate:
         for i in range(1, TRIED):
             block = best.model.with_parameters({name: own + 2 * math.pi * i / TRIED})
             tried = fit(block, (), best.starts, 1)
-            found = min(found, tried, key=lambda f: size(f)[0])
+            found = min(found, tried, key=lambda f: f.rmse)
         found = fit(found.model, (name,), found.starts, 5)
-        (before, count), (after, _) = size(best), size(found)
-        if count * math.log(before / after) > WORTH:
+        if found.count * math.log(best.rmse / found.rmse) > WORTH:
             best = found
     return best

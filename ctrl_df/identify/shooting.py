@@ -39,10 +39,12 @@ class Tangent:
     windows : list of Windows
     ridge : list of (nw, ns) arrays
         Precision of what is known of the initial states beforehand, in units of one sample.
+    colour : NoiseModel or None
+        What fits see of the output, where that is not the output itself.
     """
 
-    def __init__(self, parameters, states, windows, ridge):
-        self.states, self.windows, self.ridge = states, windows, ridge
+    def __init__(self, parameters, states, windows, ridge, colour=None):
+        self.states, self.windows, self.ridge, self.colour = states, windows, ridge, colour
         self.parameters = [self._without_starts(k, j) for k, j in enumerate(parameters)]
         stacked = np.concatenate(self.parameters)
         norms = np.linalg.norm(stacked, axis=0)
@@ -53,14 +55,25 @@ class Tangent:
     def _without_starts(self, k, columns):
         """Remove from the columns (n, m) of one record what its initial states can explain."""
         out = np.array(columns, dtype=float)
+        if self.colour is not None:
+            return self.colour.seen(out, self.windows[k].slices)
         for w, where in enumerate(self.windows[k].slices):
             s = self.states[k][where]
             if s.shape[1]:
                 out[where] -= s @ np.linalg.solve(s.T @ s + np.diag(self.ridge[k][w]), s.T @ out[where])
         return out
 
+    @property
+    def pieces(self) -> list[slice]:
+        """Every window as a slice of what `project` returns."""
+        lengths = [w.stop - w.start for windows in self.windows for w in windows.slices]
+        if self.colour is not None:
+            lengths = [n // self.colour.step - self.colour.order for n in lengths]
+        ends = np.cumsum([0, *lengths])
+        return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+
     def project(self, signals: Signals) -> np.ndarray:
-        """Return the signals, one array for all records, without what refitting could explain."""
+        """Return what fits see of signals, one array for all records, less what refitting could explain."""
         joined = np.concatenate(
             [self._without_starts(k, np.reshape(e, (-1, 1)))[:, 0] for k, e in enumerate(signals)]
         )
@@ -155,6 +168,16 @@ class Problem:
         """Return what the cost sees of signals (n,) or (n, m) of one record."""
         return x if self.colour is None else self.colour.seen(x, self.windows[k].slices)
 
+    def power(self, signals: Signals) -> tuple[float, int]:
+        """Return the sum of squares of what the cost sees of signals, and of how many values."""
+        seen = [self.weighed(k, x) for k, x in enumerate(signals)]
+        return _power(seen) / self.unit**2, sum(map(len, seen))
+
+    @property
+    def unit(self) -> float:
+        """Unit of what the cost sees: accelerations make second differences of their step squared."""
+        return 1.0 if self.colour is None else (self.colour.step * self.known[0].dt) ** 2
+
     def means(self):
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
         means = [np.zeros_like(p) for p in self.priors]
@@ -167,7 +190,7 @@ class Problem:
         """Return the linear map about the last step of `solve`."""
         assert self.slopes is not None
         ridge = [self.noise**2 / p**2 for p in self.priors]
-        return Tangent(*self.slopes, self.windows, ridge)
+        return Tangent(*self.slopes, self.windows, ridge, self.colour)
 
     # --- solving --------------------------------------------------------------------------------------
 

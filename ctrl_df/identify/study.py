@@ -83,13 +83,23 @@ class Study:
         """Return every effect that can be added, fitted, the one with most evidence first."""
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
-        plain = not found or found[0].train.rmse > 0.97 * base.rmse
-        if plain and not self.data.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
+        if not self.data.forced and self._hides(base, found, longest):
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
             base, found = self._look(classes, executor, longest)
         if found:
             self._rebase(found)
         return found
+
+    def _hides(self, base, found, longest: Data) -> bool:
+        """Whether long windows show an error that short ones do not, and that no candidate takes away."""
+        there = longest.moved(base).rmse
+        if there <= _GROWTH * base.rmse:
+            return False
+        plain = not found or found[0].train.rmse > 0.97 * base.rmse
+        return plain or (
+            found[0].train.rmse > 0.8 * base.rmse
+            and min(longest.moved(t.train, 3).rmse for t in found[:3]) > 0.5 * there
+        )
 
     def _look(self, classes, executor, data: Data):
         """Fit every effect over one set of windows; return the baseline there and the effects, best first."""
@@ -108,7 +118,7 @@ class Study:
             values = {k: tried.block.parameters[k].value for k in self.free}
             block = self.base.block
             again = self.data.fit(block.with_parameters(feasible(block, values)), self.free, iterations=8)
-            if self.data.size(again) < self.data.size(self.base.train):
+            if again.rmse < self.base.train.rmse:
                 self.base = Trial("", again)
 
     # --- the best, carefully --------------------------------------------------------------------------
@@ -242,7 +252,7 @@ def _try(job) -> Trial | None:
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     span = float(np.ptp(screen.motion.x))
     found = [t for t in found if _periodic_enough(t, span)]
-    return min(found, key=lambda t: screen.data.size(t.train), default=None)
+    return min(found, key=lambda t: t.train.rmse, default=None)
 
 
 def _spread(effects, count):

@@ -10,7 +10,7 @@ import numpy as np
 
 from .candidate import Candidate, fit_windows
 from .measurement import Measurement
-from .noise import NoiseModel, force_errors, whitened_power
+from .noise import NoiseModel, force_errors
 from .ripple_phase import rephased
 from .simulator import Simulator
 from .windows import Windows, cut, facts, split
@@ -79,12 +79,6 @@ class View:
     def outputs(self) -> list[np.ndarray]:
         """Measured outputs within the windows."""
         return [r.y[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
-
-    @property
-    def spread(self) -> float:
-        """Root mean square of the centred outputs."""
-        ys = self.outputs
-        return math.sqrt(sum(float(np.sum((y - y.mean()) ** 2)) for y in ys) / sum(map(len, ys)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,13 +169,6 @@ class Data:
         """Samples a value that counts."""
         return self.colour.step if self.colour is not None else 1
 
-    def size(self, found: Candidate) -> tuple[float, int]:
-        """Return the rms error of a fit by the measure that it makes least, and of how many values."""
-        if self.colour is None:
-            return found.rmse, sum(map(len, found.residual))
-        power, count = whitened_power(found.residual_pieces, self.colour)
-        return math.sqrt(power / count), count
-
     @property
     def sampled(self) -> Data:
         """The same with every second window to learn from, for a first look."""
@@ -219,8 +206,7 @@ class Data:
 
     def errors(self, model) -> tuple[float, float]:
         """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
-        ran = {name: self._ran(model, name).rmse for name in ("train", "held")}
-        return ran["train"] / self.train.spread, ran["held"] / self.held.spread
+        return self._ran(model, "train").nrmse, self._ran(model, "held").nrmse
 
     def _ran(self, model, name) -> Candidate:
         """Fit the initial states alone: short windows first, found without fail; the others begin there."""
@@ -228,9 +214,7 @@ class Data:
         short = getattr(self.level(SHORTEST), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
         if name == "held" and view.records is not self.train.records:
-            near = rephased(
-                near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i), self.size
-            )
+            near = rephased(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
             model = near.model
         near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
         return self.fit(model, (), view=view, starts=near.starts, iterations=1)

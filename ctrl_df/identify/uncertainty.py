@@ -42,7 +42,7 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
     inverse = (vectors / np.maximum(eigen, 1e-12 * top)) @ vectors.T / np.outer(size, size)
     middle = np.zeros_like(h)
     for k, e in enumerate(residual):
-        e, columns = problem.weighed(k, e), problem.weighed(k, tangent.parameters[k])
+        e, columns = problem.weighed(k, e), tangent.parameters[k]
         n = len(e)
         lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.windows[k])
         length = 1 << (n - 1).bit_length()
