@@ -19,6 +19,9 @@ def applicable(cls, block) -> bool:
     two = block.core.bodies == 2
     if cls.id == "load_friction":
         return two  # on a rigid block it is Coulomb friction
+    if cls.id == "bristle":
+        # they slip under a kinetic level: without one they are a spring
+        return any(e.role == "friction" and e.side == "motor" and e.rank == 0 for e in block.effects)
     if cls.id == "backlash":
         return "compliance" not in ids or cls.id not in ids
     return not (cls.role == "coupling" and two and "compliance" in ids)

@@ -68,4 +68,4 @@ def _without_idle(block, added, study):
         if study.evidence(study.refitted(block, ()), without) < SIGNIFICANT:
             block = without.fitted.block
             dropped.append(key)
-    return block, tuple(dropped)
+    return block, tuple(dropped), ()

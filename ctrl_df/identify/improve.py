@@ -6,12 +6,16 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from .attach import attach
 from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
 from .evidence import ranked
 from .ladder import Found, Study, climb, last_diagnosis, outcome
 from .records import as_records, has_tables
 from .study import Study as Fits
 from .trial import Trial
+
+RIVALS = 2
+"""Candidates of a step that are tried again when a later step is taken."""
 
 
 def improve(
@@ -49,6 +53,7 @@ def improve(
     held = as_records(holdout, "holdout") if holdout is not None else ()
     start, classes = block_of(model), effect_classes(candidates)
     last: Any = None
+    rivals: dict[str, list] = {}
 
     def ask(block, names, search):
         nonlocal last
@@ -57,7 +62,11 @@ def improve(
         found = verdict_of(fits, fits.candidates(classes, executor) if search else [], asked)
         best = found.ranking[0] if found.ranking else None
         worth = best is not None and best.evidence_fitted >= SIGNIFICANT and best.evidence_holdout >= HELD
-        return Found(found, worth, lambda block, ids: _without_idle(block, ids, fits, names))
+        known = set(found.model.parameters) - set(names)
+        if best is not None and worth:
+            confirmed = [c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > SIGNIFICANT]
+            rivals[best.model._keys[-1]] = confirmed[:RIVALS]
+        return Found(found, worth, lambda block, ids: _revised(block, ids, fits, known, rivals))
 
     steps = climb(start, free, max_effects, ask)
     # The windows of a diagnosis are as long as its best model bears: steps are compared over those of the
@@ -72,19 +81,39 @@ def improve(
     )
 
 
-def _without_idle(block, added, fits, names):
-    """Drop effects added earlier that the last one made idle: without them the error stays as it is."""
+def _revised(block, added, fits, known, rivals):
+    """Look again at effects added earlier, beside the last one of the block.
+
+    Those without which the error stays as it is are dropped. Those that stood in for something else, too,
+    give way to another candidate of their own step that does better now, or as well with fewer parameters:
+    `rivals`, effects by the id chosen. `known`: parameters that are not to be refitted.
+    """
     dropped: list[str] = []
+    instead: list[str] = []
     data = fits.data
+
+    def fitted(model, iterations):
+        free = [k for k in free_names(model) if k not in known]
+        found = data.fit(model, free, iterations=iterations)
+        return data.judged(Trial(model._keys[-1], found, extra=len(free)))
+
     for key in added:
-        less = block.without_effect(key)
-        free = [k for k in free_names(less) if k in set(names) or k.startswith(less._keys[-1] + ".")]
-        fits.base = data.judged(Trial("", data.fit(less, free, iterations=8)))
-        full_free = [k for k in free_names(block) if k in set(names) or k.startswith(block._keys[-1] + ".")]
-        whole = data.judged(
-            Trial(key, data.fit(block, full_free, iterations=4), extra=len(full_free) - len(free))
-        )
-        if ranked(fits.base, [whole], data.block)[0][0].evidence < SIGNIFICANT:
-            block = fits.base.block
+        less = fitted(block.without_effect(key), 8)
+        tried = [fitted(block, 4)]
+        for effect in rivals.get(key, ()):
+            other = attach(less.block, effect)
+            if other is not None:
+                tried.append(fitted(other, 8))
+        tried = [replace(t, extra=t.extra - less.extra) for t in tried]
+        judged, _ = ranked(less, tried, data.block)
+        kept = next(t for t in judged if t.block is tried[0].block)
+        if judged[0].evidence < SIGNIFICANT:
+            block = less.block
             dropped.append(key)
-    return block, tuple(dropped)
+        elif judged[0].evidence > kept.evidence + (0.0 if judged[0].extra < kept.extra else SIGNIFICANT):
+            block = judged[0].block
+            dropped.append(key)
+            instead.append(block._keys[-1])
+        if key in dropped:
+            fits.base = less
+    return block, tuple(dropped), tuple(instead)

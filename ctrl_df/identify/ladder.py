@@ -19,7 +19,9 @@ class Step:
     effect : str
         Id of the effect added; empty for the refitted start.
     dropped : tuple of str
-        Ids that this effect made idle.
+        Ids that this effect made idle, or for which others do better beside it.
+    instead : tuple of str
+        Ids of these others.
     model : block
     nrmse, nrmse_holdout : float
         Over windows with fitted starts.
@@ -42,6 +44,18 @@ class Step:
     parameters: Mapping[str, float]
     equivalents: tuple[str, ...] = ()
     diagnosis: Diagnosis | None = None
+    instead: tuple[str, ...] = ()
+
+    @property
+    def changes(self) -> list[tuple[str, str]]:
+        """What became of effects added earlier: sign and id."""
+        return [*(("-", d) for d in self.dropped), *(("+", d) for d in self.instead)]
+
+    @property
+    def name(self) -> str:
+        """What the step did, in signs."""
+        first = f"+ {self.effect}" if self.effect else "refitted"
+        return " ".join([first, *(f"{sign} {key}" for sign, key in self.changes)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +91,13 @@ class Study:
 
     def table(self) -> str:
         """Return one line a step."""
-        lines = [f"{'step':<30} {'nrmse':>9} {'held out':>9} {'evidence':>10}"]
+        w = max(30, *(len(step.name) for step in self.steps))
+        lines = [f"{'step':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>10}"]
         for step in self.steps:
-            name = f"+ {step.effect}" if step.effect else "refitted"
-            name += "".join(f" - {d}" for d in step.dropped)
-            lines.append(f"{name:<30} {step.nrmse:>9.3g} {step.nrmse_holdout:>9.3g} {step.evidence:>10.1f}")
-        lines.append(f"{'noise floor':<30} {self.noise:>9.3g}")
+            lines.append(
+                f"{step.name:<{w}} {step.nrmse:>9.3g} {step.nrmse_holdout:>9.3g} {step.evidence:>10.1f}"
+            )
+        lines.append(f"{'noise floor':<{w}} {self.noise:>9.3g}")
         return "\n".join(lines)
 
     def summary(self) -> str:
@@ -131,14 +146,14 @@ class Found(NamedTuple):
     diagnosis : Diagnosis
     worth : bool
         Whether the first of its ranking is worth a step.
-    drop : callable
-        ``drop(block, ids) -> (block, ids dropped)``: leaves out those of the effects `ids`, added earlier,
-        that the last one of the block made idle.
+    revise : callable
+        ``revise(block, ids) -> (block, ids dropped, ids in their place)``: looks again at the effects `ids`,
+        added earlier, now that the last one of the block is there too.
     """
 
     diagnosis: Diagnosis
     worth: bool
-    drop: Callable[[Any, Sequence[str]], tuple[Any, tuple[str, ...]]]
+    revise: Callable[[Any, Sequence[str]], tuple[Any, tuple[str, ...], tuple[str, ...]]]
 
 
 def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
@@ -163,19 +178,21 @@ def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
     if int(max_effects) != max_effects or max_effects < 0:
         raise ValueError(f"improve needs max_effects as an integer >= 0; got {max_effects!r}.")
     kept, own = set(start.parameters) - set(free_names(start, free)), set(start._keys)
-    block, steps, effect, evidence, dropped, same = start, [], "", 0.0, (), ()
+    block, steps, effect, evidence, dropped, same, instead = start, [], "", 0.0, (), (), ()
     while True:
         names = tuple(k for k in free_names(block) if k not in kept)
         found = ask(block, names, len(steps) < max_effects)
         d = found.diagnosis
         values = {k: p.value for k, p in d.model.parameters.items()}
-        steps.append(Step(effect, dropped, d.model, d.nrmse, d.nrmse_holdout, evidence, values, same, d))
+        steps.append(
+            Step(effect, dropped, d.model, d.nrmse, d.nrmse_holdout, evidence, values, same, d, instead)
+        )
         if not found.worth:
             return tuple(steps)
         best = d.ranking[0]
         effect, evidence, same = best.id, best.evidence, best.equivalents
         added = [k for k in best.model._keys[:-1] if k not in own]
-        block, dropped = found.drop(best.model, added) if added else (best.model, ())
+        block, dropped, instead = found.revise(best.model, added) if added else (best.model, (), ())
 
 
 def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:

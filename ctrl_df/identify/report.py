@@ -156,7 +156,8 @@ def _steps(study):
     rows = []
     for s in study.steps:
         name = "+ " + s.effect.replace("_", " ") if s.effect else "start, refitted"
-        name += "".join(f"; {d.replace('_', ' ')} became idle and was dropped" for d in s.dropped)
+        name += "".join(f"; without {d.replace('_', ' ')}" for d in s.dropped)
+        name += "".join(f", {d.replace('_', ' ')} in its place" for d in s.instead)
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
         evidence = f"{s.evidence:,.0f}" if s.effect else "–"
         rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), evidence, same])

@@ -242,12 +242,16 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
         thin //= 2
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
-    # A lag much shorter than a sample is none, and a stiff equation.
-    limits["input_lag.time_constant"] = (0.05 * min(r.dt for r in records), max(r.duration for r in records))
+    # What settles much faster than a sample is not seen, and a stiff equation.
+    scales, dt = _scales(block, records), min(r.dt for r in records)
+    limits["input_lag.time_constant"] = (0.05 * dt, max(r.duration for r in records))
+    limits["bristle.stiffness"] = (0.0, 2 * scales.force / (scales.speed * dt))
+    limits["bristle.damping"] = (0.0, 2 * scales.mass / dt)
+    limits["compliance.damping"] = (0.0, 0.1 * scales.mass / dt)
     # A joint with next to nothing behind it is no joint, but a dashpot that stands in for other friction.
     for name in ("compliance", "backlash"):
         limits.setdefault(f"{name}.load_fraction", (0.05, 0.95))
-    return Data(learn, judge, thin, _scales(block, records), limits)
+    return Data(learn, judge, thin, scales, limits)
 
 
 def _rough(record, thin: int) -> bool:

@@ -45,7 +45,7 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
     ax.set_xticks(
         at,
         [
-            n + "".join(f"\n- {d.replace('_', ' ')}" for d in s.dropped)
+            n + "".join(f"\n{sign} {d.replace('_', ' ')}" for sign, d in s.changes)
             for n, s in zip(names, steps, strict=True)
         ],
     )
