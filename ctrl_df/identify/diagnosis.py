@@ -94,7 +94,7 @@ class Diagnosis:
         The refitted baseline's errors: `nrmse`, `nrmse_holdout`.
     noise, structure : float
         Of the best candidate's residual: rms of noise and of what the model still misses [unit of `measure`].
-    measure : {'output', 'acceleration'}
+    measure : {'output', 'acceleration', 'N'}
         What all errors are of: the output, or (where forces that no model has, such as friction that wanders,
         outweigh the noise of the sensor) its acceleration, averaged over some samples.
     """

@@ -266,7 +266,7 @@ class FrequencyStudy:
         result = FrequencyDiagnosis(
             verdict, tuple(ranking), self.base.fitted.block, self.block, *errors, noise, structure, "",
             where.kinds, where, tuple(self.records), tuple(self.held), time.perf_counter() - began,
-            dict(limits or {}),
+            dict(limits or {}), "N",
             before=before, after=after,
         )  # fmt: skip
         object.__setattr__(

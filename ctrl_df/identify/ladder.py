@@ -89,6 +89,11 @@ class Study:
         before = list(self.start._keys)
         return tuple(k for k in self.model._keys if k not in before)
 
+    @property
+    def measure(self) -> str:
+        """What the errors of the steps are of."""
+        return last_diagnosis(self.steps).measure
+
     def table(self) -> str:
         """Return one line a step."""
         w = max(30, *(len(step.name) for step in self.steps))

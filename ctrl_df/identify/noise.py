@@ -49,6 +49,15 @@ class NoiseModel:
         age = np.arange(len(blocks)) - np.repeat(begins, np.diff([*begins, len(blocks)]))
         return self.whiten(blocks)[age >= self.order]
 
+    def rows(self, windows) -> np.ndarray:
+        """Return the sample in the middle of each value that `seen` returns of signals within `windows`."""
+        found = []
+        for w in windows:
+            values = np.arange(self.order, (w.stop - w.start) // self.step)
+            # a filter of k values is about the middle one
+            found.append(w.start + ((values - 0.5 * self.order + 0.5) * self.step).astype(int))
+        return np.concatenate(found)
+
     def spectrum(self, omega_dt) -> np.ndarray:
         """Return the density at ``omega dt`` [rad a sample]; constant sigma^2 for white noise."""
         k = np.arange(1, self.order + 1)

@@ -66,6 +66,13 @@ $sections
 </main></body></html>
 """)
 
+_ERRORS = {
+    "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
+    "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
+    "model has, such as friction that wanders, are larger here than the noise of the sensor",
+    "N": "of |N|",
+}
+
 _VERDICTS = {"none": "nothing missing", "effect": "found", "unknown": "something remains"}
 
 
@@ -95,9 +102,6 @@ def render(study) -> str:
     names = ", ".join(_record(r) for r in study.train)
     held = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
     fit = _known(study)
-    tables = hasattr(study.train[0], "omega")
-    measure = "of |N|" if tables else "over the rms of the centred output"
-    over = "" if tables else ", over windows each of which starts from a fitted state"
     return _PAGE.substitute(
         title=html.escape(f"What the model of {study.train[0].name} was missing"),
         records=html.escape(f"Fitted to {names}. Held out: {held}."),
@@ -106,7 +110,8 @@ def render(study) -> str:
         next=_next(study),
         how=html.escape(
             "Each step adds the effect that explains most of what is left, and refits everything. It stays "
-            f"only if the error on data it was not fitted to falls too. Errors are rms {measure}{over}."
+            "only if the error on data it was not fitted to falls too. Errors are rms "
+            f"{_ERRORS[study.measure]}."
         ),
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
         steps=_steps(study),

@@ -24,7 +24,8 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, **keywords) -> ct.ControlPl
     fig = sheet(8, 1.15 + 0.36 * (min(rows, len(diagnosis.ranking)) + 1), keywords)
     ax = fig.add_subplot()
     bars = draw_ranking(ax, diagnosis, rows)
-    ax.set_xlabel("Held-out error, rms over rms of the output [%]")
+    of = "acceleration" if diagnosis.measure == "acceleration" else "output"
+    ax.set_xlabel(f"Held-out error, rms over rms of the {of} [%]")
     return finished(fig, [ax], [bars], verdict_title(diagnosis, title))
 
 

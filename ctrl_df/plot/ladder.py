@@ -6,6 +6,13 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+OF = {
+    "output": "Error [% of the output's rms]",
+    "acceleration": "Error of the acceleration [% of its rms]",
+    "N": "Error [% of |N|]",
+}
+"""What errors are drawn as shares of."""
+
 
 def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
     """Draw the error of each step on training and held-out data; the grey band is the noise floor.
@@ -49,8 +56,7 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
             for n, s in zip(names, steps, strict=True)
         ],
     )
-    tables = hasattr(study.train[0], "omega")
-    ax.set_ylabel("Error [% of |N|]" if tables else "Error [% of the output's rms]")
+    ax.set_ylabel(OF[study.measure])
     ax.spines[["top", "right"]].set_visible(False)
     fig.suptitle("Error of every step" if title is None else title, fontsize=11)
     fig.tight_layout()
