@@ -10,6 +10,7 @@ import numpy as np
 from .attach import applicable, attach
 from .equivalence import indistinguishable
 from .evidence import ROUNDED, ranked
+from .joint_search import resonant
 from .proposals import proposals
 from .regression import Start, force_regression, motion_of
 from .screen import Screen, starts_for
@@ -250,6 +251,12 @@ def _try(job) -> Trial | None:
         # does.
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
+    if cls.role == "coupling" and screen.block.core.bodies == 1:
+        for near in resonant(screen, 3):
+            key = list(near.model._keys)[-1] + "."
+            names = (*free, *(k for k in near.model.parameters if k.startswith(key)))
+            fitted = screen.data.fit(near.model, names, starts=near.starts, iterations=14, tolerance=3e-3)
+            found.append(Trial(cls.id, fitted, extra=len(names) - len(free)))
     span = float(np.ptp(screen.motion.x))
     found = [t for t in found if _periodic_enough(t, span)]
     return min(found, key=lambda t: t.train.rmse, default=None)

@@ -1,0 +1,120 @@
+"""Machines whose own forces wander far beyond the noise of their sensor: fitted and judged by forces."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.diagnose import diagnose
+from ctrl_df.identify.noise import force_errors, noise_model, whitened_power, whitener
+from ctrl_df.identify.simulator import Simulator
+from ctrl_df.identify.windows import make_windows
+
+DT = 1e-3
+
+
+def machine(seed, difference=0.0, wander=0.06, n=10_000):
+    """A mass of 3 kg on 2 N of friction that wanders by a share of it within a tenth of a second.
+
+    Integrated here, by small steps; the encoder is good to 10 nm.
+    """
+    rng, sub = np.random.default_rng(seed), 10
+    t = DT * np.arange(n)
+    tones = rng.uniform(0.4, 4.0, 9)
+    u = sum(2.2 * np.sin(2 * math.pi * f * t + p) for f, p in zip(tones, rng.uniform(0, 6, 9), strict=True))
+    x = v = level = 0.0
+    y = np.empty(n)
+    for i in range(n):
+        y[i] = x
+        level += -level * DT / 0.1 + math.sqrt(2 * DT / 0.1) * rng.standard_normal()
+        dry = 2.0 * (1 + wander * level)
+        viscous = 6.0 + 0.5 * difference * np.sign(v)
+        for _ in range(sub):
+            h = DT / sub
+            free = v + h * (u[i] - viscous * v - 0.4 * x) / 3.0
+            v = math.copysign(max(abs(free) - h * dry / 3.0, 0.0), free)
+            x += h * v
+    return cdf.Measurement(t, u, y + 1e-8 * rng.standard_normal(n), name=f"machine {seed}")
+
+
+MODEL = cdf.Mass(2.5, [cdf.Coulomb(2.4), cdf.Viscous(5.0), cdf.LinearSpring(0.5)])
+FEW = ("asymmetric_viscous", "asymmetric_coulomb", "quadratic_drag", "bristle", "compliance")
+    "asymmetric_viscous",
+    "asymmetric_coulomb",
+    "quadratic_drag",
+    "bristle",
+    "stribeck",
+    "compliance",
+    "drift",
+)
+
+
+def test_what_is_missing_is_told_from_what_wanders():
+    found = diagnose(MODEL, machine(1, difference=2.0), holdout=machine(2, difference=2.0), candidates=FEW)
+    assert found.measure == "acceleration"
+    best = found.ranking[0]
+    assert best.id == "asymmetric_viscous"
+    assert abs(best.parameters["difference"] - 2.0) < 3 * best.errors["difference"]
+    assert best.nrmse_holdout < found.nrmse_holdout
+
+
+def test_what_wanders_is_no_effect():
+    found = diagnose(MODEL, machine(3), holdout=machine(4), candidates=FEW)
+    assert found.measure == "acceleration"
+    assert found.verdict in ("none", "unknown")
+
+
+def test_noise_is_told_from_the_jumps_between_windows():
+    rng = np.random.default_rng(1)
+    pieces = [100 * rng.standard_normal() + np.cumsum(rng.standard_normal(200)) for _ in range(40)]
+    model = noise_model(pieces, max_order=4)
+    assert model.sigma == pytest.approx(1.0, rel=0.05)
+    assert noise_model(np.concatenate(pieces), max_order=4).sigma > 5
+
+
+def test_forces_are_second_differences():
+    t = DT * np.arange(400)
+    pieces = [3.0 * t**2 / 2 + 5 * t + 1, -2.0 * t**2 / 2]
+    noise = force_errors(pieces, 10)
+    whole, windows = np.concatenate(pieces), [slice(0, 400), slice(400, 800)]
+    seen = noise.seen(whole, windows) / (10 * DT) ** 2
+    assert len(seen) == 2 * 38
+    assert seen[:38] == pytest.approx(3.0, rel=1e-9) and seen[38:] == pytest.approx(-2.0, rel=1e-9)
+    # the value sits in the middle of the samples that make it
+    rows = noise.rows(windows)
+    assert len(rows) == len(seen)
+    cubic = noise.seen(t**3, [slice(0, 400)]) / (10 * DT) ** 2
+    assert cubic == pytest.approx(6 * t[rows[:38]], abs=6 * DT)
+
+
+def test_wandering_forces_are_whitened():
+    rng = np.random.default_rng(2)
+    force = [np.convolve(rng.standard_normal(1200), 0.97 ** np.arange(200))[:1200] for _ in range(20)]
+    pieces = [np.cumsum(np.cumsum(f)) for f in force]
+    noise = whitener(pieces, 10)
+    white = [noise.seen(p, [slice(0, len(p))]) for p in pieces]
+    one = sum(float(w[1:] @ w[:-1]) for w in white) / whitened_power(pieces, noise)[0]
+    assert abs(one) < 0.05
+
+
+PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
+
+
+@pytest.mark.parametrize(
+    "effect", [cdf.Backlash(0.01, 0.3, 0.4), cdf.Compliance(900.0, 2.0, 0.4), cdf.Bristle(4000.0, 30.0)]
+)
+def test_hidden_states_go_on_from_window_to_window(effect):
+    block, t = PLAIN.with_effect(effect), DT * np.arange(3000)
+    u = np.repeat(np.random.default_rng(5).uniform(-6, 6, 30), 100)
+    y, v = cdf.event_response(block, t, u, 0, input_hold="zoh").outputs[:2]
+    data = cdf.Measurement(t, u, y)
+    windows = make_windows(data, 0.5)
+    exact = replace(windows, x=y[windows.begins], v=v[windows.begins])
+    simulator = Simulator(block, data, chained=True)
+    assert simulator.nuisances == ()
+    gone_on = simulator.run(exact) - y[windows.samples]
+    begun_anew = Simulator(block, data).run(exact) - y[windows.samples]
+    later = windows.samples >= windows.begins[1]
+    assert np.abs(gone_on[later]).max() < 0.02 * np.abs(begun_anew[later]).max()
