@@ -52,7 +52,7 @@ def test_free_forces_tell_what_a_model_misses_and_where():
     def most_telling(rig, block):
         data = prepare(rig.baseline, [of(rig)[0]]).level(4)
         found = data.fit(block, default_free(block))
-        return lacks(Trial("", found), data, whitener(found.residual_pieces))[0]
+        return lacks(Trial("", found), data, whitener(found.residual))[0]
 
     rig = rigs.draw("linear_spring", 4, excitation="chirp")
     assert most_telling(rig, rig.true_block).evidence < 0

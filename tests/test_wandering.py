@@ -41,14 +41,6 @@ def machine(seed, difference=0.0, wander=0.06, n=10_000):
 
 MODEL = cdf.Mass(2.5, [cdf.Coulomb(2.4), cdf.Viscous(5.0), cdf.LinearSpring(0.5)])
 FEW = ("asymmetric_viscous", "asymmetric_coulomb", "quadratic_drag", "bristle", "compliance")
-    "asymmetric_viscous",
-    "asymmetric_coulomb",
-    "quadratic_drag",
-    "bristle",
-    "stribeck",
-    "compliance",
-    "drift",
-)
 
 
 def test_what_is_missing_is_told_from_what_wanders():

@@ -38,6 +38,8 @@ class Candidate:
         Values that the cost is of.
     unit : float
         Of these values, where they are not in the unit of `rmse`.
+    forced : bool
+        Whether they are of forces.
     rmse, nrmse : float
         Error over all records; nrmse over the rms of the centred outputs. Where the cost is of forces (see
         `fit_windows`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
@@ -67,6 +69,7 @@ class Candidate:
     simulated: list
     count: int
     unit: float
+    forced: bool
     rmse: float
     nrmse: float
     nfev: int
@@ -80,13 +83,17 @@ class Candidate:
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
-        """The residual window by window, of all records."""
-        return _pieces(self.windows, self.residual)
+        """The residual as evidence takes it: of every record, or every window where errors are of forces."""
+        return self.by_window(self.residual) if self.forced else list(self.residual)
 
     @property
     def simulated_pieces(self) -> list[np.ndarray]:
-        """The simulated output window by window, of all records."""
-        return _pieces(self.windows, self.simulated)
+        """The simulated output, as `residual_pieces`."""
+        return self.by_window(self.simulated) if self.forced else list(self.simulated)
+
+    def by_window(self, signals) -> list[np.ndarray]:
+        """Return signals, one a record, window by window."""
+        return [x[where] for w, x in zip(self.windows, signals, strict=True) for where in w.slices]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -99,10 +106,6 @@ class Candidate:
         return dict(
             zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True)
         )
-
-
-def _pieces(windows, signals) -> list[np.ndarray]:
-    return [x[where] for w, x in zip(windows, signals, strict=True) for where in w.slices]
 
 
 def window_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
@@ -308,6 +311,7 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
         count=count,
         unit=problem.unit,
+        forced=problem.colour is not None,
         rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),

@@ -32,6 +32,7 @@ a ripple.
 
 _LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
 _NOISIER = 1.4  # error on held-out windows over that on fitted ones that may be chance
+_GROWN = 2.0  # error over the least that the shortest windows leave, up to which it may be noise
 
 
 def diagnose(
@@ -176,6 +177,9 @@ def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float,
     beyond the noise: that of the fitted windows, times what the records' own noise floors say of the two.
     """
     structure = missed[0].rms if missed and missed[0].evidence > SIGNIFICANT else 0.0
+    if best.key != ROUNDED and not study.data.forced:
+        # what the right model misses over long windows it misses over short ones
+        structure = max(structure, math.sqrt(max(best.train.rmse**2 - (_GROWN * study.floor) ** 2, 0.0)))
     noise = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - noise**2, structure**2, 1e-300))
     assert best.held is not None and base.held is not None

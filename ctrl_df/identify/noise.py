@@ -156,10 +156,10 @@ def force_errors(pieces: Pieces, step: int) -> NoiseModel:
 def whitener(pieces: Pieces, step: int = 1) -> NoiseModel:
     """Return the noise model that evidence is judged by.
 
-    `step` > 1: of forces that wander, averaged over so many samples.
+    Of the longest record; `step` > 1: of forces that wander, averaged over so many samples, in all windows.
     """
     if step == 1:
-        return noise_model(pieces, max_order=12)
+        return noise_model(max(pieces, key=len), max_order=12)
     plain = force_errors(pieces, step)
     left = noise_model([plain.seen(r, [slice(0, len(r))]) for r in pieces], max_order=4)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))

@@ -65,10 +65,14 @@ class Tangent:
 
     @property
     def pieces(self) -> list[slice]:
-        """Every window as a slice of what `project` returns."""
-        lengths = [w.stop - w.start for windows in self.windows for w in windows.slices]
-        if self.colour is not None:
-            lengths = [n // self.colour.step - self.colour.order for n in lengths]
+        """What `project` returns as evidence takes it: whole, or by windows where errors are of forces."""
+        if self.colour is None:
+            return [slice(0, sum(map(len, self.states)))]
+        lengths = [
+            (w.stop - w.start) // self.colour.step - self.colour.order
+            for windows in self.windows
+            for w in windows.slices
+        ]
         ends = np.cumsum([0, *lengths])
         return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
 

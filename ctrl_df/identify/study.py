@@ -53,10 +53,11 @@ class Study:
         self.nominal = {k: p.value for k, p in block.parameters.items()}
         self._look_at(data, 1)
         self.base = self._baseline(block)
+        self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
         # friction that wanders drowns all else over longer windows
         near = self.levels[0].moved(self.base.train)
         if near.rmse > FORCED * data.noise:
-            self._look_at(self.levels[0].wandering(near.residual_pieces), 0)
+            self._look_at(self.levels[0].wandering(near.by_window(near.residual)), 0)
             self.base = Trial("", self.data.fit(near.model, self.free))
 
     def _look_at(self, data: Data, which: int):
@@ -132,6 +133,7 @@ class Study:
         # Wandering forces let the first look tell little.
         found = _promising(found, *((10, 0.0) if self.data.forced else (CONFIRMED, 0.2)))
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
+        self.floor = floor
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
         if found and found[0].key == ROUNDED and not self.data.forced:
             # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.

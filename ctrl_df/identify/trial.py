@@ -105,13 +105,13 @@ class Trial:
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """Of all windows, each by itself."""
+        """Of all windows, as evidence takes them."""
         held = self.held.residual_pieces if self.held is not None else ()
         return [*self.train.residual_pieces, *held]
 
     @property
     def outputs(self) -> list[np.ndarray]:
-        """Simulated, of all windows, each by itself."""
+        """Simulated, of all windows, as evidence takes them."""
         held = self.held.simulated_pieces if self.held is not None else ()
         return [*self.train.simulated_pieces, *held]
 
