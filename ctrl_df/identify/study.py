@@ -87,7 +87,8 @@ class Study:
         base, found = self._look(classes, executor, self.data.sampled)
         if not self.data.forced and self._hides(base, found, longest):
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
-            base, found = self._look(classes, executor, longest)
+            first, (base, found) = found, self._look(classes, executor, longest)
+            found = _best_of(base, first, found, longest)
         if found:
             self._rebase(found)
         return found
@@ -202,6 +203,16 @@ class Study:
 def _periodic_enough(tried: Trial, span) -> bool:
     """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+
+
+def _best_of(base, first, found, longest: Data) -> list[Trial]:
+    """Return trials over the longest windows, each from there or from short ones, whichever fits better."""
+    best = {t.key: t for t in found}
+    for t in sorted(first, key=lambda t: t.train.rmse)[:CONFIRMED]:
+        moved = longest.moved(t.train, 4, 1e-2)
+        if t.key not in best or moved.rmse < best[t.key].train.rmse:
+            best[t.key] = replace(t, train=moved)
+    return ranked(Trial("", base), best.values())[0]
 
 
 def _promising(found, most, share) -> list[Trial]:
