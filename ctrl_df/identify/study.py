@@ -25,6 +25,8 @@ CONFIRMED = 6
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
 _CLOSE = 60.0
+# Width of a Stribeck bump over the typical speed below which it is stiction.
+_NARROW = 1e-3
 # Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain.
 _FLOOR = 1.03
 
@@ -196,7 +198,12 @@ class Study:
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 
     def alike(self, a: Trial, b: Trial) -> bool:
-        """Whether two candidates make the same of these data, within noise."""
+        """Whether two candidates make the same of these data, within noise or as the limit of each other."""
+        if {a.key, b.key} == {"stiction", "stribeck"}:
+            # a bump this narrow is passed within a sample: only breaking away is seen of it
+            narrow = next(t for t in (a, b) if t.key == "stribeck").block.effects[-1].velocity
+            if narrow < _NARROW * self.data.scales.speed:
+                return True
         return indistinguishable(a.outputs, b.outputs, self.noise)
 
 
