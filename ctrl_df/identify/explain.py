@@ -54,10 +54,11 @@ def explain(diagnosis, missed) -> str:
     where = " ".join(r.sentence for r in places)
     if d.verdict == "unknown":
         tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
+        acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
         return (
-            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}; {tried}"
-            f"{d.structure:.2g} of structure remain beside {d.noise:.2g} of noise (rms of the {d.measure}). "
-            f"It acts like {missed[0].sentence}. {where}".rstrip()
+            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}. {tried}"
+            f"Of structure {d.structure:.2g} remains beside {d.noise:.2g} of noise (rms of the {d.measure}). "
+            f"{acts}{where}".rstrip()
         )
     size = f"{d.nrmse:.2%} to {first.nrmse:.2%} (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
     same = ""

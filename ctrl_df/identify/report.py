@@ -49,7 +49,6 @@ summary { cursor: pointer; font-weight: 600; padding: .3rem 0; }
 <p class="soft">$records</p>
 <p><span class="verdict">$verdict</span></p>
 <p class="lead">$lead</p>
-$next
 <h2>The ladder</h2>
 <p>$how</p>
 $ladder
@@ -107,7 +106,6 @@ def render(study) -> str:
         records=html.escape(f"Fitted to {names}. Held out: {held}."),
         verdict=_VERDICTS[study.verdict],
         lead=html.escape(study.summary().split("\n")[0]),
-        next=_next(study),
         how=html.escape(
             "Each step adds the effect that explains most of what is left, and refits everything. It stays "
             "only if the error on data it was not fitted to falls too. Errors are rms "
@@ -148,13 +146,6 @@ def _known(study):
         return refit(study.model, list(study.train), names, budget=200)
     except (ValueError, ArithmeticError):
         return None
-
-
-def _next(study) -> str:
-    last = study.steps[-1].diagnosis
-    if last is None or study.verdict != "unknown":
-        return ""
-    return f"<p>{html.escape(last.explanation)}</p>"
 
 
 def _steps(study):

@@ -38,6 +38,8 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
     bottom = 0.5 * min(100 * study.noise, train.min(), held.min())
     lines[2] = [ax.axhspan(bottom, max(100 * study.noise, bottom * 1.001), color="0.85", zorder=0)]
     ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:.0e}"[0] in "25" else "")
     ax.set_ylim(bottom, 2.2 * max(train.max(), held.max()))
     for x, a, b in zip(at, train, held, strict=True):
         ax.text(x - 0.19, a * 1.05, f"{a:.3g}", ha="center", fontsize=8)
