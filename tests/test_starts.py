@@ -7,8 +7,12 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify import initial_states
+from ctrl_df.identify.joint_search import resonant
 from ctrl_df.identify.rounding import rounding_evidence
+from ctrl_df.identify.screen import Screen
 from ctrl_df.identify.simulator import Simulator, free_run
+from ctrl_df.identify.trial import prepare
+from ctrl_df.identify.variables import default_free
 from ctrl_df.identify.windows import make_windows
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
@@ -75,3 +79,16 @@ def test_rounding_is_told_from_noise_of_the_same_size():
         assert rounding_evidence(noisy, [x], step) < gauss + 20
     # an encoder finer than the noise is part of the noise
     assert rounding_evidence([0.01 * np.round(x / 0.01)], [x + 0.02], 0.01) == -math.inf
+
+
+def test_a_joint_is_found_by_its_resonance():
+    data = prepare(PLAIN, [record(BLOCKS["joint"], n=6000)]).level(4)
+    screen = Screen(data.fit(PLAIN, default_free(PLAIN)), data)
+    joint = resonant(screen, 1)[0].model.effects[-1]
+
+    def frequency(effect, mass):
+        return math.sqrt(effect.stiffness / mass / effect.load_fraction / (1 - effect.load_fraction))
+
+    # the grid steps by 1.35; measured 0.81
+    ratio = frequency(joint, screen.scales.mass) / frequency(BLOCKS["joint"].effects[-1], 2.0)
+    assert 1 / 1.35 < ratio < 1.35
