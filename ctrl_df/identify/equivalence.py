@@ -11,7 +11,7 @@ def indistinguishable(first, second, noise: NoiseModel, *, nats: float = 6.0) ->
     Parameters
     ----------
     first, second : sequence of arrays
-        Simulated outputs, one a window.
+        Simulated outputs, as evidence takes them (`Trial.outputs`).
     noise : NoiseModel
         Of the better one's residual.
     nats : float

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .noise import NoiseModel, whitener
+from .noise import NoiseModel, noise_model
 from .trial import Data, Trial
 
 # Amplitude of a test force over the rms of the force: linear still, and far above rounding.
@@ -63,13 +63,13 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
     windows = tangent.pieces
     if data.forced:
         # the residual is of forces here, as the fits see it
-        noise = whitener([residual[w] for w in windows])
+        noise = noise_model([residual[w] for w in windows], max_order=12)
     found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = whitener([left[w] for w in windows])
+        noise = noise_model([left[w] for w in windows], max_order=12)
         found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
     unit = tried.train.unit
     return sorted((replace(f[0], rms=f[0].rms / unit) for f in found), key=lambda f: -f.evidence)
