@@ -69,7 +69,7 @@ def test_noise_is_told_from_the_jumps_between_windows():
 def test_forces_are_second_differences():
     t = DT * np.arange(400)
     pieces = [3.0 * t**2 / 2 + 5 * t + 1, -2.0 * t**2 / 2]
-    noise = force_errors(pieces, 10)
+    noise = force_errors(10)
     whole, windows = np.concatenate(pieces), [slice(0, 400), slice(400, 800)]
     seen = noise.seen(whole, windows) / (10 * DT) ** 2
     assert len(seen) == 2 * 38
@@ -85,7 +85,7 @@ def test_wandering_forces_are_whitened():
     rng = np.random.default_rng(2)
     force = [np.convolve(rng.standard_normal(1200), 0.97 ** np.arange(200))[:1200] for _ in range(20)]
     pieces = [np.cumsum(np.cumsum(f)) for f in force]
-    noise = whitener(pieces, 10)
+    noise = whitener(pieces, force_errors(10))
     white = [noise.seen(p, [slice(0, len(p))]) for p in pieces]
     one = sum(float(w[1:] @ w[:-1]) for w in white) / whitened_power(pieces, noise)[0]
     assert abs(one) < 0.05

@@ -125,6 +125,16 @@ def level(effects: Sequence[Effect], moving: float, direction: float, speed: flo
     return value
 
 
+def is_kinetic(effect: Effect) -> bool:
+    """Whether an effect is of the dry friction on the moving motor; static levels add to it."""
+    return effect.role == "friction" and effect.side == "motor" and effect.rank == 0
+
+
+def kinetic_level(effects: Sequence[Effect]) -> float:
+    """Dry friction level [N] on the moving motor."""
+    return level([e for e in effects if is_kinetic(e)], 1.0, 1.0, 0.0)
+
+
 def _only(effects, cls) -> Any:
     found = [e for e in effects if isinstance(e, cls)]
     if len(found) > 1:

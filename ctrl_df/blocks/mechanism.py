@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from . import compliant
-from .core import Core, build_core, level
+from .core import Core, build_core, kinetic_level
 from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Stribeck, Viscous
 from .parameter import Parameter, checked
@@ -304,8 +304,7 @@ def _effect_keys(effects) -> tuple[str, ...]:
 
 
 def _check_levels(effects) -> None:
-    base = [e for e in effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
-    kinetic = level(base, 1.0, 1.0, 0.0)
+    kinetic = kinetic_level(effects)
     for effect in effects:
         if isinstance(effect, Stiction | Stribeck) and effect.level < kinetic:
             raise ValueError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from ..blocks.core import level
+from ..blocks.core import is_kinetic, kinetic_level
 from .simulator import feasible
 
 # Effects of which a block may hold several; a second of any other is the first one again.
@@ -21,7 +21,7 @@ def applicable(cls, block) -> bool:
         return two  # on a rigid block it is Coulomb friction
     if cls.id == "bristle":
         # they slip under a kinetic level: without one they are a spring
-        return any(e.role == "friction" and e.side == "motor" and e.rank == 0 for e in block.effects)
+        return any(map(is_kinetic, block.effects))
     if cls.id == "backlash":
         return "compliance" not in ids or cls.id not in ids
     return not (cls.role == "coupling" and two and "compliance" in ids)
@@ -35,8 +35,7 @@ def attach(block, effect):
         if not hasattr(effect, "level"):
             return None
         try:
-            base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
-            lifted = dataclasses.replace(effect, level=max(effect.level, level(base, 1.0, 1.0, 0.0)))
+            lifted = dataclasses.replace(effect, level=max(effect.level, kinetic_level(block.effects)))
             grown = block.with_effect(lifted)
         except (ValueError, TypeError):
             return None

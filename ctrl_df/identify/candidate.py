@@ -38,8 +38,8 @@ class Candidate:
         Values that the cost is of.
     unit : float
         Of these values, where they are not in the unit of `rmse`.
-    forced : bool
-        Whether they are of forces.
+    colour : NoiseModel or None
+        What the cost sees of the output where it is of forces (see `fit_windows`).
     rmse, nrmse : float
         Error over all records; nrmse over the rms of the centred outputs. Where the cost is of forces (see
         `fit_windows`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
@@ -69,7 +69,7 @@ class Candidate:
     simulated: list
     count: int
     unit: float
-    forced: bool
+    colour: NoiseModel | None
     rmse: float
     nrmse: float
     nfev: int
@@ -84,12 +84,12 @@ class Candidate:
     @property
     def residual_pieces(self) -> list[np.ndarray]:
         """The residual as evidence takes it: of every record, or every window where errors are of forces."""
-        return self.by_window(self.residual) if self.forced else list(self.residual)
+        return self.by_window(self.residual) if self.colour is not None else list(self.residual)
 
     @property
     def simulated_pieces(self) -> list[np.ndarray]:
         """The simulated output, as `residual_pieces`."""
-        return self.by_window(self.simulated) if self.forced else list(self.simulated)
+        return self.by_window(self.simulated) if self.colour is not None else list(self.simulated)
 
     def by_window(self, signals) -> list[np.ndarray]:
         """Return signals, one a record, window by window."""
@@ -238,8 +238,8 @@ def fit_windows(
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
     colour : NoiseModel or None
-        Of the residual where the machine's own forces make it: its whitened squares are made least, and every
-        window begins as the record says, hidden states as the window before ends.
+        The `force_errors` whose squares are made least, where the machine's own forces make the error; every
+        window then begins as the record says, hidden states as the window before ends.
 
     Returns
     -------
@@ -311,7 +311,7 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
         count=count,
         unit=problem.unit,
-        forced=problem.colour is not None,
+        colour=problem.colour,
         rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),

@@ -19,14 +19,14 @@ REFUTED = 20.0
 """Evidence [nats] of held-out data against a candidate that puts it last."""
 
 
-def ranked(base: Trial, trials, step: int = 1) -> tuple[list[Trial], NoiseModel]:
+def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
     """Return the trials with their evidence over the baseline, best first, and the noise that judged it.
 
     What held-out data speak against comes after all that they do not. The noise model is of the residuals of
-    the best one, a sensor that rounds left aside; of the means of every `step` samples.
+    the best one, a sensor that rounds left aside.
     """
     best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
-    noise = whitener(best.residuals, step)
+    noise = whitener(best.residuals, base.train.colour)
     before = _powers(base, noise)
     judged = []
     for t in trials:

@@ -18,7 +18,7 @@ def find_regions(tried, view):
     record, inside, residual = view.records[i], view.windows[i].samples, np.asarray(tried.train.residual[i])
     if not np.all(np.isfinite(residual)):
         return None
-    colour = tried.train.tangent.colour if tried.train.tangent is not None else None
+    colour = tried.train.colour
     if colour is not None:
         windows = view.windows[i].slices
         inside, residual = inside[colour.rows(windows)], colour.seen(residual, windows) / tried.train.unit

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..blocks.core import level
+from ..blocks.core import kinetic_level
 from .attach import attach
 from .frequency_fit import QUICK, Points, Scales, relative_error, simulate_table
 
@@ -62,11 +62,10 @@ def plane_of(block, points: Points) -> Plane:
     moved = points.N != 0
     swing = (points.A * np.abs(points.N))[moved]
     spans = (points.A[moved], swing, swing * points.omega[moved], points.omega[moved])
-    base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
     still = points.A[~moved]
     force, swings, speed, omega = (Span(float(s.min()), float(s.max())) for s in spans)
     mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
-    friction, stuck = level(base, 1.0, 1.0, 0.0), float(still.max(initial=0.0))
+    friction, stuck = kinetic_level(block.effects), float(still.max(initial=0.0))
     return Plane(force, swings, speed, omega, friction, mass, stuck)
 
 

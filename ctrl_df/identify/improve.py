@@ -105,7 +105,7 @@ def _revised(block, added, fits, known, rivals):
             if other is not None:
                 tried.append(fitted(other, 8))
         tried = [replace(t, extra=t.extra - less.extra) for t in tried]
-        judged, _ = ranked(less, tried, data.block)
+        judged, _ = ranked(less, tried)
         kept = next(t for t in judged if t.block is tried[0].block)
         if judged[0].evidence < SIGNIFICANT:
             block = less.block

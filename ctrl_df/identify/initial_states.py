@@ -30,13 +30,11 @@ def names(core) -> tuple[str, ...]:
     return tuple(found)
 
 
-def reach(which, core, known, windows) -> np.ndarray:
-    """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
+def reach(core, known, windows) -> np.ndarray:
+    """Return how far each of the initial states may be from its estimate, (nw, number of states).
 
     `known`: `windows.facts` of the record.
     """
-    if not which:
-        return np.zeros((len(windows), 0))
     one = np.ones(len(windows))
     table = {
         "x": 5 * windows.x_error + 0.02 * known.spread,
@@ -50,7 +48,7 @@ def reach(which, core, known, windows) -> np.ndarray:
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         table["stretch"] = 0.3 * bend * one
         table["stretch_rate"] = 0.3 * bend * math.sqrt(core.stiffness / mass) * one
-    return np.column_stack([table[name] for name in which])
+    return np.column_stack([table[name] for name in names(core)])
 
 
 def fill(states, core, given: Mapping[str, float], usual, speed: float) -> None:

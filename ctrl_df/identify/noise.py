@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -100,13 +100,13 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseMode
     n = sum(map(len, pieces))
     mean = sum(float(r.sum()) for r in pieces) / n
     forward = backward = [r - mean for r in pieces]
-    power, a = _power(forward) / n, np.zeros(0)
-    if power <= 0:
+    left, a = power(forward) / n, np.zeros(0)
+    if left <= 0:
         return NoiseModel(a, 0.0)
-    best = (n * math.log(power), a, power)
+    best = (n * math.log(left), a, left)
     for order in range(1, min(max_order, min(map(len, pieces)) // 4) + 1):
         forward, backward = [f[1:] for f in forward], [b[:-1] for b in backward]
-        norm = _power(forward) + _power(backward)
+        norm = power(forward) + power(backward)
         if norm <= 0:
             break
         k = 2 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / norm
@@ -115,12 +115,12 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseMode
             [b - k * f for f, b in zip(forward, backward, strict=True)],
         )
         a = np.append(a - k * a[::-1], k)
-        power *= 1 - k * k
-        if power <= 0:
+        left *= 1 - k * k
+        if left <= 0:
             break
-        score = n * math.log(power) + order * math.log(n)
+        score = n * math.log(left) + order * math.log(n)
         if score < best[0]:
-            best = (score, a, power)
+            best = (score, a, left)
     return NoiseModel(best[1], math.sqrt(best[2]))
 
 
@@ -136,41 +136,34 @@ def averaged(x, windows, step: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(means), begins
 
 
-def force_errors(pieces: Pieces, step: int) -> NoiseModel:
+def force_errors(step: int) -> NoiseModel:
     """Return the filter that makes accelerations of residuals in position: their second differences.
 
     Where wandering forces, integrated twice, make the residuals, their slow parts are the largest and tell
-    the least; the forces themselves are level over the frequencies at which machines move.
-
-    Parameters
-    ----------
-    pieces : sequence of (n,) arrays
-    step : int
-        Samples a value; what is faster than twice that does not count.
+    the least; the forces themselves are level over the frequencies at which machines move. `step`: samples a
+    value; what is faster than twice that does not count.
     """
-    plain = NoiseModel(np.array([2.0, -1.0]), 1.0, step)
-    power, n = whitened_power(pieces, plain)
-    return replace(plain, sigma=math.sqrt(power / n))
+    return NoiseModel(np.array([2.0, -1.0]), 1.0, step)
 
 
-def whitener(pieces: Pieces, step: int = 1) -> NoiseModel:
+def whitener(pieces: Pieces, plain: NoiseModel | None = None) -> NoiseModel:
     """Return the noise model that evidence is judged by.
 
-    Of the longest record; `step` > 1: of forces that wander, averaged over so many samples, in all windows.
+    Of the longest record; `plain`: the `force_errors` that fits see, then of these in all windows.
     """
-    if step == 1:
+    if plain is None:
         return noise_model(max(pieces, key=len), max_order=12)
-    plain = force_errors(pieces, step)
     left = noise_model([plain.seen(r, [slice(0, len(r))]) for r in pieces], max_order=4)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
-    return NoiseModel(-both[1:], left.sigma, step)
+    return NoiseModel(-both[1:], left.sigma, plain.step)
 
 
 def whitened_power(pieces: Pieces, noise: NoiseModel) -> tuple[float, int]:
     """Return the sum of squares of the whitened residuals, and their number."""
     white = [noise.seen(r, [slice(0, len(r))]) for r in pieces]
-    return _power(white), sum(map(len, white))
+    return power(white), sum(map(len, white))
 
 
-def _power(pieces) -> float:
+def power(pieces: Pieces) -> float:
+    """Return the sum of squares."""
     return sum(float(r @ r) for r in pieces)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..blocks import effects as library
-from ..blocks.core import level
+from ..blocks.core import kinetic_level
 from .attach import attach
 
 if TYPE_CHECKING:
@@ -65,13 +65,8 @@ def _generic(cls, screen: Screen):
             continue
 
 
-def _kinetic(block):
-    base = [e for e in block.effects if e.role == "friction" and e.side == "motor" and e.rank == 0]
-    return level(base, 1.0, 1.0, 0.0)
-
-
 def _stiction(screen):
-    kinetic, force = _kinetic(screen.block), screen.scales.force
+    kinetic, force = kinetic_level(screen.block.effects), screen.scales.force
     levels = (
         {kinetic * f for f in (1.03, 1.08, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0)}
         if kinetic > 0.01 * force
@@ -83,14 +78,14 @@ def _stiction(screen):
 
 
 def _stribeck(screen):
-    kinetic, s = _kinetic(screen.block), screen.scales
+    kinetic, s = kinetic_level(screen.block.effects), screen.scales
     low = max(kinetic, 0.02 * s.force)
     grid = itertools.product((1.1, 1.35, 1.8, 2.4), (0.05, 0.12, 0.3, 0.8))
     return [library.Stribeck(low * a, s.speed * b) for a, b in grid]
 
 
 def _bristle(screen):
-    kinetic, s = _kinetic(screen.block), screen.scales
+    kinetic, s = kinetic_level(screen.block.effects), screen.scales
     found = []
     for bend in (0.001, 0.003, 0.01, 0.03, 0.1, 0.3):
         k = max(kinetic, 0.05 * s.force) / (bend * s.position)

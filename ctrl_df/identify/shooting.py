@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .noise import power
 from .simulator import Simulator, feasible
 from .start_search import rescue, scan_slack
 from .variables import variables_of
@@ -23,10 +24,6 @@ Signals = list[np.ndarray]
 
 # Laws whose events make single windows go lost, and the cost a row of valleys.
 ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck"})
-
-
-def _power(signals: Signals) -> float:
-    return sum(float(e @ e) for e in signals)
 
 
 class Tangent:
@@ -159,7 +156,7 @@ class Problem:
     def cost(self, residual, nuisance, weights) -> float:
         """Return half the weighted sum of squares, initial states weighed by what is known of them."""
         if self.colour is not None:
-            return 0.5 * _power([self.weighed(k, r) for k, r in enumerate(residual)])
+            return 0.5 * power([self.weighed(k, r) for k, r in enumerate(residual)])
         total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
         known = sum(
             float(np.sum((a - m) ** 2 / p**2))
@@ -175,7 +172,7 @@ class Problem:
     def power(self, signals: Signals) -> tuple[float, int]:
         """Return the sum of squares of what the cost sees of signals, and of how many values."""
         seen = [self.weighed(k, x) for k, x in enumerate(signals)]
-        return _power(seen) / self.unit**2, sum(map(len, seen))
+        return power(seen) / self.unit**2, sum(map(len, seen))
 
     @property
     def unit(self) -> float:
@@ -225,7 +222,7 @@ class Problem:
         trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
         rescue(self, trial)
         trial = self._descend(trial, iterations, tolerance, robust)
-        if _power(self.last) < _power(kept[2]):
+        if power(self.last) < power(kept[2]):
             return trial
         theta, self.nuisance, self.last, self.slopes, self.converged = kept
         return theta

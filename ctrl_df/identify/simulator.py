@@ -14,6 +14,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..blocks.core import is_kinetic
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ..simulate.engine import Engine, State, sampled_drive
@@ -131,9 +132,9 @@ class Simulator:
 
     def priors(self, windows: Windows) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
-        return initial_states.reach(
-            self.nuisances, self.block.core if self.mechanism else None, self.facts, windows
-        )
+        if not self.nuisances:
+            return np.zeros((len(windows), 0))
+        return initial_states.reach(self.block.core, self.facts, windows)
 
     def with_values(self, values: Mapping[str, float] | None):
         """Return the model with these values; a static level below the kinetic one is raised to it."""
@@ -187,7 +188,8 @@ class Simulator:
             out[where] = run.outputs[: where.stop - where.start, 0]
             if not run.status.ok:
                 out[where.start + run.recorded : where.stop] = np.nan
-            hidden = self._hidden(part, windows, w + 1, run) if follows and run.status.ok else {}
+            came = self._arrival(part, windows, w + 1, run) if follows and run.status.ok else {}
+            hidden = {k: v for k, v in came.items() if k not in initial_states.SEEN}
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
                 out += primitive.offset + primitive.rate * (record.t[inside] - later)
@@ -206,11 +208,10 @@ class Simulator:
         pause = windows.begins[1:] - windows.ends[:-1]
         return set(np.flatnonzero(pause <= 2 * (windows.ends - windows.begins)[:-1]).tolist())
 
-    def _hidden(self, part, windows, w, run) -> dict[str, float]:
-        """Return the hidden states, as corrections by name, in which a run came to the begin of a window."""
+    def _arrival(self, part, windows, w, run) -> dict[str, float]:
+        """Return the states, as corrections by name, in which a run came to the begin of a window."""
         usual = self._usual(part, windows, w)
-        given = initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
-        return {k: v for k, v in given.items() if k not in initial_states.SEEN}
+        return initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
 
     def at_rest(self, windows: Windows, values) -> np.ndarray:
         """Return the initial states (nw, number of nuisances) with which every window begins at rest."""
@@ -235,10 +236,8 @@ class Simulator:
                 continue
             run = self._window(part, drive, windows, w, start, record.t[[windows.begins[w], windows.ends[w]]])
             if run.status.ok and part.core is not None:
-                usual = self._usual(part, windows, w + 1)
-                states = run.states[-1][part.offset :]
-                given = initial_states.corrections(states, part.core, usual, self.facts.speed)
-                found[w + 1] = [given[name] for name in self.nuisances]
+                came = self._arrival(part, windows, w + 1, run)
+                found[w + 1] = [came[name] for name in self.nuisances]
         return found
 
     def _drive(self, part):
@@ -396,7 +395,7 @@ def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
         kinetic = sum(
             values.get(f"{k}.level", current[f"{k}.level"].value)
             for k, e in zip(block._keys, block.effects, strict=True)
-            if e.role == "friction" and e.side == "motor" and e.rank == 0 and f"{k}.level" in current
+            if is_kinetic(e) and f"{k}.level" in current
         )
         for name in statics:
             if values.get(name, current[name].value) < kinetic:

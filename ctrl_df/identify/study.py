@@ -21,6 +21,9 @@ from .valleys import all_hopped, begun_at, hopped, own, settled
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
 
+CONFIRMED_FORCED = 10
+"""The same where the machine's own forces wander."""
+
 # Best error over windows four times as long that still counts as the same.
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
@@ -59,7 +62,7 @@ class Study:
         # friction that wanders drowns all else over longer windows
         near = self.levels[0].moved(self.base.train)
         if near.rmse > FORCED * data.noise:
-            self._look_at(self.levels[0].wandering(near.by_window(near.residual)), 0)
+            self._look_at(self.levels[0].wandering, 0)
             self.base = Trial("", self.data.fit(near.model, self.free))
 
     def _look_at(self, data: Data, which: int):
@@ -87,24 +90,27 @@ class Study:
         """Return every effect that can be added, fitted, the one with most evidence first."""
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
-        if not self.data.forced and self._hides(base, found, longest):
+        if not self.data.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
-            first, (base, found) = found, self._look(classes, executor, longest)
-            found = _best_of(base, first, found, longest)
+            moved = self._over_long_windows(base, found, longest)
+            if moved is not None:
+                base, again = self._look(classes, executor, longest)
+                found = _best_of(base, [*moved, *again])
         if found:
             self._rebase(found)
         return found
 
-    def _hides(self, base, found, longest: Data) -> bool:
-        """Whether long windows show an error that short ones do not, and that no candidate takes away."""
-        there = longest.moved(base).rmse
-        if there <= _GROWTH * base.rmse:
-            return False
-        plain = not found or found[0].train.rmse > 0.97 * base.rmse
-        return plain or (
-            found[0].train.rmse > 0.8 * base.rmse
-            and min(longest.moved(t.train, 3).rmse for t in found[:3]) > 0.5 * there
-        )
+    def _over_long_windows(self, base, found, longest: Data) -> list[Trial] | None:
+        """Return the best by error moved to the longest windows; None where they explain enough there."""
+        if found and found[0].train.rmse <= 0.8 * base.rmse:
+            return None
+        best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
+        moved = [replace(t, train=longest.moved(t.train, 4, 1e-2)) for t in best]
+        if found and found[0].train.rmse <= 0.97 * base.rmse:
+            there = longest.moved(base).rmse
+            if min(t.train.rmse for t in moved) <= 0.5 * there:
+                return None
+        return moved
 
     def _look(self, classes, executor, data: Data):
         """Fit every effect over one set of windows; return the baseline there and the effects, best first."""
@@ -115,7 +121,7 @@ class Study:
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
         jobs = [(cls, screen, self.levels[0].sampled, self.free, nominal) for cls in kinds]
         found = [t for t in run(_try, jobs) if t is not None]
-        return base, ranked(Trial("", base), found, self.data.block)[0]
+        return base, ranked(Trial("", base), found)[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -134,7 +140,7 @@ class Study:
         The windows are of the length that suits these data (`_longest_coherent`).
         """
         # Wandering forces let the first look tell little.
-        found = _promising(found, *((10, 0.0) if self.data.forced else (CONFIRMED, 0.2)))
+        found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.forced else _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         self.floor = floor
         at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
@@ -148,7 +154,7 @@ class Study:
             for t, f in zip((self.base, *found), stages[at], strict=True)
         ]
         self.base = best[0]
-        chosen, self.noise = ranked(self.base, best[1:], self.data.block)
+        chosen, self.noise = ranked(self.base, best[1:])
         if not chosen:
             return []
         chosen = self._again(chosen, chosen[:1])
@@ -159,7 +165,7 @@ class Study:
         ended = [self._ended(t, t in near and len(near) > 1, floor, least) for t in close]
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
-        chosen, self.noise = ranked(self.base, chosen, self.data.block)
+        chosen, self.noise = ranked(self.base, chosen)
         return chosen
 
     def _stages(self, fits):
@@ -194,7 +200,7 @@ class Study:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
         fine = self.data.fine
         begun = [begun_at(t, best, fine) for best in those for t in chosen if t is not best]
-        judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)], self.data.block)
+        judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 
     def alike(self, a: Trial, b: Trial) -> bool:
@@ -212,17 +218,16 @@ def _periodic_enough(tried: Trial, span) -> bool:
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
 
 
-def _best_of(base, first, found, longest: Data) -> list[Trial]:
-    """Return trials over the longest windows, each from there or from short ones, whichever fits better."""
-    best = {t.key: t for t in found}
-    for t in sorted(first, key=lambda t: t.train.rmse)[:CONFIRMED]:
-        moved = longest.moved(t.train, 4, 1e-2)
-        if t.key not in best or moved.rmse < best[t.key].train.rmse:
-            best[t.key] = replace(t, train=moved)
+def _best_of(base, trials) -> list[Trial]:
+    """Return every effect's best fit, best first."""
+    best: dict[str, Trial] = {}
+    for t in trials:
+        if t.key not in best or t.train.rmse < best[t.key].train.rmse:
+            best[t.key] = t
     return ranked(Trial("", base), best.values())[0]
 
 
-def _promising(found, most, share) -> list[Trial]:
+def _promising(found, most=CONFIRMED, share=0.2) -> list[Trial]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
 
     `most`: of them by evidence, `share` of the best one's that is near.
@@ -273,10 +278,11 @@ def _try(job) -> Trial | None:
             found += _fitted(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
     if cls.role == "coupling" and screen.block.core.bodies == 1:
         for near in resonant(screen, 3):
-            key = list(near.model._keys)[-1] + "."
-            names = (*free, *(k for k in near.model.parameters if k.startswith(key)))
-            fitted = screen.data.fit(near.model, names, starts=near.starts, iterations=14, tolerance=3e-3)
-            found.append(Trial(cls.id, fitted, extra=len(names) - len(free)))
+            added = _own_names(near.model)
+            fitted = screen.data.fit(
+                near.model, (*free, *added), starts=near.starts, iterations=14, tolerance=3e-3
+            )
+            found.append(Trial(cls.id, fitted, extra=len(added)))
     span = float(np.ptp(screen.motion.x))
     found = [t for t in found if _periodic_enough(t, span)]
     return min(found, key=lambda t: t.train.rmse, default=None)
@@ -292,14 +298,8 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
     block = attach(base, start.effect)
     if block is None:
         return
-    key, data = list(block._keys)[-1], screen.data
-    own = [
-        f"{key}.{n}"
-        for n, p in start.effect.parameters.items()
-        if p.free and f"{key}.{n}" in block.parameters
-    ]
-    rough = ROUNDED in key
-    names = (*free, *(() if rough else own))
+    data, added = screen.data, _own_names(block)
+    names = (*free, *(() if start.effect.id == ROUNDED else added))
     if start.effect.id in _CURVED:
         # a joint changes everything at once: its valley is long and bent
         steps, tolerance = (14, 3e-3) if start.effect.role in ("contact", "coupling") else (6, 1e-2)
@@ -307,4 +307,10 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
     else:
         begin = None if start.values else screen.starts(block)
         fitted = data.fit(block, names, starts=begin, iterations=6, tolerance=1e-2)
-    yield Trial(start.effect.id, fitted, extra=len(own))
+    yield Trial(start.effect.id, fitted, extra=len(added))
+
+
+def _own_names(block) -> tuple[str, ...]:
+    """Return the parameters of a block's newest effect that a fit may move."""
+    key = block._keys[-1] + "."
+    return tuple(k for k, p in block.parameters.items() if k.startswith(key) and p.free)

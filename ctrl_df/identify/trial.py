@@ -154,20 +154,15 @@ class Data:
         """Whether forces that no model has (friction that wanders) outweigh the noise."""
         return self.colour is not None
 
-    def wandering(self, residual) -> Data:
-        """Return the same for a machine whose own forces wander; `residual`: what they leave, in pieces.
+    @property
+    def wandering(self) -> Data:
+        """The same for a machine whose own forces wander.
 
         The slow error that such forces leave would drown all else: what counts are the forces, averaged.
         """
-        if self.colour is not None:
-            return self
-        thin, length = max(self.thin // 2, 1), float(np.median([len(r) for r in residual]))
-        return replace(self, colour=force_errors(residual, max(thin, round(length / BLOCKS), 2)), thin=thin)
-
-    @property
-    def block(self) -> int:
-        """Samples a value that counts."""
-        return self.colour.step if self.colour is not None else 1
+        length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.windows])))
+        thin = max(self.thin // 2, 1)
+        return replace(self, colour=force_errors(max(thin, round(length / BLOCKS), 2)), thin=thin)
 
     @property
     def sampled(self) -> Data:
