@@ -74,6 +74,33 @@ def test_a_single_effect_is_named_first(effect):
     assert effect.replace("_", " ") in found.explanation
 
 
+def test_a_bump_passed_within_a_sample_is_stiction():
+    rig = rigs.draw("stiction", 1005, excitation="multisine", snr_db=40, noise="coloured")
+    train, held = of(rig)
+    found = diagnose(rig.baseline, train, holdout=held, candidates=("stiction", "stribeck"))
+    assert found.verdict == "effect"
+    assert {found.best.id, *found.best.equivalents} == {"stiction", "stribeck"}
+    assert found.best.parameters["level"] == pytest.approx(rig.truth["stiction.level"], rel=0.03)
+
+
+def test_what_only_long_windows_show_is_unknown():
+    # a notch in the force at one place: short windows begin anew beyond it
+    rig = rigs.draw_outside(1005, kind="detent", excitation="multisine", snr_db=40, noise="coloured")
+    train, held = of(rig)
+    few = ("linear_spring", "position_ripple", "stribeck")
+    found = diagnose(rig.baseline, train, holdout=held, candidates=few)
+    assert found.verdict == "unknown"
+    assert found.structure > found.noise
+    assert "position" in found.regions
+
+
+def test_a_joint_with_nothing_behind_it_is_no_joint():
+    rig = rigs.draw_outside(1008, kind="friction_zone", excitation="multisine", snr_db=60)
+    train, held = of(rig)
+    found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance", "position_ripple"))
+    assert found.verdict == "unknown" and found.regions == ("position",)
+
+
 def test_equal_maps_are_one_class():
     rig = rigs.draw("constant_force", 12, snr_db=60)
     train, held = of(rig)

@@ -37,6 +37,21 @@ def test_both_effects_are_found(study):
     )
 
 
+def test_an_effect_that_stood_in_for_two_gives_way():
+    rig = rigs.draw(("coulomb", "quadratic_drag"), 1002, excitation="multisine", snr_db=60)
+    free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
+    found = improve(
+        rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free=free,
+        candidates=("coulomb", "stribeck", "quadratic_drag"), max_effects=3,
+    )  # fmt: skip
+    first, last = found.steps[1], found.steps[-1]
+    # one Stribeck curve looks most like Coulomb friction and drag together, until drag is there
+    assert first.effect == "stribeck"
+    assert last.dropped == ("stribeck",) and last.instead == ("coulomb",)
+    assert set(found.effects) == {"coulomb", "quadratic_drag"}
+    assert "coulomb" in found.summary()
+
+
 def test_the_report_stands_alone(study, tmp_path):
     path = tmp_path / "report.html"
     study[1].report(path)

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
@@ -111,6 +112,8 @@ class Effect:
 def register_effect(cls: _EffectClass) -> _EffectClass:
     """Class decorator: add an effect to the library, so that diagnosis screens it and blocks accept it.
 
+    The same class again (a cell run twice, a script that is imported as well) takes the place of the first.
+
     Raises
     ------
     ValueError
@@ -119,12 +122,18 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
     if cls.role not in ROLES:
         raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
     known = _LIBRARY.get(cls.id)
-    if known is not None and (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
+    if known is not None and _origin(known) != _origin(cls):
         raise ValueError(
             f"effect id {cls.id!r} is taken by {known.__module__}.{known.__qualname__}; rename the class."
         )
     _LIBRARY[cls.id] = cls
     return cls
+
+
+def _origin(cls) -> tuple[str, str]:
+    """Return where a class is written: its file (a script has two module names), or its module."""
+    module = sys.modules.get(cls.__module__)
+    return getattr(module, "__file__", None) or cls.__module__, cls.__qualname__
 
 
 def effect_library() -> dict[str, type[Effect]]:

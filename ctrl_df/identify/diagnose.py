@@ -156,10 +156,18 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         verdict = NONE
     else:
         verdict = EFFECT if all(c.id in first.equivalents for c in rivals(ranking)) else AMBIGUOUS
-    where = find_regions(best if verdict == UNKNOWN else base, study.data.train)
+    shown = base
+    if verdict == UNKNOWN:
+        # An effect that stands in for the one missing bends what it leaves: look where least remains.
+        before = lacks(base, study.data, study.noise)
+        if not before or (missed and missed[0].left < before[0].left):
+            shown = best
+        else:
+            missed = before
+    where = find_regions(shown, study.data.train)
     kinds = tuple(where.kinds) if where is not None else ()
     if verdict == UNKNOWN:
-        kinds = tuple(m.kind for m in missed if m.evidence > 0.8 * missed[0].evidence)
+        kinds = tuple(m.kind for m in missed if m.evidence > 0.98 * missed[0].evidence - SIGNIFICANT)
     held = () if study.data.held.records is study.data.train.records else study.data.held.records
     result = Diagnosis(
         verdict, tuple(ranking), base.block, base.block, *base_errors, noise, structure, "", kinds, where,

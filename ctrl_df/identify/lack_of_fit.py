@@ -19,6 +19,12 @@ from .trial import Data, Trial
 # Amplitude of a test force over the rms of the force: linear still, and far above rounding.
 _SMALL = 3e-3
 
+FINER = 3
+"""How many times finer the second grid of every kind is."""
+
+# Travel after a reversal [typical positions] over which a force may build up.
+_REACHES = (0.03, 0.1, 0.3, 1.0)
+
 
 @dataclass(frozen=True)
 class Lack:
@@ -32,6 +38,8 @@ class Lack:
         Log likelihood ratio [nats] less the price of the free forces (Schwarz).
     rms : float
         Of the error these forces explain, and the model does not, in the unit of the fit's `rmse`.
+    left : float
+        Of the error that these forces do not explain either, in the same unit.
     span : (float, float)
         Where the force found is largest, in the unit of the kind.
     sentence : str
@@ -40,6 +48,7 @@ class Lack:
     kind: str
     evidence: float
     rms: float
+    left: float
     span: tuple[float, float]
     sentence: str
 
@@ -52,14 +61,16 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
     scene = _Scene(tried, data)
     residual = tangent.project(tried.train.residual)
     tables = []
-    for kind, shapes, spans in scene.kinds():
-        columns = [tangent.project(r) for r in map(scene.response, shapes)]
-        alive = [
-            i for i, c in enumerate(columns) if np.linalg.norm(c) > 1e-9 * scene.scale * math.sqrt(len(c))
-        ]
-        if alive:
-            matrix = np.array([columns[i] for i in alive]).T
-            tables.append((kind, matrix, [spans[i % len(spans)] for i in alive]))
+    for kind, families in scene.kinds():
+        answers = [[(tangent.project(scene.response(s)), span) for s, span in family] for family in families]
+        if len(answers) > 1:
+            answers.append([a for family in answers for a in family])
+        for family in answers:
+            alive = [
+                (c, span) for c, span in family if np.linalg.norm(c) > 1e-9 * scene.scale * math.sqrt(len(c))
+            ]
+            if alive:
+                tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
     windows = tangent.pieces
     if data.forced:
         # the residual is of forces here, as the fits see it
@@ -71,8 +82,10 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
         left = residual - explained
         noise = noise_model([left[w] for w in windows], max_order=12)
         found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
-    unit = tried.train.unit
-    return sorted((replace(f[0], rms=f[0].rms / unit) for f in found), key=lambda f: -f.evidence)
+    unit, best = tried.train.unit, {}
+    for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
+        best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
+    return list(best.values())
 
 
 def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.ndarray]:
@@ -86,8 +99,8 @@ def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.
     gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
-    rms = math.sqrt(float(explained @ explained) / len(explained))
-    return Lack(kind, gain, rms, span, _SENTENCES[kind].format(*span)), explained
+    rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
+    return Lack(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span)), explained
 
 
 _SENTENCES = {
@@ -130,24 +143,28 @@ class _Scene:
         return changes
 
     def kinds(self):
-        """Yield (kind, shapes, spans of the shapes)."""
+        """Yield (kind, families): each a list of (shape, span), coarse and fine along what the kind is of."""
         every = {k: np.concatenate([m[k] for m in self.motion]) for k in ("t", "x", "v", "u")}
-        middles, width = _grid(every["t"], 0.0, 8)
-        bumps = [_bump("t", m, width) for m in middles]
-        shapes = bumps + [_times(b, _direction) for b in bumps] + [_times(b, _acceleration) for b in bumps]
-        yield "time", shapes, _spans(middles, width)
-        middles, width = _grid(every["x"], 0.005, 12)
-        bumps = [_bump("x", m, width) for m in middles]
-        yield "position", bumps + [_times(b, _direction) for b in bumps], _spans(middles, width)
-        middles, width = _grid(every["v"], 0.01, 12)
-        yield "low_speed", [_bump("v", m, width) for m in middles], _spans(middles, width)
-        middles, width = _grid(every["u"], 0.01, 8)
-        bumps = [_bump("u", m, width) for m in middles]
-        yield "load", bumps + [_times(b, _direction) for b in bumps], _spans(middles, width)
-        lengths = [f * self.scale for f in (0.03, 0.1, 0.3, 1.0)]
-        yield "after_reversal", [_since(n) for n in lengths], [(0.0, n) for n in lengths]
+        for kind, name, tail, count, factors in (
+            ("time", "t", 0.0, 8, (_one, _direction, _acceleration)),
+            ("position", "x", 0.005, 12, (_one, _direction)),
+            ("low_speed", "v", 0.01, 12, (_one,)),
+            ("load", "u", 0.01, 8, (_one, _direction)),
+        ):
+            families = []
+            for n in (count, FINER * count):
+                middles, width = _grid(every[name], tail, n)
+                families += [
+                    [
+                        (_times(_bump(name, m, width), f), (float(m - width), float(m + width)))
+                        for m in middles
+                    ]
+                    for f in factors
+                ]
+            yield kind, families
+        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in _REACHES]]
         line = self._line()
-        yield "frequency", [_wave(line, np.cos), _wave(line, np.sin)], [(line, line)]
+        yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 
     def _line(self) -> float:
         """Return the frequency [Hz] at which the residual's acceleration stands out most."""
@@ -183,16 +200,16 @@ def _grid(values, tail, count):
     return middles, float(middles[1] - middles[0])
 
 
-def _spans(middles, width):
-    return [(float(m - width), float(m + width)) for m in middles]
-
-
 def _bump(name, middle, width):
     return lambda m: np.clip(1 - np.abs(m[name] - middle) / width, 0, None)
 
 
 def _times(first, second):
     return lambda m: first(m) * second(m)
+
+
+def _one(m):
+    return 1.0
 
 
 def _direction(m):

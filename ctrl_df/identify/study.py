@@ -165,7 +165,8 @@ class Study:
         ended = [self._ended(t, t in near and len(near) > 1, floor, least) for t in close]
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
-        chosen, self.noise = ranked(self.base, chosen)
+        span = max(float(np.ptp(r.y)) for r in self.data.train.records)
+        chosen, self.noise = ranked(self.base, [t for t in chosen if _itself(t, span)])
         return chosen
 
     def _stages(self, fits):
@@ -213,8 +214,15 @@ class Study:
         return indistinguishable(a.outputs, b.outputs, self.noise)
 
 
-def _periodic_enough(tried: Trial, span) -> bool:
-    """Refuse a ripple of which the stroke shows less than a period: that is a spring by another name."""
+def _itself(tried: Trial, span) -> bool:
+    """Whether the newest effect is what its name says, and no stand-in for another.
+
+    A ripple of which the stroke `span` [m] shows less than a period is a spring, a joint with nothing behind
+    it (or before it) is a dashpot.
+    """
+    bounds = dict(zip(tried.train.names, tried.train.at_bound, strict=True))
+    if bounds.get(f"{tried.block._keys[-1]}.load_fraction", False):
+        return False
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
 
 
@@ -284,7 +292,7 @@ def _try(job) -> Trial | None:
             )
             found.append(Trial(cls.id, fitted, extra=len(added)))
     span = float(np.ptp(screen.motion.x))
-    found = [t for t in found if _periodic_enough(t, span)]
+    found = [t for t in found if _itself(t, span)]
     return min(found, key=lambda t: t.train.rmse, default=None)
 
 
