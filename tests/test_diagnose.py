@@ -101,6 +101,14 @@ def test_a_joint_with_nothing_behind_it_is_no_joint():
     assert found.verdict == "unknown" and found.regions == ("position",)
 
 
+def test_hidden_states_of_many_windows_do_not_pass_for_a_hum():
+    rig = rigs.draw_outside(1013, kind="hum", excitation="steps", snr_db=40, noise="encoder")
+    train, held = of(rig)
+    found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance", "bristle"))
+    assert found.verdict == "unknown" and found.regions[0] == "frequency"
+    assert f"{rig.truth['outside.hum_omega'] / (2 * np.pi):.2g} Hz" in found.explanation
+
+
 def test_equal_maps_are_one_class():
     rig = rigs.draw("constant_force", 12, snr_db=60)
     train, held = of(rig)

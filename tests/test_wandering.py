@@ -8,6 +8,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
+from ctrl_df.identify.initial_states import MEASURED
 from ctrl_df.identify.noise import force_errors, noise_model, whitened_power, whitener
 from ctrl_df.identify.simulator import Simulator
 from ctrl_df.identify.windows import make_windows
@@ -104,7 +105,7 @@ def test_hidden_states_go_on_from_window_to_window(effect):
     data = cdf.Measurement(t, u, y)
     windows = make_windows(data, 0.5)
     exact = replace(windows, x=y[windows.begins], v=v[windows.begins])
-    simulator = Simulator(block, data, chained=True)
+    simulator = Simulator(block, data, begins=MEASURED)
     assert simulator.nuisances == ()
     gone_on = simulator.run(exact) - y[windows.samples]
     begun_anew = Simulator(block, data).run(exact) - y[windows.samples]

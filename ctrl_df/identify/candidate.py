@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .initial_states import FITTED
 from .measurement import Measurement
 from .noise import NoiseModel
 from .shooting import Problem, Tangent
@@ -217,6 +218,7 @@ def fit_windows(
     limits: Mapping[str, tuple[float, float]] | None = None,
     errors: bool = False,
     colour: NoiseModel | None = None,
+    begins: str = FITTED,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage.
 
@@ -238,14 +240,15 @@ def fit_windows(
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
     colour : NoiseModel or None
-        The `force_errors` whose squares are made least, where the machine's own forces make the error; every
-        window then begins as the record says, hidden states as the window before ends.
+        The `force_errors` whose squares are made least, where the machine's own forces make the error.
+    begins : str
+        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
 
     Returns
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, colour)
+    problem = Problem(model, records, names, 100_000, limits, colour, begins)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

@@ -17,6 +17,14 @@ from ..blocks.core import ELASTIC, IMPACT, level
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
 
+SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "bristle"})
+"""Names of those hidden that come to be what the motion makes them, wherever they began."""
+
+FITTED, CHAINED, MEASURED = "fitted", "chained", "measured"
+"""How windows begin: every state is fitted, window by window; all but those that settle are, which go on from
+one window into the next; none is: windows begin as the record says, and what is hidden goes on.
+"""
+
 
 def names(core) -> tuple[str, ...]:
     """Return the names of the initial states of a mechanism, in the order of the corrections."""
@@ -30,8 +38,21 @@ def names(core) -> tuple[str, ...]:
     return tuple(found)
 
 
-def reach(core, known, windows) -> np.ndarray:
-    """Return how far each of the initial states may be from its estimate, (nw, number of states).
+def fitted_names(core, begins: str) -> tuple[str, ...]:
+    """Return the names of those that are fitted where windows begin so."""
+    if begins == MEASURED:
+        return ()
+    return tuple(n for n in names(core) if begins == FITTED or n not in SETTLING)
+
+
+def carried_names(core, begins: str) -> tuple[str, ...]:
+    """Return the names of those that go on from one window into the next."""
+    fitted = fitted_names(core, begins)
+    return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
+
+
+def reach(which, core, known, windows) -> np.ndarray:
+    """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
 
     `known`: `windows.facts` of the record.
     """
@@ -48,7 +69,7 @@ def reach(core, known, windows) -> np.ndarray:
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         table["stretch"] = 0.3 * bend * one
         table["stretch_rate"] = 0.3 * bend * math.sqrt(core.stiffness / mass) * one
-    return np.column_stack([table[name] for name in names(core)])
+    return np.column_stack([table[name] for name in which])
 
 
 def fill(states, core, given: Mapping[str, float], usual, speed: float) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .initial_states import FITTED
 from .noise import power
 from .simulator import Simulator, feasible
 from .start_search import rescue, scan_slack
@@ -88,9 +89,9 @@ class Problem:
     initial states, `slopes` the derivatives of the last step.
     """
 
-    def __init__(self, model, records, names, budget, limits=None, colour=None):
+    def __init__(self, model, records, names, budget, limits=None, colour=None, begins=FITTED):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.colour = colour
+        self.colour, self.begins = colour, begins
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -118,12 +119,13 @@ class Problem:
 
     def stage(self, windows: list[Windows], thin, starts=None):
         """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
-        self.simulators = [
-            Simulator(self.model, r, thin=thin, chained=self.colour is not None) for r in self.records
-        ]
+        self.simulators = [Simulator(self.model, r, thin=thin, begins=self.begins) for r in self.records]
         self.windows = windows
         self.measured = [r.y[w.samples] for r, w in zip(self.records, windows, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, windows, strict=True)]
+        if starts is not None:
+            # those of a fit of more states: the first of them are the same
+            starts = [a[:, : p.shape[1]] for a, p in zip(starts, self.priors, strict=True)]
         self.fresh = starts is None or any(
             a.shape != p.shape for a, p in zip(starts, self.priors, strict=True)
         )

@@ -63,9 +63,8 @@ class Simulator:
         Relative tolerance of the engine.
     force : (n,) array or None
         Input in place of the recorded one.
-    chained : bool
-        Whether windows begin as the record says and hidden states (of a joint, of bristles) go on from one
-        into the next, without corrections of any.
+    begins : str
+        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
 
     Raises
     ------
@@ -81,9 +80,9 @@ class Simulator:
         thin: int = 1,
         rtol: float = 1e-6,
         force: np.ndarray | None = None,
-        chained: bool = False,
+        begins: str = initial_states.FITTED,
     ):
-        self.model, self.record, self.rtol, self.chained = model, record, rtol, chained
+        self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
         self.input = np.asarray(record.u if force is None else force)
         self.parts: Any = getattr(model, "parts", None)
         self.closed = self.parts is not None
@@ -128,13 +127,18 @@ class Simulator:
     @property
     def nuisances(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per window."""
-        return initial_states.names(self.block.core) if self.mechanism and not self.chained else ()
+        return initial_states.fitted_names(self.block.core, self.begins) if self.mechanism else ()
+
+    @property
+    def chained(self) -> bool:
+        """Whether some of the initial states go on from one window into the next."""
+        return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
 
     def priors(self, windows: Windows) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
         if not self.nuisances:
             return np.zeros((len(windows), 0))
-        return initial_states.reach(self.block.core, self.facts, windows)
+        return initial_states.reach(self.nuisances, self.block.core, self.facts, windows)
 
     def with_values(self, values: Mapping[str, float] | None):
         """Return the model with these values; a static level below the kinetic one is raised to it."""
@@ -178,8 +182,8 @@ class Simulator:
         inside = windows.samples
         out = np.empty(len(inside))
         drive, hidden = self._drive(part), {}
-        hides = part.core is not None and len(initial_states.names(part.core)) > len(initial_states.SEEN)
-        on = self._followed(windows) if self.chained and hides else ()
+        carried = initial_states.carried_names(part.core, self.begins) if part.core is not None else ()
+        on = self._followed(windows) if carried else ()
         for w, where in enumerate(windows.slices):
             t, follows = record.t[inside[where]], w in on
             if follows:
@@ -189,7 +193,7 @@ class Simulator:
             if not run.status.ok:
                 out[where.start + run.recorded : where.stop] = np.nan
             came = self._arrival(part, windows, w + 1, run) if follows and run.status.ok else {}
-            hidden = {k: v for k, v in came.items() if k not in initial_states.SEEN}
+            hidden = {k: came[k] for k in carried if k in came}
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
                 out += primitive.offset + primitive.rate * (record.t[inside] - later)

@@ -23,7 +23,7 @@ def rescue(problem, theta) -> bool:
     """
     found, values = False, problem.values(theta)
     for k, simulator in enumerate(problem.simulators):
-        if "v" not in simulator.nuisances:
+        if "v" not in simulator.nuisances or simulator.chained:
             continue
         column, windows, starts = simulator.nuisances.index("v"), problem.windows[k], problem.nuisance[k]
         rms = np.array([math.sqrt(float(np.mean(problem.last[k][w] ** 2))) for w in windows.slices])

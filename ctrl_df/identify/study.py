@@ -143,11 +143,17 @@ class Study:
         found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.forced else _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         self.floor = floor
-        at = _longest_coherent([[f.rmse for f in stage] for stage in stages])
+        levels, at = list(self.levels), _longest_coherent(stages)
+        if at == 0 and not self.data.forced:
+            # Longer windows show what no candidate explains: hidden states, fitted anew in many short ones,
+            # would pass for it.
+            levels[0] = levels[0].chained
+            stages[0] = [levels[0].moved(f) if levels[0].carries(f.model) else f for f in stages[0]]
+            at = _longest_coherent(stages)
         if found and found[0].key == ROUNDED and not self.data.forced:
             # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
             at = len(stages) - 1
-        self.data = self.levels[at]
+        self.data = levels[at]
         fine = self.data.fine
         best = [
             fine.judged(replace(t, train=fine.moved(f, 3, 1e-3), confirmed=True))
@@ -246,14 +252,15 @@ def _promising(found, most=CONFIRMED, share=0.2) -> list[Trial]:
     return likely + [t for t in close if not any(t is o for o in likely)]
 
 
-def _longest_coherent(errors) -> int:
+def _longest_coherent(stages) -> int:
     """Return the level to judge at: the longest windows over which the best model's error does not grow.
 
-    `errors`: rms errors per level, short windows first, the baseline's and then the candidates'. Where the
+    `stages`: fits per level, short windows first, the baseline's and then the candidates'. Where the
     best grows with the length (motion that is sensitive to its start, force noise in a real machine, an
     effect outside the library) short windows are clearer, provided that they show what is missing as well
     as long ones do.
     """
+    errors = [[f.rmse for f in stage] for stage in stages]
     base, best = [e[0] for e in errors], [min(e) for e in errors]
     at = 0
     while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:

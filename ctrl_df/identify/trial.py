@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .candidate import Candidate, fit_windows
+from .initial_states import CHAINED, FITTED, MEASURED
 from .measurement import Measurement
 from .noise import NoiseModel, force_errors
 from .ripple_phase import rephased
@@ -133,6 +134,7 @@ class Data:
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     colour: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
+    begins: str = FITTED  # how windows begin
 
     def level(self, factor: int) -> Data:
         """Return the same data in windows `factor` times as many as the longest."""
@@ -162,7 +164,14 @@ class Data:
         """
         length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.windows])))
         thin = max(self.thin // 2, 1)
-        return replace(self, colour=force_errors(max(thin, round(length / BLOCKS), 2)), thin=thin)
+        return replace(
+            self, colour=force_errors(max(thin, round(length / BLOCKS), 2)), thin=thin, begins=MEASURED
+        )
+
+    @property
+    def chained(self) -> Data:
+        """The same with hidden states that go on from window to window."""
+        return replace(self, begins=CHAINED)
 
     @property
     def sampled(self) -> Data:
@@ -177,7 +186,11 @@ class Data:
 
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
-        return Simulator(block, record, thin=self.thin, chained=self.forced, **keywords)
+        return Simulator(block, record, thin=self.thin, begins=self.begins, **keywords)
+
+    def carries(self, block) -> bool:
+        """Whether the block has hidden states that go on from window to window."""
+        return any(self.simulator(block, r).chained for r in self.train.records)
 
     def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
@@ -185,6 +198,7 @@ class Data:
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
+            begins=self.begins,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
