@@ -67,8 +67,8 @@ def reach(which, core, known, windows) -> np.ndarray:
     if core.joint == ELASTIC:
         bend = known.force / max(core.stiffness, 1e-300)
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
-        table["stretch"] = 0.3 * bend * one
-        table["stretch_rate"] = 0.3 * bend * math.sqrt(core.stiffness / mass) * one
+        table["stretch"] = 0.6 * bend * one
+        table["stretch_rate"] = 0.6 * bend * math.sqrt(core.stiffness / mass) * one
     return np.column_stack([table[name] for name in which])
 
 

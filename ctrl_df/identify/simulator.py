@@ -7,6 +7,7 @@ rounding act on the output's samples.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -354,12 +355,16 @@ class Simulator:
         return engine.start(x0, time)
 
     def _usual(self, part, windows, w) -> tuple[float, float, float]:
-        """Return position, speed and acceleration with which a window begins, without what sensors add."""
+        """Return position, speed and acceleration with which a window begins, without what sensors add.
+
+        Noise can make of the acceleration what no force of the record does: it is held within what one does.
+        """
         ramps = [
             (p, self.record.t[windows.begins[w]] - later) for p, later in part.output if isinstance(p, Ramp)
         ]
         shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
-        return windows.x[w] - shift, windows.v[w] - drift, windows.a[w]
+        usual = self.facts.force / sum(part.core.masses)
+        return windows.x[w] - shift, windows.v[w] - drift, usual * math.tanh(windows.a[w] / usual)
 
 
 def free_run(
