@@ -24,7 +24,7 @@ from .windows import Windows, facts
 Signals = list[np.ndarray]
 
 # Laws whose events make single windows go lost, and the cost a row of valleys.
-ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck"})
+ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck", "load_friction"})
 
 
 class Tangent:

@@ -35,7 +35,16 @@ _FLOOR = 1.03
 
 # Effects whose error has many valleys over long windows: short ones first.
 _CURVED = frozenset(
-    {"stribeck", "stiction", "bristle", "backlash", "compliance", "position_ripple", "hard_stop"}
+    {
+        "stribeck",
+        "stiction",
+        "bristle",
+        "backlash",
+        "compliance",
+        "position_ripple",
+        "hard_stop",
+        "load_friction",
+    }  # fmt: skip
 )
 
 
@@ -316,8 +325,9 @@ def _fitted(start: Start, screen: Screen, shortest: Data, free):
     data, added = screen.data, _own_names(block)
     names = (*free, *(() if start.effect.id == ROUNDED else added))
     if start.effect.id in _CURVED:
-        # a joint changes everything at once: its valley is long and bent
-        steps, tolerance = (14, 3e-3) if start.effect.role in ("contact", "coupling") else (6, 1e-2)
+        # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
+        bent = start.effect.role in ("contact", "coupling") or start.effect.id == "load_friction"
+        steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
         fitted = data.moved(shortest.fit(block, names, iterations=steps, tolerance=tolerance), 4, 1e-2)
     else:
         begin = None if start.values else screen.starts(block)

@@ -20,9 +20,13 @@ from .trial import Data, Trial
 # levels that nothing but breaking away shows: records leave ranges of them open
 _THRESHOLDS = ("stiction.level", "stribeck.level")
 
+# friction of which the sum with the motor's shows best
+_SHARED = "load_friction.level"
+
 _HOPS = (0.6, 0.8, 1.25, 1.6)
 _SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
 _HOPELESS = 3.0  # error over the best candidate's beyond which another try is not worth it
+_AGAIN = 2  # times that a parameter that found a better valley is moved once more
 _TRIED = 3  # of the hops along one parameter: those that begin best
 _WORTH = 0.99  # error over the one before that counts as a better valley
 _SAME = 1.001  # error over the least that counts as the same floor
@@ -51,16 +55,19 @@ def hopped(found: Candidate, fit: Callable[..., Candidate], names: list[str]) ->
     names : list of str
         Parameters to move.
     """
-    for name in names:
+    queue = [(name, 0) for name in names]
+    for name, times in queue:
         at, best = found.parameters[name], found
         near = []
-        for factor in _SMALL if name.endswith(".level") else _HOPS:
+        for factor in _SMALL if name in _THRESHOLDS else _HOPS:
             moved = _moved(found.model, name, _within(found, name, factor * at))
             near.append(fit(moved, (), starts=found.starts, iterations=2))
         for begun in sorted(near, key=lambda f: f.rmse)[:_TRIED]:
             tried = fit(begun.model, found.names, starts=begun.starts, iterations=4)
             if tried.rmse < _WORTH * best.rmse:
                 best = tried
+        if best is not found and times < _AGAIN:
+            queue.append((name, times + 1))
         found = best
     return found
 
@@ -141,7 +148,13 @@ def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> t
 
 
 def _moved(model, name, value):
-    return model.with_parameters(feasible(model, {name: value}))
+    values = {name: value}
+    if name == _SHARED and "coulomb.level" in model.parameters:
+        # what the load gains the motor loses
+        table = model.parameters
+        motor, more = table["coulomb.level"].value, value - table[_SHARED].value
+        values["coulomb.level"] = max(motor - more, 0.05 * motor)
+    return model.with_parameters(feasible(model, values))
 
 
 def _within(found, name, value):
