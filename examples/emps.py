@@ -80,10 +80,13 @@ def force_error(model, run: cdf.Measurement, held=False) -> float:
 
 
 def free_run(model, run: cdf.Measurement) -> float:
-    """Return the rms position error [m] over the whole record."""
+    """Return the rms position error [m] over the whole record, less its mean.
+
+    The published figures leave the mean out: so the published model comes to its 8.38 mm on the test record.
+    """
     from ctrl_df.identify.simulator import free_run
 
-    return float(np.sqrt(np.mean((run.y - free_run(model, run, position=float(run.y[0]))) ** 2)))
+    return float(np.std(run.y - free_run(model, run, position=float(run.y[0]))))
 
 
 def line(name, model, train, test) -> str:

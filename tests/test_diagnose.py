@@ -109,6 +109,26 @@ def test_hidden_states_of_many_windows_do_not_pass_for_a_hum():
     assert f"{rig.truth['outside.hum_omega'] / (2 * np.pi):.2g} Hz" in found.explanation
 
 
+@pytest.mark.parametrize("hidden", [None, cdf.LinearSpring(20.0), cdf.Backlash(0.005, 0.3, 0.4)])
+def test_simulated_records_without_noise(hidden):
+    rng, t = np.random.default_rng(0), 1e-3 * np.arange(10_000)
+    tones, phases = rng.uniform(0.3, 4, 8), rng.uniform(0, 6, 8)
+    u = sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
+    true = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0)])
+    true = true if hidden is None else true.with_effect(hidden)
+    y = cdf.event_response(true, t, u, 0, input_hold="zoh").outputs[0]
+    start = cdf.Mass(2.5, [cdf.Coulomb(2.4), cdf.Viscous(5.0)])
+    found = diagnose(start, Measurement(t, u, y), candidates=("linear_spring", "backlash", "input_lag"))
+    assert found.measure == "output"
+    if hidden is None:
+        assert found.verdict == "none" and found.nrmse < 1e-6
+    else:
+        assert found.verdict == "effect" and found.best.id == hidden.id
+        name, p = next(iter(hidden.parameters.items()))
+        # worst: 1e-5 of the gap, over impacts
+        assert found.best.parameters[name] == pytest.approx(p.value, rel=1e-4)
+
+
 def test_equal_maps_are_one_class():
     rig = rigs.draw("constant_force", 12, snr_db=60)
     train, held = of(rig)

@@ -59,6 +59,28 @@ def test_what_wanders_is_no_effect():
     assert found.verdict in ("none", "unknown")
 
 
+def test_parameters_are_fitted_where_slow_forces_move_nothing_far():
+    true = {"mass": 3.0, "coulomb.level": 2.0, "viscous.coefficient": 6.0}
+    fit = cdf.refit(MODEL, machine(5))
+    # of twenty such machines 92 % within two standard errors
+    for name, value in true.items():
+        found = fit.parameters[name]
+        assert abs(found.value - value) < 3 * found.standard_error < 0.3 * value
+    assert fit.comparison.windows > 100
+    named = cdf.refit(MODEL, machine(5), window=2.0)
+    assert named.comparison.windows < 10
+
+
+def test_a_ladder_of_a_wandering_machine_has_such_parameters():
+    train, held = machine(1, difference=2.0), machine(2, difference=2.0)
+    study = cdf.improve(MODEL, train, held, 1, candidates=("asymmetric_viscous", "quadratic_drag"))
+    assert study.effects == ("asymmetric_viscous",)
+    again = cdf.refit(study.model, train)
+    for name, found in again.parameters.items():
+        assert abs(study.model.parameters[name].value - found.value) < found.standard_error
+    assert study.steps[-1].parameters["mass"] == study.model.parameters["mass"].value
+
+
 def test_noise_is_told_from_the_jumps_between_windows():
     rng = np.random.default_rng(1)
     pieces = [100 * rng.standard_normal() + np.cumsum(rng.standard_normal(200)) for _ in range(40)]

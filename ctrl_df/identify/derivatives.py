@@ -59,6 +59,16 @@ def noise_floor(t: np.ndarray, y: np.ndarray) -> float:
     return max(math.sqrt(white_level(f, p) * f[-1]), step_of(y) / math.sqrt(12))
 
 
+def grain(y: np.ndarray) -> float:
+    """Return the rms of white noise that explains the usual fourth difference, jumps of motion left aside.
+
+    For rounded signals: the rounding's.
+    """
+    if step_of(y) > 0:
+        return step_of(y) / math.sqrt(12)
+    return float(np.median(np.abs(np.diff(y, 4)))) / (0.6745 * math.sqrt(70))
+
+
 def automatic_cutoff(y: np.ndarray, dt: float) -> float:
     """Return the frequency [Hz] above which the signal is no more than ten times its noise floor in power."""
     f, p = spectrum(y, dt, 24)

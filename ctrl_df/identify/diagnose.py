@@ -18,7 +18,7 @@ from .records import as_records, has_tables
 from .study import Study
 from .trial import Trial
 from .variables import default_free
-from .windows import facts
+from .windows import EXACT, facts
 
 SIGNIFICANT = 20.0
 """Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
@@ -150,7 +150,9 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     noise, structure, share = _left(best, base, missed, study)
     if rounds:
         share = 1.0 if missed and missed[0].evidence > SIGNIFICANT else 0.0
-    if share > _LEFT:
+    if base_errors[0] < EXACT and not study.data.forced:
+        verdict = NONE
+    elif share > _LEFT:
         verdict = UNKNOWN
     elif first is None or not significant:
         verdict = NONE

@@ -8,8 +8,9 @@ from typing import Any
 
 from .attach import attach
 from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
+from .diagnosis import NONE
 from .evidence import ranked
-from .ladder import Found, Study, climb, last_diagnosis, outcome
+from .ladder import Found, Step, Study, climb, last_diagnosis, outcome
 from .records import as_records, has_tables
 from .study import Study as Fits
 from .trial import Trial
@@ -61,7 +62,12 @@ def improve(
         last = fits = Fits(block, records, held, names)
         found = verdict_of(fits, fits.candidates(classes, executor) if search else [], asked)
         best = found.ranking[0] if found.ranking else None
-        worth = best is not None and best.evidence_fitted >= SIGNIFICANT and best.evidence_holdout >= HELD
+        worth = (
+            best is not None
+            and found.verdict != NONE
+            and best.evidence_fitted >= SIGNIFICANT
+            and best.evidence_holdout >= HELD
+        )
         known = set(found.model.parameters) - set(names)
         if best is not None and worth:
             confirmed = [c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > SIGNIFICANT]
@@ -72,6 +78,8 @@ def improve(
     # The windows of a diagnosis are as long as its best model bears: steps are compared over those of the
     # last.
     common = last.data.fine
+    if common.forced:
+        steps = [_sharpened(s, common, set(start.parameters) - set(free_names(start, free))) for s in steps]
     errors = [common.errors(step.model) for step in steps]
     steps = tuple(replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True))
     base = last.base.train
@@ -79,6 +87,15 @@ def improve(
     return Study(
         steps, steps[-1].model, outcome(steps), noise, start, records, held, time.perf_counter() - began
     )
+
+
+def _sharpened(step: Step, data, known) -> Step:
+    """Return a step with parameters that wandering forces blur least; `known` ones stay as they are."""
+    if data.carries(step.model):
+        return step
+    names = [k for k in free_names(step.model) if k not in known]
+    model = data.brief.fit(step.model, names).model
+    return replace(step, model=model, parameters={k: p.value for k, p in model.parameters.items()})
 
 
 def _revised(block, added, fits, known, rivals):

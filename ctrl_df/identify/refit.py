@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ..blocks.mechanism import Mechanism
 from .candidate import Candidate, fit_candidate, fit_windows
 from .compare import Comparison, comparison_of
 from .records import as_records, has_tables
 from .simulator import Simulator
+from .trial import brief_window
 from .valleys import hopped, rough
 from .variables import default_free
 
@@ -137,7 +139,8 @@ def refit(
     start : mapping or None
         Start values other than the model's; the short windows are then left out.
     mode, window
-        As for `ctrl_df.compare`.
+        As for `ctrl_df.compare`; where forces that no model has (friction that wanders) outweigh the noise of
+        the sensor, "auto" takes windows of some ten samples: slow forces move nothing far in them.
     robust : bool
         Whether outliers beyond four median deviations count linearly only.
     budget : int
@@ -178,6 +181,11 @@ def refit(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
     )
     found = fit_candidate(fitted, records, start, names, coarse=start is None, iterations=40, **settings)
+    if mode == "auto" and window is None and names and isinstance(fitted, Mechanism):
+        brief = brief_window(found.model, records)
+        if brief is not None:
+            settings["window"] = brief
+            found = fit_candidate(found.model, records, None, names, coarse=False, iterations=40, **settings)
     if rough(found):
         better = hopped(found, _Beside(records, found.windows), rough(found))
         if better is not found:

@@ -119,9 +119,7 @@ def render(study) -> str:
             "time if the structure is right."
         ),
         parameters=_parameters(study, fit),
-        doubts="".join(f"<p>{html.escape(s[0].upper() + s[1:])}</p>" for s in fit.unidentifiable)
-        if fit
-        else "",
+        doubts="".join(f"<p>{html.escape(s)}</p>" for s in fit.unidentifiable) if fit else "",
         sections="\n".join(_section(i, s) for i, s in enumerate(study.steps)),
         closing=html.escape(
             "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's "
@@ -210,7 +208,9 @@ def _parameters(study, fit):
         if known is not None:
             error = f"± {known.standard_error:.2g}" if math.isfinite(known.standard_error) else "–"
             note = " (at its bound)" if known.at_bound else "" if known.identifiable else " (not determined)"
-        rows.append([_words(name), old, f"{p.value:.5g}", error, p.unit, p.meaning + note])
+        rows.append(
+            [_words(name), old, f"{p.value:.5g}", error, p.unit.replace(" ", "\u00a0"), p.meaning + note]
+        )
     head = ["Parameter", "Start", "Fitted", "Standard error", "Unit", "Meaning"]
     return _table(head, rows, numeric=(1, 2, 3))
 

@@ -235,7 +235,12 @@ class Problem:
         for windows, e in zip(self.windows, self.last, strict=True):
             power = np.array([float(np.mean(e[w] ** 2)) for w in windows.slices])
             usual = max(float(np.median(power)), self.noise**2)
-            trusts.append(np.repeat(np.minimum(1.0, (2 * usual / power) ** 2), windows.ends - windows.begins))
+            trusts.append(
+                np.repeat(
+                    np.minimum(1.0, (2 * usual / np.maximum(power, usual)) ** 2),
+                    windows.ends - windows.begins,
+                )
+            )
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):

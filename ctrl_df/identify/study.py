@@ -70,7 +70,7 @@ class Study:
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
         # friction that wanders drowns all else over longer windows
         near = self.levels[0].moved(self.base.train)
-        if near.rmse > FORCED * data.noise:
+        if near.rmse > FORCED * data.noise and not data.clean:
             self._look_at(self.levels[0].wandering, 0)
             self.base = Trial("", self.data.fit(near.model, self.free))
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from . import derivatives
 from .candidate import Candidate, fit_windows
 from .initial_states import CHAINED, FITTED, MEASURED
 from .measurement import Measurement
 from .noise import NoiseModel, force_errors
 from .ripple_phase import rephased
 from .simulator import Simulator
-from .windows import Windows, cut, facts, split
+from .windows import CLEAN, Windows, cut, facts, split
 
 SAMPLES = 2500
 """Steps of the input a record is thinned to while candidates are screened."""
@@ -24,6 +25,9 @@ SHORTEST = 16
 
 LEVELS = (SHORTEST, 4, 1)
 """How many times as many they are, of the three lengths that are looked at."""
+
+BRIEF = 4 * SHORTEST
+"""The same of windows for the parameters of a machine whose own forces wander."""
 
 FORCED = 50.0
 """Error over the sensor's noise, in the shortest windows, that only forces make which no model has."""
@@ -152,6 +156,11 @@ class Data:
         return [self.level(f) for f in LEVELS]
 
     @property
+    def clean(self) -> bool:
+        """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
+        return all(derivatives.grain(r.y) < CLEAN * facts(r).spread for r in self.train.records)
+
+    @property
     def forced(self) -> bool:
         """Whether forces that no model has (friction that wanders) outweigh the noise."""
         return self.colour is not None
@@ -167,6 +176,15 @@ class Data:
         return replace(
             self, colour=force_errors(max(thin, round(length / BLOCKS), 2)), thin=thin, begins=MEASURED
         )
+
+    @property
+    def brief(self) -> Data:
+        """The same by position over windows so short that slow forces move nothing far: for parameters alone.
+
+        Wandering forces blur parameters least there. What hides in a joint or in bristles is not told: their
+        states, fitted anew in every window, pass for it.
+        """
+        return replace(self.level(BRIEF), colour=None, begins=FITTED)
 
     @property
     def chained(self) -> Data:
@@ -283,6 +301,22 @@ def _scales(block, records) -> Scales:
     speed = math.sqrt(np.mean([np.mean(facts(r).velocity ** 2) for r in records]))
     mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
     return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
+
+
+def brief_window(model, records: Sequence[Measurement]) -> float | None:
+    """Return the length [s] of `Data.brief` where forces wander beyond a fitted model; or None.
+
+    Not for models of which something is hidden, nor for records too short to tell.
+    """
+    if min(map(len, records)) < PARTS * LEAST:
+        return None
+    data = prepare(model, records, records)
+    near = data.levels[0].fit(model, (), iterations=4, tolerance=2e-2)
+    if near.rmse <= FORCED * data.noise or data.clean or data.wandering.carries(model):
+        return None
+    windows = data.wandering.brief.train.windows
+    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, windows, strict=True)]
+    return float(np.median(np.concatenate(spans)))
 
 
 def same_begins(found: Candidate, windows) -> list[np.ndarray]:

@@ -9,13 +9,17 @@ import numpy as np
 from .noise import noise_model
 from .shooting import Problem, Tangent
 
+MANY = 50
+"""Windows of a record from which on they tell how their errors go on from one to the next."""
+
 
 def covariance_of(problem: Problem, tangent: Tangent, jp, js):
     """Return the covariance of the scaled parameters and the directions the data do not determine.
 
     The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
     H^-1, Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost
-    degrees of freedom are given back.
+    degrees of freedom are given back. Errors that go on from one of many windows into the next (forces that
+    wander, whose trace in position every fitted start cuts off) are seen from the scores of the windows.
 
     Returns
     -------
@@ -25,7 +29,7 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
 
     References
     ----------
-    Ljung (1999), sec. 9.4.
+    Ljung (1999), sec. 9.4; Newey & West (1987).
     """
     residual = problem.last
     ones = [np.ones(len(r)) for r in residual]
@@ -43,6 +47,10 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
     middle = np.zeros_like(h)
     for k, e in enumerate(residual):
         e, columns = problem.weighed(k, e), tangent.parameters[k]
+        if problem.colour is None and len(problem.windows[k]) >= MANY:
+            scores = np.array([columns[w].T @ e[w] for w in problem.windows[k].slices])
+            middle += _long_run(scores)
+            continue
         n = len(e)
         lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.windows[k])
         length = 1 << (n - 1).bit_length()
@@ -56,3 +64,13 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
             (transform.conj() * (density * double / length)[:, None]).T @ transform
         )  # fmt: skip
     return inverse @ middle @ inverse, null
+
+
+def _long_run(scores) -> np.ndarray:
+    """Return the covariance (p, p) of the sum of scores (nw, p) of windows that follow each other."""
+    n = len(scores)
+    reach, total = round(2 * n ** (1 / 3)), scores.T @ scores
+    for lag in range(1, reach + 1):
+        after = scores[lag:].T @ scores[:-lag]
+        total += (1 - lag / (reach + 1)) * (after + after.T)
+    return total

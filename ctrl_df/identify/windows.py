@@ -10,6 +10,12 @@ import numpy as np
 from . import derivatives
 from .measurement import Measurement
 
+CLEAN = 1e-7
+"""Noise over the spread of the output that no sensor is below: such a record was simulated."""
+
+EXACT = 10 * CLEAN
+"""Error over the spread of the output that is no error."""
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -41,7 +47,7 @@ def facts(record: Measurement) -> Facts:
         half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
         known = Facts(
             dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
-            max(record.noise_floor(), 1e-9 * float(np.std(record.y))), swing, half, velocity,
+            max(record.noise_floor(), CLEAN * float(np.std(record.y))), swing, half, velocity,
         )  # fmt: skip
         _FACTS[record] = known
     return known

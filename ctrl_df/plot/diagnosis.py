@@ -44,16 +44,20 @@ def draw_ranking(ax, diagnosis, rows):
     # A candidate far worse than the model without it must not squeeze the others.
     end = 1.15 * max(values[np.isfinite(values) & (values <= 2 * values[0])], default=1.0)
     at = np.arange(len(values))[::-1]
-    bars = ax.barh(at, np.minimum(np.nan_to_num(values, nan=end), end), color=shades, height=0.62)
+    known = np.isfinite(values)
+    bars = ax.barh(at, np.where(known, np.minimum(values, end), 0.0), color=shades, height=0.62)
     for y, value, c in zip(at, values, entries, strict=True):
+        if not np.isfinite(value):
+            ax.text(0, y, " passed over at the first look", va="center", fontsize=8, color="0.45")
+            continue
         text = f" {value:.3g} %" + (" >>" if value > end else "")
         if c is not None and c.probability >= 0.005:
             text += f"   p = {c.probability:.0%}"
         if c is not None and c.equivalents:
             text += "   same as " + ", ".join(e.replace("_", " ") for e in c.equivalents)
-        ax.text(min(value, end) if np.isfinite(value) else end, y, text, va="center", fontsize=8)
+        ax.text(min(value, end), y, text, va="center", fontsize=8)
     ax.set_yticks(at, labels)
-    ax.set_xlim(0, 1.6 * end)
+    ax.set_xlim(0, 1.9 * end)
     ax.set_ylim(-0.6, len(values) - 0.4)
     ax.spines[["top", "right"]].set_visible(False)
     return bars
