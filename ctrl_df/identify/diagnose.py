@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.mechanism import Mechanism
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from .evidence import ROUNDED
-from .explain import explain, find_regions
+from .explain import explain, find_regions, remains
 from .lack_of_fit import lacks
 from .records import as_records, has_tables
 from .study import Study
@@ -176,8 +177,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
         study.data.train.records, held, time.perf_counter() - began, dict(limits or {}),
         "acceleration" if study.data.forced else "output",
     )  # fmt: skip
-    object.__setattr__(result, "explanation", explain(result, missed))
-    return result
+    left = remains(result, missed) if verdict == UNKNOWN else ""
+    return replace(result, explanation=explain(result, missed), remains=left)
 
 
 def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float, float]:

@@ -97,6 +97,8 @@ class Diagnosis:
     measure : {'output', 'acceleration', 'N'}
         What all errors are of: the output, or (where forces that no model has, such as friction that wanders,
         outweigh the noise of the sensor) its acceleration, averaged over some samples.
+    remains : str
+        Of 'unknown' over time: how much the library does not explain, and where, in sentences.
     """
 
     verdict: str
@@ -115,6 +117,7 @@ class Diagnosis:
     seconds: float = 0.0
     limits: Mapping[str, float] = field(default_factory=dict)
     measure: str = "output"
+    remains: str = ""
 
     @property
     def best(self) -> CandidateEffect | None:

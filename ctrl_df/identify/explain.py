@@ -40,6 +40,20 @@ def values_of(effect) -> str:
     )
 
 
+def remains(diagnosis, missed) -> str:
+    """Return how much the library does not explain, what it acts like, and where it shows, in sentences."""
+    d = diagnosis
+    acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
+    return (
+        f"Of structure {d.structure:.2g} remains beside {d.noise:.2g} of noise (rms of the {d.measure}). "
+        f"{acts}{_where(d)}".rstrip()
+    )
+
+
+def _where(d) -> str:
+    return " ".join(r.sentence for r in (d.where.significant[:2] if d.where is not None else ()))
+
+
 def explain(diagnosis, missed) -> str:
     """Return the verdict in sentences."""
     d = diagnosis
@@ -50,15 +64,12 @@ def explain(diagnosis, missed) -> str:
             f"{d.nrmse_holdout:.2%}), which is the noise of these data. "
             "No effect of the library improves on it beyond chance."
         )
-    places = d.where.significant[:2] if d.where is not None else ()
-    where = " ".join(r.sentence for r in places)
+    where = _where(d)
     if d.verdict == "unknown":
         tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
-        acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
         return (
             f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}. {tried}"
-            f"Of structure {d.structure:.2g} remains beside {d.noise:.2g} of noise (rms of the {d.measure}). "
-            f"{acts}{where}".rstrip()
+            f"{remains(d, missed)}"
         )
     size = f"{d.nrmse:.2%} to {first.nrmse:.2%} (held out {d.nrmse_holdout:.2%} to {first.nrmse_holdout:.2%})"
     same = ""

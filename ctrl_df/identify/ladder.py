@@ -121,7 +121,9 @@ class Study:
                 f"{first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%} (noise {self.noise:.2%})."
             )
         if self.verdict == UNKNOWN and last.diagnosis is not None:
-            head += " " + last.diagnosis.explanation
+            d = last.diagnosis
+            left = f"Something outside the library is missing. {d.remains}" if d.remains else d.explanation
+            head += " " + left
         lines = [head, "", self.table(), ""]
         for name, p in self.model.parameters.items():
             lines.append(f"  {name:<30} {p.value:>12.6g} {p.unit}")

@@ -182,7 +182,8 @@ class Data:
         """The same by position over windows so short that slow forces move nothing far: for parameters alone.
 
         Wandering forces blur parameters least there. What hides in a joint or in bristles is not told: their
-        states, fitted anew in every window, pass for it. No limits: models of any rung of a ladder begin near.
+        states, fitted anew in every window, pass for it. No limits: models of any rung of a ladder
+        begin near.
         """
         return replace(self.level(BRIEF), colour=None, begins=FITTED, limits={})
 
