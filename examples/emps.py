@@ -158,12 +158,13 @@ def main(folder, report=None):
         if effect.id == "position_ripple":
             print(f"The force repeats every {1e3 * effect.wavelength:.4g} mm of travel.\n")
 
-    # our own effect in place of what bends the friction; where friction wanders (a newton from one record to
-    # the other) refit sees to short windows by itself
+    # our own effect in place of what bends the friction; a tenth of a second at a time, as the slow wander of
+    # friction (a newton from one record to the other) drowns all else over longer windows
     plain = study.model.without_effect("stribeck") if "stribeck" in study.effects else study.model
     friction = published.parameters["coulomb.level"].value
     start = {"coulomb.level": 0.6 * friction, "viscous.coefficient": 200.0}
-    fit = cdf.refit(plain.with_parameters(start).with_effect(RisingFriction(0.4 * friction)), train)
+    begun = plain.with_parameters(start).with_effect(RisingFriction(0.4 * friction))
+    fit = cdf.refit(begun, train, window=0.1)
     improved = fit.model
     print(f"{'':<26}force error [%]    with the hold [%]  free run [mm]")
     print(line("+ rising friction (ours)", improved, train, test), flush=True)

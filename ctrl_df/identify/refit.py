@@ -185,7 +185,8 @@ def refit(
         brief = brief_window(found.model, records)
         if brief is not None:
             settings["window"] = brief
-            found = fit_candidate(found.model, records, None, names, coarse=False, iterations=40, **settings)
+            # from the start again: longer windows may have left the right valley (of a ripple, say)
+            found = fit_candidate(fitted, records, start, names, coarse=False, iterations=40, **settings)
     if rough(found):
         better = hopped(found, _Beside(records, found.windows), rough(found))
         if better is not found:
