@@ -12,8 +12,9 @@ import numpy as np
 from .initial_states import FITTED
 from .measurement import Measurement
 from .noise import NoiseModel
-from .shooting import Problem, Tangent
+from .shooting import Problem
 from .simulator import Simulator
+from .tangent import Tangent
 from .uncertainty import covariance_of
 from .variables import default_free
 from .windows import Windows, facts, make_windows, usual_window

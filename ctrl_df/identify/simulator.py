@@ -1,15 +1,9 @@
-"""A model driven by a recorded input: whole, or window by window from initial states of its own.
-
-What a record's clock can do exactly is taken out of the engine: a dead time shifts the axis of the input or
-the instants at which the output is read, static laws of a held input act on its samples, offset, drift and
-rounding act on the output's samples.
-"""
+"""A model driven by a recorded input: whole, or window by window from initial states of its own."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import control as ct
@@ -17,34 +11,15 @@ import numpy as np
 
 from ..blocks.core import is_kinetic
 from ..blocks.mechanism import Mechanism
-from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
-from ..simulate.engine import Engine, State, sampled_drive
+from ..blocks.primitives import Ramp
+from ..simulate.engine import State, sampled_drive
 from ..simulate.loop import closed_loop
 from . import initial_states
-from .drive import lagged, thinned
 from .measurement import Measurement
+from .ready import Ready, of_block, of_loop, of_system
 from .windows import Windows, facts
 
-REFERENCE = ("reference", "r")
 _TIED = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
-
-
-# --- the model on the record --------------------------------------------------------------------------
-
-
-@dataclass
-class _Parts:
-    """A block made ready: its engine, and what acts outside of it."""
-
-    engine: Engine
-    core: Any
-    offset: int  # of the block's states in the engine's
-    drive_time: np.ndarray
-    drive_value: np.ndarray
-    delay: float = 0.0  # of the output
-    output: list = field(default_factory=list)  # (primitive, delay still to come)
-    lags: list = field(default_factory=list)  # (state, samples)
-    hold: str = ""  # between the values of the drive; as recorded if not said
 
 
 class Simulator:
@@ -97,7 +72,7 @@ class Simulator:
         self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
         self.facts = facts(record)
         self.runs = 0
-        self._prepared: tuple[Any, _Parts | None] = (None, None)
+        self._prepared: tuple[Any, Ready | None] = (None, None)
 
     @property
     def tied(self) -> bool:
@@ -260,85 +235,19 @@ class Simulator:
 
     # --- preparing ------------------------------------------------------------------------------------
 
-    def _prepare(self, values) -> _Parts:
+    def _prepare(self, values) -> Ready:
         key = None if values is None else tuple(values.items())
         if self._prepared[1] is not None and self._prepared[0] == key:
             return self._prepared[1]
         model = self.with_values(values)
         if self.closed:
-            part = self._prepare_loop(model)
+            part = of_loop(model, self.record, self.input, self.mechanism)
         elif self.mechanism:
-            part = self._prepare_block(model)
+            part = of_block(model, self.record, self.input, self.thin)
         else:
-            time, value = self._before(self.record.t, self.input)
-            part = _Parts(Engine(model), None, 0, time, value)
+            part = of_system(model, self.record, self.input)
         self._prepared = (key, part)
         return part
-
-    def _before(self, t, u):
-        """Let the first value hold for all time before the record."""
-        return np.concatenate(([t[0] - 1e3 * self.record.duration - 1.0], t)), np.concatenate(([u[0]], u))
-
-    def _prepare_loop(self, loop) -> _Parts:
-        channels = self.record.channels or {}
-        reference = next((channels[k] for k in REFERENCE if k in channels), self.input)
-        time, value = self._before(self.record.t, reference)
-        block = loop.parts.block
-        offset = (loop.nstates or 0) - (block.nstates or 0)
-        return _Parts(Engine(loop), block.core if self.mechanism else None, offset, time, value)
-
-    def _prepare_block(self, block) -> _Parts:
-        record, t, u = self.record, self.record.t, self.input
-        outside, input_delay, static = [], 0.0, record.input_hold == "zoh"
-        held = u
-        for key, effect in zip(block._keys, block.effects, strict=True):
-            if effect.role != "input":
-                continue
-            channel = effect.channel()
-            if all(isinstance(p, Delay) for p in channel):
-                # a dead time commutes with every law that does not know the time of day
-                input_delay += sum(p.delay for p in channel)
-                outside.append(key)
-            elif static and all(isinstance(p, PiecewiseAffine) and not p.hysteretic for p in channel):
-                for p in channel:
-                    held = p.value(held)
-                outside.append(key)
-            else:
-                static = False
-        tail = []
-        for key, effect in reversed(list(zip(block._keys, block.effects, strict=True))):
-            if effect.role == "output":
-                channel = effect.channel()
-                if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
-                    break
-                tail = [*channel, *tail]
-                outside.append(key)
-        delays = [p.delay if isinstance(p, Delay) else 0.0 for p in tail]
-        later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
-        output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
-        inner = block
-        if outside:
-            kept = [e for k, e in zip(block._keys, block.effects, strict=True) if k not in outside]
-            inner = block._remade(block._values, kept)
-        core = inner.core
-        time, value = self._before(t, held)
-        lags = []
-        signal = held
-        for primitive, state in core.input_channel:
-            if isinstance(primitive, Lag) and record.input_hold == "zoh":
-                signal = lagged(t, signal, primitive.time_constant)
-                lags.append((state, signal))
-            elif isinstance(primitive, Lag):
-                lags.append((state, signal))
-            elif state < 0:
-                signal = primitive.value(signal)
-        hold = record.input_hold
-        if self.thin > 1:
-            time, value, hold = thinned(t, held, self.thin)
-            time, value = self._before(time, value)
-        return _Parts(Engine(inner), core, 0, time + input_delay, value, float(sum(delays)), output, [
-            (state, np.interp(t - input_delay, t, s)) for state, s in lags
-        ], hold)  # fmt: skip
 
     def _start(self, part, windows, w, start, time, hidden) -> State:
         engine, core = part.engine, part.core

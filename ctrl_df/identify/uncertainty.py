@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from .noise import noise_model
-from .shooting import Problem, Tangent
+from .shooting import Problem
+from .tangent import Tangent
 
 MANY = 50
 """Windows of a record from which on they tell how their errors go on from one to the next."""

@@ -1,0 +1,62 @@
+"""A fitted model as a linear map: what its parameters and initial states can change in the output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+class Tangent:
+    """A fitted model as a linear map: what its parameters and initial states can change in the output.
+
+    Parameters
+    ----------
+    parameters, states : list of (n, p) and (n, ns) arrays
+        Per record, derivatives of the output at the samples within the windows.
+    windows : list of Windows
+    ridge : list of (nw, ns) arrays
+        Precision of what is known of the initial states beforehand, in units of one sample.
+    colour : NoiseModel or None
+        What fits see of the output, where that is not the output itself.
+    """
+
+    def __init__(self, parameters, states, windows, ridge, colour=None):
+        self.states, self.windows, self.ridge, self.colour = states, windows, ridge, colour
+        self.parameters = [self._without_starts(k, j) for k, j in enumerate(parameters)]
+        stacked = np.concatenate(self.parameters)
+        norms = np.linalg.norm(stacked, axis=0)
+        stacked = stacked[:, norms > 0] / norms[norms > 0]
+        u, s, _ = np.linalg.svd(stacked, full_matrices=False)
+        self._basis = u[:, s > 1e-6 * s[0]] if len(s) else u
+
+    def _without_starts(self, k, columns):
+        """Remove from the columns (n, m) of one record what its initial states can explain."""
+        out = np.array(columns, dtype=float)
+        if self.colour is not None:
+            return self.colour.seen(out, self.windows[k].slices)
+        for w, where in enumerate(self.windows[k].slices):
+            s = self.states[k][where]
+            if s.shape[1]:
+                out[where] -= s @ np.linalg.solve(s.T @ s + np.diag(self.ridge[k][w]), s.T @ out[where])
+        return out
+
+    @property
+    def pieces(self) -> list[slice]:
+        """What `project` returns as evidence takes it: whole, or by windows where errors are of forces."""
+        if self.colour is None:
+            return [slice(0, sum(map(len, self.states)))]
+        lengths = [
+            (w.stop - w.start) // self.colour.step - self.colour.order
+            for windows in self.windows
+            for w in windows.slices
+        ]
+        ends = np.cumsum([0, *lengths])
+        return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+
+    def project(self, signals: Sequence[np.ndarray]) -> np.ndarray:
+        """Return what fits see of signals, one array for all records, less what refitting could explain."""
+        joined = np.concatenate(
+            [self._without_starts(k, np.reshape(e, (-1, 1)))[:, 0] for k, e in enumerate(signals)]
+        )
+        return joined - self._basis @ (self._basis.T @ joined)
