@@ -7,6 +7,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify import initial_states
+from ctrl_df.identify.attach import applicable
 from ctrl_df.identify.joint_search import resonant
 from ctrl_df.identify.rounding import rounding_evidence
 from ctrl_df.identify.screen import Screen
@@ -92,3 +93,9 @@ def test_a_joint_is_found_by_its_resonance():
     # the grid steps by 1.35; measured 0.81
     ratio = frequency(joint, screen.scales.mass) / frequency(BLOCKS["joint"].effects[-1], 2.0)
     assert 1 / 1.35 < ratio < 1.35
+
+
+def test_an_offset_of_the_sensor_needs_a_law_of_the_place():
+    assert not applicable(cdf.SensorOffset, PLAIN)
+    assert applicable(cdf.SensorOffset, PLAIN.with_effect(cdf.LinearSpring(20.0)))
+    assert not applicable(cdf.Bristle, cdf.Mass(2.0)) and applicable(cdf.Bristle, PLAIN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ..blocks.core import is_kinetic, kinetic_level
-from .simulator import feasible
+from .simulator import feasible, tied
 
 # Effects of which a block may hold several; a second of any other is the first one again.
 _REPEATABLE = ("position_ripple",)
@@ -19,6 +19,8 @@ def applicable(cls, block) -> bool:
     two = block.core.bodies == 2
     if cls.id == "load_friction":
         return two  # on a rigid block it is Coulomb friction
+    if cls.id == "sensor_offset":
+        return tied(block)  # elsewhere it is where windows begin
     if cls.id == "bristle":
         # they slip under a kinetic level: without one they are a spring
         return any(map(is_kinetic, block.effects))

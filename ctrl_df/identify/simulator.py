@@ -77,13 +77,7 @@ class Simulator:
     @property
     def tied(self) -> bool:
         """Whether the block's laws depend on the place (a spring, a ripple, a stop, or a law not known)."""
-        if self.closed or not self.mechanism:
-            return True
-        from ..blocks import effects
-
-        names = {e.id for e in self.block.effects}
-        foreign = any(not hasattr(effects, type(e).__name__) for e in self.block.effects if e.role == "force")
-        return bool(names & _TIED) or foreign
+        return self.closed or not self.mechanism or tied(self.block)
 
     @property
     def anchored(self) -> bool:
@@ -298,6 +292,15 @@ def free_run(
     whole = Windows(np.array([0]), np.array([len(record)]), one, one, one, one, one)
     start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
     return simulator.run(whole, None, start, rounded=True)
+
+
+def tied(block: Mechanism) -> bool:
+    """Whether a law of the block depends on the place, or may do so."""
+    from ..blocks import effects
+
+    names = {e.id for e in block.effects}
+    foreign = any(not hasattr(effects, type(e).__name__) for e in block.effects if e.role == "force")
+    return bool(names & _TIED) or foreign
 
 
 def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
