@@ -140,7 +140,8 @@ def refit(
         Start values other than the model's; the short windows are then left out.
     mode, window
         As for `ctrl_df.compare`; where forces that no model has (friction that wanders) outweigh the noise of
-        the sensor, "auto" takes windows of some ten samples: slow forces move nothing far in them.
+        the sensor, "auto" fits over windows of some ten samples, in which slow forces move nothing far, and
+        compares over the usual ones.
     robust : bool
         Whether outliers beyond four median deviations count linearly only.
     budget : int
@@ -181,9 +182,11 @@ def refit(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
     )
     found = fit_candidate(fitted, records, start, names, coarse=start is None, iterations=40, **settings)
+    shown = None
     if mode == "auto" and window is None and names and isinstance(fitted, Mechanism):
         brief = brief_window(found.model, records)
         if brief is not None:
+            shown = settings | {"coarse": False, "starts": found.starts}
             settings["window"] = brief
             # from the start again: longer windows may have left the right valley (of a ripple, say)
             found = fit_candidate(fitted, records, start, names, coarse=False, iterations=40, **settings)
@@ -194,7 +197,9 @@ def refit(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
             )
     found = _with_steps(found, records, block, free)
-    comparison = comparison_of(found.model, records, found.windows, found.starts, fitted=len(names))
+    # a model that errs over brief windows of its own fit would look better than it is
+    seen = found if shown is None else fit_candidate(found.model, records, None, (), **shown)
+    comparison = comparison_of(found.model, records, seen.windows, seen.starts, fitted=len(names))
     blurred = _blurred(found)
     table = Simulator(found.model, records[0]).block.parameters
     errors = found.standard_errors
