@@ -79,7 +79,8 @@ def improve(
     # last.
     common = last.data.fine
     if common.forced:
-        steps = [_sharpened(s, common, set(start.parameters) - set(free_names(start, free))) for s in steps]
+        known = set(start.parameters) - set(free_names(start, free))
+        steps = [_sharpened(s, common, known) for s in steps]
     errors = [common.errors(step.model) for step in steps]
     steps = tuple(replace(s, nrmse=e, nrmse_holdout=h) for s, (e, h) in zip(steps, errors, strict=True))
     base = last.base.train

@@ -13,6 +13,7 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 from .candidate import Candidate, fit_candidate, fit_windows
 from .compare import Comparison, comparison_of
+from .ready import REFERENCE
 from .records import as_records, has_tables
 from .simulator import Simulator
 from .trial import brief_window
@@ -231,7 +232,7 @@ def _fitted_model(model, records):
     """Return the block of a loop where the recorded force can drive it; otherwise the model."""
     if getattr(model, "parts", None) is None:
         return model
-    has_reference = all(any(k in (r.channels or {}) for k in ("reference", "r")) for r in records)
+    has_reference = all(any(k in (r.channels or {}) for k in REFERENCE) for r in records)
     return model.parts.block if has_reference else model
 
 

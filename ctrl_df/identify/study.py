@@ -99,9 +99,10 @@ class Study:
         """Return every effect that can be added, fitted, the one with most evidence first."""
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
-        if not self.data.forced and longest.moved(base).rmse > _GROWTH * base.rmse:
+        there = base.rmse if self.data.forced else longest.moved(base).rmse
+        if there > _GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
-            moved = self._over_long_windows(base, found, longest)
+            moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
                 found = _best_of(base, [*moved, *again])
@@ -109,17 +110,18 @@ class Study:
             self._rebase(found)
         return found
 
-    def _over_long_windows(self, base, found, longest: Data) -> list[Trial] | None:
-        """Return the best by error moved to the longest windows; None where they explain enough there."""
-        if found and found[0].train.rmse <= 0.8 * base.rmse:
+    def _over_long_windows(self, here, there, found) -> list[Trial] | None:
+        """Return the best by error moved to the longest windows; None where they explain enough there.
+
+        `here`, `there`: error of the baseline where the trials were fitted, and over the longest windows.
+        """
+        if found and found[0].train.rmse <= 0.8 * here:
             return None
+        longest = self.levels[-1]
         best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
         moved = [replace(t, train=longest.moved(t.train, 4, 1e-2)) for t in best]
-        if found and found[0].train.rmse <= 0.97 * base.rmse:
-            there = longest.moved(base).rmse
-            if min(t.train.rmse for t in moved) <= 0.5 * there:
-                return None
-        return moved
+        shows = found and found[0].train.rmse <= 0.97 * here
+        return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
     def _look(self, classes, executor, data: Data):
         """Fit every effect over one set of windows; return the baseline there and the effects, best first."""

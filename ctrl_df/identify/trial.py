@@ -312,10 +312,10 @@ def brief_window(model, records: Sequence[Measurement]) -> float | None:
     if min(map(len, records)) < PARTS * LEAST:
         return None
     data = prepare(model, records, records)
-    near = data.levels[0].fit(model, (), iterations=4, tolerance=2e-2)
-    if near.rmse <= FORCED * data.noise or data.clean or data.wandering.carries(model):
+    near, forced = data.levels[0].fit(model, (), iterations=4, tolerance=2e-2), data.wandering
+    if near.rmse <= FORCED * data.noise or data.clean or forced.carries(model):
         return None
-    windows = data.wandering.brief.train.windows
+    windows = forced.brief.train.windows
     spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, windows, strict=True)]
     return float(np.median(np.concatenate(spans)))
 
