@@ -31,7 +31,7 @@ class Shot(NamedTuple):
     shoot: int
     prog: L.Program
     space: tuple
-    scale: np.ndarray  # margins' running scales
+    scale: np.ndarray  # (4, ng) scales of margins
     clock: np.ndarray
     before: np.ndarray
     log_t: np.ndarray
@@ -70,12 +70,12 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     no_spectrum = np.zeros((rows, 0), complex)
     log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
     arguments = (
-        engine.program, drive, np.zeros(9), vector, modes, 1.0, none, rows_x, rows_y, 8, 1e-9, 1e-12, 1.0,
-        True, False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, vector, 0, engine._space,
+        engine.program, drive, np.zeros(9), vector, modes, 1.0, none, rows_x, rows_y, 8, 1e-9, 0.0, 1.0,
+        True, False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, np.zeros((4, ng)), 0, engine._space,
         no_spectrum, 1.0,
     )  # fmt: skip
     shot = Shot(
-        native_address(run, arguments), 0, engine.program, engine._space, np.full(ng, 1e-13), np.zeros(9),
+        native_address(run, arguments), 0, engine.program, engine._space, np.zeros((4, ng)), np.zeros(9),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
         np.full((nf, nf), np.nan), np.zeros((8, max(n, 1))), np.zeros((3, nf, nf)),

@@ -172,6 +172,7 @@ class Tracer:
         slot = run.margin - int(program.nodes[node, layout.G])
         rates(program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, False)
         modes.event(
-            program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, node, slot, 1e-10
+            program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, node, slot, 1e-10,
+            1e-6,
         )
         return x

@@ -43,6 +43,7 @@ from .roots import first_root
 TERMS = 20
 SLOTS = 16
 HARMONICS = 32
+UNIT = 2.0**200  # probes of linear maps: what is constant beside them vanishes without rounding them
 SHARE = 0.01
 """Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
 
@@ -61,6 +62,7 @@ class Memory(NamedTuple):
     ahead: np.ndarray  # scratch: margins at a unit state, extended
     forcing: np.ndarray  # (TERMS + 1, nr): powers of the external inputs over a step
     curves: np.ndarray  # (TERMS + 1): a margin over a step
+    measures: np.ndarray  # (n,): sizes that tolerances refer to
 
 
 def memory(prog) -> Memory:
@@ -72,6 +74,7 @@ def memory(prog) -> Memory:
         probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, ng + 2, n + nr + 1)),
         np.zeros(ng + 3), np.zeros(ng + 3), np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
+        np.zeros(n),
     )  # fmt: skip
 
 
@@ -104,32 +107,33 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
         x[j] = 0.0
     for i in range(nr):
         store.probe.harmonics[i, 0] = 0.0
-    # rates and margins at zero, at each unit state, under each unit input, at unit time
+    # rates and margins at zero, then one state, input, or the time at a time far from it
     for column in range(-1, n + nr + 1):
         t = 0.0
         if 0 <= column < n:
-            x[column] = 1.0
+            x[column] = UNIT
         elif n <= column < n + nr:
-            store.probe.harmonics[column - n, 0] = 1.0
+            store.probe.harmonics[column - n, 0] = UNIT
         elif column == n + nr:
-            t = 1.0
+            t = UNIT
         margin = store.base if column < 0 else store.ahead
         rates(prog, store.probe, 0, t, x, mode, work, dx0 if column < 0 else dx, g, True)
         extend(prog, mode, work, g, margin)
         if 0 <= column < n:
             x[column] = 0.0
             for j in range(n):
-                store.a[slot, j, column] = dx[j] - dx0[j]
+                store.a[slot, j, column] = (dx[j] - dx0[j]) / UNIT
         elif n <= column < n + nr:
             store.probe.harmonics[column - n, 0] = 0.0
             for j in range(n):
-                store.b[slot, j, column - n] = dx[j] - dx0[j]
+                store.b[slot, j, column - n] = (dx[j] - dx0[j]) / UNIT
         elif column == n + nr:
             for j in range(n):
-                store.d[slot, j] = dx[j] - dx0[j]
+                store.d[slot, j] = (dx[j] - dx0[j]) / UNIT
         if column >= 0:
             for i in range(store.rows.shape[1]):
-                store.rows[slot, i, column] = margin[i] - store.base[i] if store.base[i] < math.inf else 0.0
+                known_margin = store.base[i] < math.inf
+                store.rows[slot, i, column] = (margin[i] - store.base[i]) / UNIT if known_margin else 0.0
     return slot
 
 
@@ -215,6 +219,8 @@ def series(store, slot, length, least, k0, size, rtol, atol, poly):
     n, nr = size.shape[0], store.b.shape[2]
     a = store.a[slot]
     before = now = 0.0
+    for i in range(n):
+        store.measures[i] = size[i]
     for k in range(1, TERMS + 1):
         before, now = now, 0.0
         for i in range(n):
@@ -231,7 +237,10 @@ def series(store, slot, length, least, k0, size, rtol, atol, poly):
                     value += store.d[slot, i] * length
                 value *= length / k
             poly[k - 1, i] = value
-            now = max(now, abs(value) / (atol + rtol * size[i]))
+            if store.measures[i] == 0.0:
+                store.measures[i] = abs(value)  # begins at zero: measured by what moves it first
+            if value != 0.0:
+                now = max(now, abs(value) / (atol + rtol * store.measures[i]))
         if not now < math.inf:
             return k, -1.0
         if k >= 3 and now < SHARE and before < SHARE and k >= least:

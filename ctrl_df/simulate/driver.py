@@ -13,16 +13,19 @@ from . import history
 from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
 from .flow import rates
 from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
-from .locate import bump_share, complete, locate_event, margins, may_touch, tolerances, worst
+from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
-from .stepper import inside, prepare, prepare8, roughness, step
+from .stepper import grains, inside, prepare, prepare8, roughness, step
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
 sliding, step below the resolution of time, more steps within a delay than its history holds."""
 
 PATIENCE = 40  # steps of order 5 after one of order 3 that failed
+GRAINS = 200  # steps after which rounding is asked anew
+REACH = 1e-4  # of a step: the time over which rates of inputs are taken
+SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
 
 
 def workspace(prog, delays: bool = False):
@@ -43,7 +46,7 @@ def workspace(prog, delays: bool = False):
     owner = np.zeros(ng + 1, np.int64)
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
-    vectors = [np.zeros(n) for _ in range(4)] + [np.zeros(ng + 1) for _ in range(5)]
+    vectors = [np.zeros(n) for _ in range(5)] + [np.zeros(ng + 1) for _ in range(5)]
     return (work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), memory(prog))
 
 
@@ -64,15 +67,16 @@ def run(
 
     ``clock``: [time, next output index, last step size, steps used, events so far, events in this log,
     segment, on section, margin of the last event].
-    ``before``: state just before the event that stopped the run. ``scale``: running scale of each margin.
+    ``before``: state just before the event that stopped the run. ``scale`` (4, ng): see `renewed`.
     ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, g, g0, gtol, lowest, norm, owner, memo, store = space
-    n, ng = x.shape[0], scale.shape[0]
+    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store = space
+    n, ng = x.shape[0], scale.shape[1]
     t, index, h = clock[0], int(clock[1]), clock[2]
     segment = int(clock[6])
+    shortest = SHORTEST * (t_end - t)
     nt, nh = drive.time.shape[0], drive.harmonics.shape[1]
     held = nt > 0 and drive.linear == 0
     has_tracked, bumpy, delays = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1, prog.ints[H_DELAYS] > 0
@@ -92,6 +96,7 @@ def run(
     jumped = False  # something outside the states jumped just now: modes may be out of line
     generation = 1.0  # of the record that a delay opens next
     patience = slot = 0
+    stale = 0  # steps until rounding is asked anew
     blocked = ng - 1 if clock[7] > 0.5 else -1
     reason = DONE
     for i in range(ng):
@@ -106,6 +111,7 @@ def run(
             reason = CHATTER
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
+    renewed(prog, mode, scale, -1)
     next_tick = next_sample(prog, t)
     while reason == DONE:
         while index < tout.shape[0] and tout[index] <= t:
@@ -143,7 +149,7 @@ def run(
         if jumped or not known:
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
             if locate and (has_tracked or watch >= 0):
-                reach = max(1e-4 * h, 1e-9)
+                reach = REACH * (h if h > 0.0 else _first_step(x, k[0], limit - t, hmax))
                 complete(
                     prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign
                 )
@@ -154,11 +160,11 @@ def run(
         if locate:
             for i in range(ng):
                 if g0[i] < math.inf:
-                    scale[i] = max(scale[i], abs(g0[i]))
-            tolerances(prog, x, mode, scale, atol, gtol)
+                    scale[NOW, i] = max(scale[NOW, i], abs(g0[i]))
+            tolerances(prog, x, mode, scale, gtol)
             armed = armed or (blocked != ng - 1 and gtol[ng - 1] < g0[ng - 1] < math.inf)
             # margins already crossed at the start (simultaneous events)
-            value, at = worst(g0, gtol, scale, blocked)
+            value, at = worst(g0, gtol, scale[NOW], blocked)
             if value < 0.0 and jumped:
                 jumped = known = False
                 settle(prog, drive, segment, t, x, mode, work, dx)
@@ -180,7 +186,7 @@ def run(
             if affine and h <= 0.0:
                 length = min(room, hmax)
             elif h <= 0.0:
-                length = h = _first_step(x, k[0], rtol, atol, room, hmax)
+                length = h = _first_step(x, k[0], room, hmax)
             if bumpy:
                 for j in range(n):
                     x1[j] = x[j] + length * k[0, j]
@@ -207,6 +213,10 @@ def run(
             else:
                 for i in range(ng):
                     lowest[i] = g0[i]
+                if stale == 0:
+                    grains(prog, drive, segment, t, x, mode, work, k[0], size, x1, dx, g, grain)
+                    stale = GRAINS
+                stale -= 1
                 # samples much denser than the motion: a cheaper pair does
                 rank = order
                 if order == 5 and truncated and patience == 0 and h >= 2.0 * length:
@@ -226,6 +236,7 @@ def run(
                     lowest,
                     x1,
                     size,
+                    grain,
                     rtol,
                     atol,
                     locate,
@@ -236,7 +247,7 @@ def run(
                 patience = max(patience - 1, 0)
                 if not error < math.inf:
                     h = 0.2 * length
-                    if not h >= 1e-13 * max(abs(t), 1e-3):
+                    if not h >= 0.1 * max(1e-12 * abs(t), shortest):
                         reason = NAN
                     continue
                 if error > 1.0:
@@ -261,7 +272,7 @@ def run(
             suspect = False
             if locate:
                 for i in range(ng):
-                    norm[i] = scale[i]
+                    norm[i] = scale[NOW, i]
                 if affine and watch < 0:
                     theta, at = crossing(
                         prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm, g
@@ -269,13 +280,13 @@ def run(
                 else:
                     if affine or watch >= 0 or has_tracked:
                         margins(
-                            prog, drive, segment, t + length, x1, mode, work, dx, g, 1e-4 * length, watch,
+                            prog, drive, segment, t + length, x1, mode, work, dx, g, REACH * length, watch,
                             watch_level, watch_sign,
                         )  # fmt: skip
                         suspect = True
                     for i in range(ng):
                         if abs(g[i]) < math.inf:
-                            norm[i] = max(scale[i], abs(g[i]))
+                            norm[i] = max(scale[NOW, i], abs(g[i]))
                         if i != blocked and (
                             g[i] + gtol[i] < 0.0 or (rank == 8 and lowest[i] + gtol[i] < 0.0)
                         ):
@@ -285,7 +296,7 @@ def run(
             if not prepared and (suspect or spectrum.shape[1] > 0 or inner or delays):
                 if rank == 8:
                     prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
-                    rough = roughness(size, rtol, atol, poly)
+                    rough = roughness(size, grain, length, rtol, atol, poly)
                     if rough > 1.0:
                         h = length * max(0.3, 0.9 * rough ** (-0.125))
                         continue
@@ -339,6 +350,7 @@ def run(
                     next_tick = next_sample(prog, t)
                     jumped, generation = True, 1.0
                 continue
+        reach = REACH * h
         if theta < 1.0 and theta * length > 0.0:
             # a step that ran far beyond its event says little of what follows
             h = max(min(h, 3.0 * theta * length), 1e-14 * abs(t))
@@ -352,23 +364,24 @@ def run(
             continue
         if has_tracked:
             track(prog, drive, segment, t, x, mode, work)
-            margins(prog, drive, segment, t, x, mode, work, dx, g, 1e-9, -1, 0.0, 1)
+            margins(prog, drive, segment, t, x, mode, work, dx, g, reach, -1, 0.0, 1)
         copy(x, before)
         node = owner[at]
         modes = _signature(mode)
-        kind = event(prog, drive, segment, t, x, mode, work, dx, g, node, at - prog.nodes[node, G], height)
+        slot_at = at - prog.nodes[node, G]
+        kind = event(prog, drive, segment, t, x, mode, work, dx, g, node, slot_at, height, reach)
+        stale = 0
         generation = 1.0
         settled = settle(prog, drive, segment, t, x, mode, work, dx)
         if not settled:
             zero_events += 100
         if settled and _signature(mode) == modes and _same(x, before):
             # nothing came of it: rounding alone crossed this margin, which thereby counts as larger
-            scale[at] *= 100.0
+            scale[NOW, at] *= 100.0
         else:
-            for i in range(prog.nodes[node, G], prog.nodes[node, G] + prog.nodes[node, NG]):
-                scale[i] = 1e-3 * rtol  # the margins of the new mode are of another kind
+            renewed(prog, mode, scale, node)
         zero_events += 1
-        if t - last_event_t > 1e-9 * max(abs(t), 1e-3):
+        if t - last_event_t > max(1e-9 * abs(t), shortest):
             zero_events = 0
             last_event_t = t
         clock[4] += 1
@@ -412,12 +425,14 @@ def _same(a, b):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def _first_step(x, dx, rtol, atol, room, hmax):
-    """Estimate a first step from the size of state and rates (Hairer, Norsett & Wanner, II.4, step a)."""
-    d0 = d1 = 0.0
+def _first_step(x, dx, room, hmax):
+    """Estimate a first step: the time in which some state changes by a hundredth of itself.
+
+    States that begin at zero tell nothing; where all do, a millionth of the time ahead is tried.
+    """
+    h = math.inf
     for j in range(x.shape[0]):
-        scale = atol + rtol * abs(x[j])
-        d0 += (x[j] / scale) ** 2
-        d1 += (dx[j] / scale) ** 2
-    h = 1e-6 if d0 < 1e-10 or d1 < 1e-10 else 0.01 * math.sqrt(d0 / d1)
-    return min(max(h, 1e-9), hmax, room)
+        if x[j] != 0.0 and dx[j] != 0.0:
+            h = min(h, 0.01 * abs(x[j] / dx[j]))
+    span = min(room, hmax)
+    return min(max(h, 1e-9 * span), span) if h < math.inf else 1e-6 * span

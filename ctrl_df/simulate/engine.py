@@ -182,7 +182,8 @@ class Engine:
         order : {8, 5}
             Runge-Kutta order; 5 is faster where inputs are sampled finely.
         rtol, atol : float
-            Error tolerances of a step; atol defaults to rtol/1000.
+            Error tolerances of a step: relative to the running size of each state, and (default 0) absolute, in
+            the units of the states.
         locate : bool
             False integrates on in the fixed mode, events ignored.
         stop_at_event : bool
@@ -198,7 +199,7 @@ class Engine:
         spectrum : (ny, kmax + 1) complex array
             Receives (is added) the integrals of the outputs against exp(-j k omega t).
         """
-        atol = 1e-3 * rtol if atol is None else atol
+        atol = 0.0 if atol is None else atol
         height = max(rtol, 1e-10) if height is None else height
         if drive is None:
             drive = constant_drive(np.zeros(self.ninputs))
@@ -206,7 +207,7 @@ class Engine:
         times = np.zeros(0) if times is None else np.ascontiguousarray(times, dtype=float)
         now = state.copy()
         ng = int(self.program.ints[layout.H_NG]) + 1
-        scale = now.scale if now.scale is not None else np.full(ng, 1e-3 * rtol)
+        scale = now.scale if now.scale is not None else np.zeros((4, ng))
         xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
         clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1])
         log_t, log_n, log_k = (

@@ -15,6 +15,7 @@ from .layout import (
     A_JOINT,
     A_STOP,
     AUX,
+    G_BODY1,
     G_JOINT_HIGH,
     G_JOINT_LOW,
     G_WALL_HIGH,
@@ -25,20 +26,24 @@ from .layout import (
     KIND,
     MECHANISM,
     MODE,
+    NG,
     P_BUMP0,
     P_GAP,
     P_HIGH,
     P_LOW,
     PAR,
+    PLAY,
     PWA,
+    RATE,
     STUCK,
     G,
     X,
 )
-from .mechanics import dry_level
+from .mechanics import closed, dry_level
 from .stepper import inside
 
 GRAIN = 4.0 * np.finfo(float).eps
+NOW, FIRST, SECOND, QUANTITY = range(4)  # rows of the scales of margins, see `renewed`
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -71,14 +76,14 @@ def worst(g, gtol, scale, blocked):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
-def tolerances(prog, x, mode, scale, atol, gtol):
+def tolerances(prog, x, mode, scale, gtol):
     """Write how far below zero each margin may be before it counts as crossed.
 
     A margin compares numbers that are rounded: positions far from zero, a corner of a saturation. What their
-    last digits make of it is no crossing.
+    last digits make of it is no crossing. `scale` as in `renewed`.
     """
     for i in range(gtol.shape[0]):
-        gtol[i] = 1e-12 * scale[i] + 1e-2 * atol
+        gtol[i] = 1e-12 * scale[NOW, i] + GRAIN * scale[int(scale[QUANTITY, i]), i]
     for n in range(prog.nodes.shape[0]):
         kind, first, go, po = prog.nodes[n, KIND], prog.nodes[n, X], prog.nodes[n, G], prog.nodes[n, PAR]
         if kind == MECHANISM:
@@ -97,6 +102,40 @@ def tolerances(prog, x, mode, scale, atol, gtol):
             for side in range(2):
                 if abs(prog.par[row + side]) < math.inf:
                     gtol[go + side] += GRAIN * abs(prog.par[row + side])
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def renewed(prog, mode, scale, node):
+    """Begin the scales of margins anew after an event of `node` (-1: of those alone whose quantity changed).
+
+    One margin is a speed while its body slides and a force while it sticks, a distance over a gap and a force
+    in contact. Rows of `scale` (4, ng): size of each margin in its present mode, the largest ever of either of
+    its two quantities, and which of the two rows is the present one.
+    """
+    for n in range(prog.nodes.shape[0]):
+        kind, go, mo = prog.nodes[n, KIND], prog.nodes[n, G], prog.nodes[n, MODE]
+        joined = kind == MECHANISM and prog.ints[prog.nodes[n, AUX] + A_BODIES] == 2 and closed(prog, n, mode)
+        for slot in range(prog.nodes[n, NG]):
+            i = go + slot
+            other = False
+            if kind == MECHANISM:
+                if slot <= G_BODY1:
+                    other = mode[mo + slot] == STUCK
+                elif slot == G_JOINT_LOW or slot == G_JOINT_HIGH:
+                    other = joined
+            elif kind == PLAY:
+                other = mode[mo] != 0
+            elif kind == RATE:
+                other = mode[mo] == 0
+            row = SECOND if other else FIRST
+            if n == node or row != int(scale[QUANTITY, i]):
+                past = int(scale[QUANTITY, i])
+                if past != 0:
+                    scale[past, i] = max(scale[past, i], scale[NOW, i])
+                scale[NOW, i] = 0.0
+                scale[QUANTITY, i] = row
+    if scale[QUANTITY, scale.shape[1] - 1] == 0.0:
+        scale[QUANTITY, scale.shape[1] - 1] = FIRST
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -158,10 +158,11 @@ def advance_state(prog, node, x, w):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
+def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, reach):
     """Apply the event whose margin `slot` of `node` was crossed; returns its kind.
 
-    `height` is the flight, relative to the gap or stroke, below which an impact counts as the end of chatter.
+    `height` is the flight, relative to the gap or stroke, below which an impact counts as the end of chatter;
+    `reach` the time [s] over which rates of inputs are taken.
     """
     w, f, trial = work
     nodes, par, aux = prog.nodes, prog.par, prog.ints
@@ -173,7 +174,8 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
         mode[mo] = aux[at + slot]
         row_a, row_b = po + 4 * before, po + 4 * mode[mo]
         jump = par[row_a + 3] + par[row_a + 2] * value - par[row_b + 3] - par[row_b + 2] * value
-        return E_SWITCH if abs(jump) > 1e-12 * (1.0 + abs(value)) else E_CORNER
+        sizes = abs(par[row_a + 3]) + abs(par[row_a + 2] * value) + abs(par[row_b + 3]) + abs(par[row_b + 2] * value)
+        return E_SWITCH if abs(jump) > 1e-12 * sizes else E_CORNER
     if kind == QUANTIZER:
         mode[mo] += 1 if slot == 1 else -1
         return E_SWITCH
@@ -191,7 +193,6 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height):
         refresh(prog, drive, segment, t, x, mode, w)
         value = node_input(prog, node, 0, w)
         x[xo] = value
-        reach = 1e-6
         for i in range(x.shape[0]):
             trial[i] = x[i] + reach * dx[i]
         refresh(prog, drive, segment, t + reach, trial, mode, w)

@@ -71,8 +71,8 @@ def event_response(
     input_hold : {'linear', 'zoh'}
         How samples are read between the times.
     rtol, atol : float
-        Tolerances of the integration, relative to the running size of each state; `atol` defaults to
-        rtol/1000.
+        Tolerances of the integration, relative to the running size of each state, and, if asked, absolute in the units
+        of the states.
     max_step : float
         Longest step [s]. Needed only where a callable input has features shorter than five time points.
     max_steps : int
@@ -144,7 +144,8 @@ def check_positions(system, x0) -> None:
         if core.bodies == 2 and core.joint in ("impact", "rigid"):
             gap = core.gap if core.joint == "impact" else 0.0
             delta = x[2] - x[0]
-            if not -1e-12 <= delta <= gap * (1 + 1e-12) + 1e-12:
+            slack = 1e-12 * (gap + abs(x[0]) + abs(x[2]))
+            if not -slack <= delta <= gap + slack:
                 raise ValueError(
                     f"the initial state of {name} needs 0 <= x_motor - x <= {gap:g} m (the clearance of its "
                     f"joint); got {delta:g}. Start with x_motor = x."

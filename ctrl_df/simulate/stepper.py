@@ -9,11 +9,15 @@ that is too much.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from scipy.integrate import DOP853, RK23, RK45
 
-from .flow import rates
+from .flow import node_input, rates
+from .layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
+from .mechanics import dry_level
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
 E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
@@ -27,6 +31,8 @@ A3[:3, :3], A3[3] = RK23.A, RK23.B
 E3_3, P3 = RK23.E.copy(), RK23.P.copy()
 # share of the interpolant's last term that stands for its error
 ROUGH = 0.1
+GRAIN = 8.0 * np.finfo(float).eps
+NUDGE = 1e-4  # of the difference quotients of `grains`, relative to the size of a state
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
@@ -50,12 +56,61 @@ def stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, a, c, fi
 
 
 @njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
-def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, rtol, atol, want_g):
+def measure(j, count, h, k, x1, size):
+    """Size that the relative tolerance of state j refers to; of one that begins at zero, what it moves."""
+    if size[j] > 0.0:
+        return max(size[j], min(abs(x1[j]), 2.0 * size[j]))
+    moved = h * abs(k[0, j])
+    if moved == 0.0:
+        for m in range(1, count):
+            moved = max(moved, h * abs(k[m, j]))
+    return min(moved, abs(x1[j])) if x1[j] != 0.0 else moved
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def grains(prog, drive, segment, t, x, mode, work, k0, size, trial, dx, g, grain):
+    """Write what rounding leaves of each rate: the last digits of all the terms it is the sum of.
+
+    A rate near zero may be the difference of large forces in balance; its last digits are theirs. The terms
+    are the rate's slopes times the sizes of the states, by differences, and what acts from outside.
+    """
+    n, w = x.shape[0], work[0]
+    for i in range(n):
+        grain[i] = 0.0
+        trial[i] = x[i]
+    rates(prog, drive, segment, t, trial, mode, work, dx, g, False)
+    for node in range(prog.nodes.shape[0]):
+        kind, first, po = prog.nodes[node, KIND], prog.nodes[node, X], prog.nodes[node, PAR]
+        if kind == MECHANISM:
+            force = abs(node_input(prog, node, 0, w))
+            for b in range(prog.ints[prog.nodes[node, AUX] + A_BODIES]):
+                held = dry_level(prog, node, b, 0.0, 1.0, 0.0) + dry_level(prog, node, b, 0.0, -1.0, 0.0)
+                grain[first + 2 * b + 1] = GRAIN * (force + held) / prog.par[po + P_M0 + b]
+        elif kind == LTI:
+            nx, ni = prog.nodes[node, NX], prog.nodes[node, NIN]
+            for k in range(ni):
+                value = GRAIN * abs(node_input(prog, node, k, w))
+                for i in range(nx):
+                    grain[first + i] += value * abs(prog.par[po + nx * nx + i * ni + k])
+    for j in range(n):
+        if size[j] == 0.0:
+            continue
+        trial[j] = x[j] + NUDGE * size[j]
+        rates(prog, drive, segment, t, trial, mode, work, dx, g, False)
+        trial[j] = x[j]
+        for i in range(n):
+            term = abs(dx[i] - k0[i]) / NUDGE
+            if term < math.inf:
+                grain[i] += GRAIN * term
+
+
+@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, grain, rtol, atol, want_g):
     """One step from x to x1 with k[0] known; fills the other rates, g (at the end); returns the scaled error.
 
     `size` is the running size of each state, what the relative tolerance refers to: not the end of the step,
-    which may lie far behind a wall the step has yet to find. The last row of each tableau is the new state
-    itself.
+    which may lie far behind a wall the step has yet to find. `grain` is what rounding leaves of each rate:
+    no error below that can be asked for. The last row of each tableau is the new state itself.
     """
     n = x.shape[0]
     error = 0.0
@@ -63,11 +118,13 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
         stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, A8, C8, 1, 13, want_g, want_g)
         e3 = e5 = 0.0
         for j in range(n):
-            scale = atol + rtol * max(size[j], min(abs(x1[j]), 2.0 * size[j]))
+            scale = atol + h * grain[j] + rtol * measure(j, 13, h, k, x1, size)
             v3 = v5 = 0.0
             for m in range(13):
                 v3 += E3[m] * k[m, j]
                 v5 += E5[m] * k[m, j]
+            if scale == 0.0:
+                continue  # neither moved nor moving
             e3 += (v3 / scale) ** 2
             e5 += (v5 / scale) ** 2
         if e3 == 0.0 and e5 == 0.0:
@@ -78,7 +135,9 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
     else:
         stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, A3, C3, 1, 4, False, want_g)
     for j in range(n):
-        scale = atol + rtol * max(size[j], min(abs(x1[j]), 2.0 * size[j]))
+        scale = atol + h * grain[j] + rtol * measure(j, 7 if order == 5 else 4, h, k, x1, size)
+        if scale == 0.0:
+            continue
         value = 0.0
         if order == 5:
             for m in range(7):
@@ -108,7 +167,7 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)
-def roughness(size, rtol, atol, poly):
+def roughness(size, grain, h, rtol, atol, poly):
     """Error of the 7th-order interpolant relative to tolerance, judged by its last term.
 
     A long step can be right at its end and poor inside; events and outputs are taken from inside.
@@ -116,7 +175,9 @@ def roughness(size, rtol, atol, poly):
     worst = 0.0
     for j in range(size.shape[0]):
         # 0.0084 is the largest value of the last basis function, theta^4 (1 - theta)^3
-        worst = max(worst, 0.0084 * abs(poly[6, j]) / (atol + rtol * size[j]))
+        scale = atol + h * grain[j] + rtol * max(size[j], abs(poly[0, j]))
+        if scale > 0.0:
+            worst = max(worst, 0.0084 * abs(poly[6, j]) / scale)
     return ROUGH * worst
 
 
