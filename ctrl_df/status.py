@@ -32,6 +32,17 @@ class Status(Enum):
     NOT_CONVERGED = (
         "no periodic orbit was reached within the iterations allowed; start nearer or raise max_iterations"
     )
+    NOT_FOUND = (
+        "no periodic orbit was found from the starts tried, which is no proof that there is none; "
+        "give a guess (amplitude, omega), a state near the orbit, or a longer search_time"
+    )
+    NO_SUCH_ORBIT = (
+        "the prediction belongs to no orbit: as its harmonics are fed back it merges with another prediction"
+    )
+    CENTRE = (
+        "motions of every size repeat (a centre): none of them is a limit cycle; "
+        "add damping, or a nonlinearity that depends on the amplitude"
+    )
     NO_PERIOD = (
         "the motion from this start settles to no period; averages over many periods are given instead"
     )

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..df.family import Family
-from .balance import Balance, balance, responder
+from .answer import responder
 from .bound import mees_bergen
 from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros
 from .grade import UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
+from .path import End, follow_path
 from .scan_grid import FAST, grid_slope, noisy
 
 SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can be computed
@@ -120,7 +121,7 @@ class Assessor:
             )
         sense = sensitivity(crossing.jacobian)
         # only the motion that the method names can be asked how it answers returned harmonics
-        spread, found, remark = self._spread(crossing, distortion, sense, regime, motion is None)
+        spread, path, remark = self._spread(crossing, distortion, sense, regime, motion is None)
         notes += remark
         stable = loeb(crossing.jacobian) if attracts else False
         if self.method.name == "memory":
@@ -145,8 +146,8 @@ class Assessor:
             grade=grade,
             why=why,
             regime=regime,
-            corrected=found.solution,
-            waveform=found.waveform,
+            corrected=path.solution if path is not None and path.end is End.REACHED else None,
+            path=path,
             bound=bound,
         )
 
@@ -171,17 +172,21 @@ class Assessor:
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
         if self.answer is None or not named or regime in ("aperiodic", "subharmonic"):
-            return spread, Balance(None), []
+            return spread, None, []
         respond, count = self.answer
-        found = balance(respond, count, self.linear, a, w, crossing.jacobian)
-        if found.solution is None:
-            return (
-                spread,
-                found,
-                [(2 if "no cycle" in found.reason or "reach" in found.reason else 1, found.reason)],
+        path = follow_path(respond, count, self.linear, a, w)
+        if path.end is End.MERGED:
+            other = "{:.4g} @ {:.4g} rad/s".format(*path.solution)
+            note = (
+                f"with {path.share:.0%} of its harmonics fed back it merges with the solution at {other}: with all of "
+                f"them neither is left"
             )
-        shift = abs(math.log(found.solution[0] / a)), abs(math.log(found.solution[1] / w))
-        return tuple(SAFETY * s + FLOOR for s in shift), found, []
+            return spread, path, [(2, note)]
+        if path.end is not End.REACHED:
+            return spread, path, [(2 if path.end is End.LEFT else 1, path.end.value)]
+        shift = [abs(math.log(path.solution[0] / a)), abs(math.log(path.solution[1] / w))]
+        notes = [(1, "it passes a fold as its harmonics are fed back")] if path.folds else []
+        return tuple(SAFETY * s + FLOOR for s in shift), path, notes
 
     def _neighbour(self, crossing, others) -> bool:
         step_a = np.diff(self.log_a).max(initial=0)

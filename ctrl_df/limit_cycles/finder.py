@@ -1,29 +1,36 @@
-"""Exact limit cycles: Newton on the event-located flow, with Floquet multipliers."""
+"""`find_limit_cycle`: where an exact orbit is sought, and what came of it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import control as ct
 import numpy as np
 
 from ..df.describing import describing_function
-from ..simulate.engine import Engine, Event
-from ..simulate.layout import AUX, KIND, MECHANISM, MODE
+from ..df.dispatch import method_for
+from ..simulate.engine import Engine
 from ..simulate.loop import answers_at_once
 from ..status import Status
+from .answer import responder
+from .closing import Centre, Closing, Merged, NoClosure
+from .fate import Explorer
 from .forced_start import harmonic_start
-from .monodromy import RTOL, Tracer
-from .orbit import Orbit
-from .swings import Swings, repeats
-from .symmetry import shift_directions, transverse
+from .linear import LinearPart
+from .orbit import NoOrbit, Orbit, Try
+from .path import End, Path, corrected_near, follow_path
+from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
 
-_STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
+# A prediction and an orbit within these factors of frequency and amplitude are taken for one cycle.
+SAME_CYCLE = (1.25, 2.0)
+_NEAR_MISS = 0.3  # mismatch of a lap, relative to the orbit, from which it is worth following
+_ENOUGH = 6  # swings from which an orbit can be judged
 
 
 def find_limit_cycle(
     loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False, **keywords
-):
+) -> Orbit | NoOrbit:
     """Find an exact periodic orbit of an autonomous loop (input r = 0).
 
     Parameters
@@ -32,20 +39,23 @@ def find_limit_cycle(
         From `closed_loop`, or any interconnection that `event_response` runs; with loops of one's own the
         first output is taken as the output and the last one as the block's input.
     guess : LimitCycle, Orbit, (amplitude, omega), state array, or None
-        Where to start. A prediction starts from the block's forced motion at its amplitude and frequency;
-        None searches from simulations of several sizes and returns the first orbit found, stable ones first.
+        Where to start. From a prediction, or an amplitude at the block's input and a frequency [rad/s], the
+        harmonics that the describing function drops are fed back little by little until none is missing, which
+        reaches unstable orbits as well as stable ones; a state is closed as it stands, then simulated. None
+        simulates from starts of several sizes, closes what they settle to and what stands between starts of
+        different fate, and returns the first orbit found, stable ones first.
     max_iterations : int
         Bound on Newton steps.
     search_time : float
         Longest simulation of the search [s]; by default some hundred swings.
     raise_on_failure : bool
-        Raise RuntimeError (with the best estimate as ``.orbit``) instead of returning an orbit whose status
-        says why.
+        Raise RuntimeError (with the answer as ``.orbit``) instead of returning a `NoOrbit`.
 
     Returns
     -------
-    Orbit or None
-        None if no orbit was found at all. Otherwise look at ``status`` and ``residual``.
+    Orbit or NoOrbit
+        An orbit whose ``note`` says if it is another one than the guess speaks of; or the false `NoOrbit`, whose
+        ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
 
     Raises
     ------
@@ -67,11 +77,12 @@ def find_limit_cycle(
         orbit = next(iter(sorted(found, key=lambda o: o.stable is not True)), None)
     else:
         orbit = finder.from_guess(guess)
-    if raise_on_failure and (orbit is None or not orbit.status.ok):
-        error = RuntimeError(str(orbit.status if orbit else Status.NOT_CONVERGED))
-        error.orbit = orbit  # type: ignore[attr-defined]
+    answer = orbit if orbit is not None else finder.none()
+    if raise_on_failure and (not answer or not answer.status.ok):
+        error = RuntimeError(str(answer) if not answer else str(answer.status))
+        error.orbit = answer  # type: ignore[attr-defined]
         raise error
-    return orbit
+    return answer
 
 
 class OrbitFinder:
@@ -79,6 +90,13 @@ class OrbitFinder:
 
     A sampled loop has no period of its own, one with a pure delay no finite state: both are followed until
     their swings repeat or the bound on work is hit, and averaged.
+
+    Attributes
+    ----------
+    tried : list of Try
+        What was tried since the last guess or search, and how each try ended.
+    merged : bool
+        Whether the last guess was shown to belong to no orbit.
     """
 
     def __init__(self, loop, max_iterations=40):
@@ -88,232 +106,240 @@ class OrbitFinder:
             )
         self.loop: Any = loop
         self.engine = Engine(loop)
-        self.tracer: Any = None if self.engine.delayed else Tracer(self.engine)
-        self.max_iterations = max_iterations
         self.parts: Any = getattr(loop, "parts", None)
         self.sampled = bool(getattr(self.parts, "dt", 0))
         self.by_simulation = self.sampled or self.engine.delayed
-        self.force_row = self.engine.noutputs - 1
+        self.closing: Any = None if self.engine.delayed else Closing(loop, self.engine, max_iterations)
         self.swings = Swings(loop, self.engine)
+        self.explorer = Explorer(self.swings, self._closed_from)
+        self.tried: list[Try] = []
+        self.merged = False
+        self.centre = False
+        self.missed = np.inf
+
+    def none(self) -> NoOrbit:
+        """Return the answer that nothing was found, with all that was tried."""
+        status = Status.NOT_FOUND
+        if self.merged:
+            status = Status.NO_SUCH_ORBIT
+        elif self.centre:
+            status = Status.CENTRE
+        return NoOrbit(status, tuple(self.tried))
+
+    # --- from a guess -------------------------------------------------------------------------------------
 
     def from_guess(self, guess) -> Orbit | None:
-        """Refine a guess; a loop that cannot be shot for is simulated from it instead."""
+        """Return the orbit that a guess leads to; None if to none."""
+        self.tried, self.merged, self.centre = [], False, False
         if isinstance(guess, Orbit):
-            if self.by_simulation:
-                return self._from_simulation(guess.states[:, 0])
-            return self._from_state(guess.states[:, 0], guess.period)
+            return self._from_orbit(guess)
         if isinstance(guess, np.ndarray) and guess.shape == (self.engine.nstates,):
-            return self._from_simulation(guess)
+            return self._from_state(guess)
         amplitude, omega = _amplitude_omega(guess, self.engine.nstates)
+        told = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
+        if self.by_simulation:
+            return self._simulated(self._start(guess, amplitude, omega), "the prediction")[0]
+        others: list[Orbit] = []
+        # the path's own orbit is the guess's, however far its harmonics have moved it
+        for name, path in self._paths(guess, amplitude, omega):
+            orbit = self._closed_path(path, name)
+            if orbit is not None and self._belongs(orbit, path):
+                return self._noted(orbit, amplitude, omega, told)
+            others += [orbit] if orbit is not None else []
+        if self.merged and not any(_near(o, amplitude, omega) for o in others):
+            return None
+        start = self._start(guess, amplitude, omega)
+        orbit = self._closed(start, 2 * np.pi / omega, "the block's forced motion")
+        others += [orbit] if orbit is not None else []
+        if not any(_near(o, amplitude, omega) for o in others):
+            orbit = self._simulated(start, "a simulation from there")[0]
+            others += [orbit] if orbit is not None else []
+        if not others:
+            return None
+        return self._noted(min(others, key=lambda o: _distance(o, amplitude, omega)), amplitude, omega, told)
+
+    def _from_orbit(self, guess):
+        start = guess.states[:, 0]
+        if self.by_simulation:
+            return self._simulated(start, "the orbit given")[0]
+        orbit = self._closed(start, guess.period, "the orbit given")
+        return orbit if orbit is not None else self._simulated(start, "a simulation from it")[0]
+
+    def _from_state(self, x0):
+        """Close the orbit that a state stands on or near; else what a simulation from it comes to."""
+        if self.by_simulation:
+            return self._simulated(x0, "the state given")[0]
+        for period in self._returns(x0):
+            orbit = self._closed(x0, period, f"the state given, period {period:.5g} s")
+            if orbit is not None:
+                return orbit
+        return self._simulated(x0, "a simulation from the state given")[0]
+
+    def _returns(self, x0, most=4):
+        """Times after which a simulation from a state comes near it again, nearest first."""
+        course = self.swings.follow(x0, 4, until_repeated=False)
+        span = course.laps[-1].time if course.laps else self.swings.stride
+        times = np.linspace(0.0, span, 4097)
+        run = self.engine.run(self.engine.start(x0), span, times=times, rtol=1e-9, log=1)
+        states = run.states[: run.recorded]
+        size = np.maximum(np.max(np.abs(states[np.isfinite(states).all(axis=1)]), axis=0), 1e-300)
+        apart = np.max(np.abs(states - x0) / size, axis=1)
+        lows = np.flatnonzero((apart[1:-1] <= apart[:-2]) & (apart[1:-1] < apart[2:])) + 1
+        gone = np.flatnonzero(apart > 0.1)
+        lows = lows[(lows > (gone[0] if gone.size else len(times))) & (apart[lows] < 0.5)]
+        return [float(times[k]) for k in lows[np.argsort(apart[lows])][:most]]
+
+    def _paths(self, guess, amplitude, omega):
+        """Waveforms that a guess leads to as its harmonics are fed back, one after the other."""
+        path = getattr(guess, "path", None)
+        if path is not None:
+            yield "its path", path
+        elif self.parts is not None and not getattr(guess, "branch", ""):
+            answer, linear = self._answer()
+            if answer is None:
+                return
+            respond, count = answer
+            path = follow_path(respond, count, linear, amplitude, omega)
+            if path.end is not End.REACHED:
+                # no prediction stands at an arbitrary guess: to all its harmonics at once
+                direct = corrected_near(respond, count, linear, amplitude, omega)
+                if direct is not None:
+                    yield "harmonic balance from the guess", direct
+            yield "its path", path
+
+    def _answer(self):
+        block = self.parts.block
+        fed_back = self.loop.output_labels[0]
+        output = fed_back if fed_back in getattr(block, "output_labels", ()) else None
+        return responder(block, method_for(block, output)), LinearPart(self.parts.controller)
+
+    def _closed_path(self, path: Path, name):
+        if path.end is End.MERGED:
+            self.merged = True
+            a, w = path.solution
+            self.tried.append(
+                Try(name, f"it merges with the prediction at {a:.5g} @ {w:.5g} rad/s once {path.share:.0%} of the "
+                    "harmonics are fed back")
+            )  # fmt: skip
+            return None
+        if path.end is not End.REACHED:
+            self.tried.append(Try(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)"))
+            return None
+        start, period = harmonic_start(self.loop, path.waveform, path.omega), 2 * np.pi / path.omega
+        orbit = self._closed(start, period, name)
+        if orbit is None and self.missed < _NEAR_MISS:
+            orbit = self._closed(start, period, "the mismatch after a lap, let shrink", trace=True)
+        return orbit
+
+    def _belongs(self, orbit, path) -> bool:
+        """Whether the orbit closed from the end of a path is the path's own."""
+        return _near(orbit, *path.solution, (1.1, 1.3))
+
+    def _start(self, guess, amplitude, omega):
         wanted = getattr(guess, "output_amplitude", None)
         if wanted is None and self.parts is not None:
             gain = abs(complex(describing_function(self.parts.block, amplitude, omega)))
             wanted = gain * amplitude if np.isfinite(gain) else None
-        motion = getattr(guess, "motion", None)
-        start = harmonic_start(self.loop, amplitude, omega, wanted, motion)
-        if self.by_simulation:
-            return self._from_simulation(start)
-        orbit = self._from_state(start, 2 * np.pi / omega)
-        better, waveform = getattr(guess, "corrected", None), getattr(guess, "waveform", None)
-        if orbit is None and better is not None and waveform is not None:
-            orbit = self._from_state(harmonic_start(self.loop, waveform, better[1]), 2 * np.pi / better[1])
-        return orbit if orbit is not None else self._from_simulation(start)
+        return harmonic_start(self.loop, amplitude, omega, wanted, getattr(guess, "motion", None))
+
+    def _noted(self, orbit, amplitude, omega, told):
+        if _near(orbit, amplitude, omega):
+            return orbit
+        return replace(
+            orbit,
+            note=f"the guess ({told}) led to another orbit: amplitude {orbit.amplitude:.5g}, omega "
+            f"{orbit.omega:.5g} rad/s",
+        )
+
+    # --- without a guess ----------------------------------------------------------------------------------
 
     def search(self, search_time=None) -> list[Orbit]:
-        """Orbits that simulations from kicks of many sizes end on."""
-        found: list[Orbit] = []
-        irregular: list[Orbit] = []
-        for x0 in self.swings.kicks:
-            orbit = self._from_simulation(x0, search_time)
-            if orbit is None:
-                continue
-            known, tolerance = (found, 1e-4) if orbit.status.ok else (irregular, 2e-2)
-            if not any(orbit.same_as(o, tolerance) for o in known):
-                known.append(orbit)
+        """Orbits that simulations from starts of many sizes end on, and those between different fates."""
+        self.tried, self.merged, self.centre = [], False, False
+        fate = self.explorer.explore(search_time, edges=not self.by_simulation)
+        self.tried += [
+            Try(f"rest, displaced: {row.size:.3g} {self.swings.kicks.unit}", row.told) for row in fate
+        ]
+        found = [o for o in fate.orbits if o.status.ok]
         # averages over irregular motion are an answer only where nothing repeats
-        return found or irregular[:1]
+        return found or fate.orbits[:1]
 
-    def _from_simulation(self, x0, search_time=None, swings=1000) -> Orbit | None:
-        """Follow the loop until its swings repeat, or to the bound; then refine."""
-        laps = self.swings.follow(x0, swings, search_time)
-        if len(laps) < 6:
+    def _closed_from(self, x0, course, complete=True) -> Orbit | None:
+        """Orbit that a course comes near: closed where it can be, else an average where it is sustained."""
+        laps = course.laps
+        if len(laps) < _ENOUGH or course.fate in (RESTS, DIVERGES):
             return None
-        times, states, peaks = (np.array(column) for column in zip(*laps, strict=True))
-        if peaks[-1] < 1e-6 * peaks.max() or not np.all(np.isfinite(states[-1])):
+        if not np.all(np.isfinite(laps[-1].state)):
             return None
         if self.by_simulation:
-            return self._averaged(x0, laps) if repeats(laps, self.swings.tight) or _sustained(peaks) else None
-        size = np.maximum(np.abs(states[-12:]).max(axis=0), 1e-12)
-        size = np.maximum(size, 1e-6 * np.max(size))
+            settled = course.fate == CYCLES or course.fate == UNDECIDED
+            return self._averaged(x0, laps, self.swings.repeats(laps)) if settled else None
+        orbit = self._closed_laps(laps)
+        if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= 1000:
+            return self._averaged(x0, laps, False)
+        return orbit
+
+    def _closed_laps(self, laps):
+        """Close the orbit that a course's passages come nearest to repeating, after one lap or a few."""
+        recent = laps[-12:]
+        size = np.maximum(np.max(np.abs([lap.state for lap in recent]), axis=0), 1e-6 * self.swings.units)
         for laps_per_period in range(1, 5):
-            change = float(np.max(np.abs(states[-1] - states[-1 - laps_per_period]) / size))
-            if change > 0.5:
+            apart = [
+                float(np.max(np.abs(recent[k].state - recent[k - laps_per_period].state) / size))
+                for k in range(laps_per_period, len(recent))
+            ]
+            if not apart:
                 continue
-            orbit = self._from_state(states[-1], times[-1] - times[-1 - laps_per_period])
-            if orbit is not None and orbit.status.ok and orbit.output_amplitude > 1e-6 * np.max(size):
-                return orbit
-        return self._averaged(x0, laps) if len(laps) >= swings and _sustained(peaks) else None
+            k = int(np.argmin(apart)) + laps_per_period
+            if apart[k - laps_per_period] > 0.5:
+                continue
+            try:
+                return self.closing.close(recent[k].state, recent[k].time - recent[k - laps_per_period].time)
+            except Centre:
+                self.centre = True
+            except NoClosure:
+                pass
+        return None
 
-    # --- refinement ---------------------------------------------------------------------------------------
+    def _simulated(self, x0, name, search_time=None):
+        """Follow the loop from a start; close what it comes to. Returns (orbit or None, course)."""
+        course = self.swings.follow(x0, 1000, search_time)
+        orbit = self._closed_from(x0, course)
+        words = {RESTS: "comes to rest", DIVERGES: "diverges", CYCLES: "repeats"}.get(
+            course.fate, "no period"
+        )
+        if orbit is not None:
+            words = f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s"
+        self.tried.append(Try(name, words))
+        return orbit, course
 
-    def _from_state(self, x0, period) -> Orbit | None:
-        """Newton from a state near the orbit and an estimate of the period."""
-        start, size = self._free_state(np.array(x0, float), period)
-        if start is None:
+    def _closed(self, start, period, name, trace=False) -> Orbit | None:
+        try:
+            orbit = (self.closing.trace if trace else self.closing.close)(start, period)
+        except NoClosure as why:
+            self.centre = self.centre or isinstance(why, Centre)
+            self.merged = self.merged or isinstance(why, Merged)
+            self.missed = why.mismatch
+            self.tried.append(Try(name, str(why)))
             return None
-        status, best, grown = Status.NOT_CONVERGED, np.inf, 0
-        lap = beside = None
-        for _ in range(self.max_iterations):
-            lap = self.tracer.lap(start, period, size=size)
-            if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
-                return None
-            if beside is None:
-                # shifts that the loop does not notice: an orbit closes up to them
-                free = shift_directions(self.tracer, lap.segments, size)
-                beside = np.eye(self.tracer.n) - free @ free.T
-            residual = beside @ ((lap.end.x - start.x) / size)
-            mismatch = float(np.max(np.abs(residual)))
-            if mismatch < 3e-10:
-                status = Status.CONVERGED
-                break
-            if mismatch > 0.9 * best:
-                grown += 1
-                if grown > 6:
-                    break
-            best = min(best, mismatch)
-            f_end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
-            f_start = self.tracer.rate(start.time, start.x, start.mode)
-            n = self.tracer.n
-            system = np.zeros((n + 1, n + 1))
-            scale = np.append(size, period)
-            system[:n, :n] = lap.monodromy - np.eye(n)
-            system[:n, n] = f_end
-            system[n, :n] = f_start / size**2
-            system = system * scale / np.append(size, 1.0)[:, None]
-            system[:n] = beside @ system[:n]
-            change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=1e-12)[0]
-            shorten = min(1.0, 0.3 / max(float(np.max(np.abs(change))), 1e-300))
-            step = shorten * change * scale
-            period += step[n]
-            if period <= 0:
-                return None
-            start = self._rebuilt(start, start.x + step[:n])
-            if start is None:
-                return None
-        if lap is None or np.max(np.abs(start.x)) < 1e-9 * np.max(size) or self._at_rest(start, lap):
-            return None
-        if status is not Status.CONVERGED and best > 1e-7:
-            return None
-        lap, period = self._single(start, period, lap, size, beside)
-        return self._finished(start, period, lap, size, Status.CONVERGED if best < 1e-7 else status)
-
-    def _single(self, start, period, lap, size, beside):
-        """Return the lap and period of an orbit that may have been closed after going round several times."""
-        for parts in (4, 3, 2):
-            short = self.tracer.lap(start, period / parts, differentiate=False)
-            if short.status.ok and np.max(np.abs(beside @ ((short.end.x - start.x) / size))) < 1e-7:
-                return self.tracer.lap(start, period / parts, size=size), period / parts
-        return lap, period
-
-    def _free_state(self, x0, period) -> tuple[Any, Any]:
-        """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
-        state = self.engine.start(x0)
-        lap = self.tracer.lap(state, period, differentiate=False)
-        if not lap.status.ok or not lap.segments:
-            return None, None
-        size = np.max(np.abs([s.start.x for s in lap.segments] + [lap.end.x]), axis=0)
-        times = np.linspace(0, period, 65)[1:]
-        run = self.engine.run(self.engine.start(x0), period, times=times, rtol=1e-8, log=1)
-        size = np.maximum(size, np.nanmax(np.abs(run.states), axis=0))
-        size = np.maximum(size, 1e-9 * np.max(size))
-        constraints = [self._constraints(s.start.mode) for s in lap.segments]
-        least = min(constraints)
-        length, k = max((s.length, i) for i, s in enumerate(lap.segments) if constraints[i] == least)
-        begin = lap.segments[k].start
-        middle = self.engine.run(begin, begin.time + 0.5 * length, rtol=RTOL, locate=False, log=1).state
-        middle.time, middle.mode = 0.0, begin.mode.copy()
-        middle.fresh = True
-        return self.tracer.settle(middle), size
-
-    def _constraints(self, mode):
-        """Count the constraints active in a mode: stuck bodies, closed impact joints, walls."""
-        count = 0
-        program = self.engine.program
-        for node in program.nodes:
-            if node[KIND] == MECHANISM:
-                m = mode[node[MODE] : node[MODE] + 4]
-                bodies = program.ints[node[AUX]]
-                count += (
-                    int(m[0] == 0) + (int(m[1] == 0) if bodies == 2 else 0) + int(m[2] != 0) + int(m[3] != 0)
-                )
-        return count
-
-    def _at_rest(self, start, lap):
-        """Whether Newton ended on an equilibrium, which is periodic with any period."""
-        speed = np.abs(self.tracer.rate(start.time, start.x, start.mode))
-        moved = np.max([np.abs(s.start.x - start.x) for s in lap.segments], axis=0)
-        return bool(np.max(speed) < 1e-9 * (1e-3 + np.max(np.abs(start.x)))) and bool(np.max(moved) < 1e-9)
-
-    def _rebuilt(self, start, x):
-        """Return the moved start in freshly settled modes: rigid joints closed, within gaps and stops."""
-        state = self.tracer.settle(self.engine.start(self.feasible(x)))
-        return state if np.all(np.isfinite(state.x)) else None
+        self.tried.append(Try(name, f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s"))
+        return orbit
 
     def feasible(self, x):
         """Return the nearest state with rigid joints closed, within gaps and stops."""
-        core = getattr(self.parts.block, "core", None) if self.parts is not None else None
-        x = np.array(x, dtype=float)
-        if core is None:
-            return x
-        o = self.loop.syslist[0].nstates or 0
-        if core.stop is not None:
-            at = o + 2 * core.driven
-            x[at] = np.clip(x[at], *core.stop.span)
-        if core.joint == "rigid":
-            x[o : o + 2] = x[o + 2 : o + 4]
-        elif core.joint == "impact":
-            x[o + 2] = x[o] + np.clip(x[o + 2] - x[o], 0.0, core.gap)
-        return x
+        return np.array(x, float) if self.closing is None else self.closing.feasible(x)
 
-    def _finished(self, start, period, lap, size, status) -> Orbit | None:
-        times = np.linspace(0.0, period, 1025)
-        omega = 2 * np.pi / period
-        spectrum = np.zeros((self.engine.noutputs, 2), complex)
-        run = self.engine.run(
-            start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
-        )
-        if np.max(np.ptp(run.states, axis=0) / size) < _STILL:
-            return None  # an equilibrium, periodic with any period
-        # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
-        across = transverse(shift_directions(self.tracer, lap.segments, size))
-        carried = across.T @ (lap.monodromy * size / size[:, None]) @ across
-        values = np.linalg.eigvals(carried)
-        trivial = int(np.argmin(np.abs(values - 1.0)))
-        floquet = np.delete(values, trivial)
-        floquet = floquet[np.argsort(-np.abs(floquet))]
-        residual = float(np.max(np.abs(across.T @ ((lap.end.x - start.x) / size))))
-        events, t = [], 0.0
-        for s in lap.segments:
-            t += s.length
-            if s.event:
-                events.append(Event(t, s.node, s.event))
-        amplitudes = 2 * np.abs(spectrum[:, 1]) / period
-        return Orbit(
-            omega, period, float(amplitudes[self.force_row]), float(amplitudes[0]), floquet,
-            bool(np.all(np.abs(floquet) < 1.0)), residual, tuple(events), status, lap.grazing, times,
-            run.outputs.T, run.states.T, self.loop,
-        )  # fmt: skip
+    # --- averages -----------------------------------------------------------------------------------------
 
-    def _averaged(self, x0, laps, swings=40) -> Orbit | None:
+    def _averaged(self, x0, laps, settled, swings=40) -> Orbit | None:
         """Average over the swings after a transient, for motions that are followed only.
 
         The amplitude is that of the signal the block sees. A block that acts in continuous time sees the held
         steps of a sampled controller; a law without time sees their values alone, the sequence that the
         prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
         """
-        settled = repeats(laps, self.swings.tight)
         begin = self.engine.run(self.swings.start(x0), laps[-1].time, rtol=1e-8, log=1).state
-        later = self.swings.follow(begin, min(swings, len(laps)), until_repeated=False)
+        later = self.swings.follow(begin, min(swings, len(laps)), until_repeated=False).laps
         count = len(later) - 1
         if count < 4:
             return None
@@ -332,17 +358,20 @@ class OrbitFinder:
             amplitudes = amplitudes / np.sinc(omega * self.parts.dt / (2 * np.pi))
         exact = settled and self.engine.delayed and not self.sampled
         return Orbit(
-            omega, period, float(amplitudes[self.force_row]), float(amplitudes[0]), np.zeros(0, complex),
+            float(omega), float(period), float(amplitudes[-1]), float(amplitudes[0]), np.zeros(0, complex),
             True if exact else None, np.nan, tuple(self.engine.name_events(run.events))[:200],
             Status.CONVERGED if exact else Status.NO_PERIOD, np.nan, times - t0, run.outputs.T, run.states.T,
             self.loop,
         )  # fmt: skip
 
 
-def _sustained(peaks) -> bool:
-    """Whether swings that do not repeat keep their size, rather than being on their way to rest, or away."""
-    half = len(peaks) // 2
-    return bool(0.8 < np.mean(peaks[half:]) / np.mean(peaks[:half]) < 1.25)
+def _near(orbit, amplitude, omega, factors=SAME_CYCLE) -> bool:
+    ratio_w, ratio_a = orbit.omega / omega, orbit.amplitude / amplitude
+    return max(ratio_w, 1 / ratio_w) <= factors[0] and max(ratio_a, 1 / ratio_a) <= factors[1]
+
+
+def _distance(orbit, amplitude, omega) -> float:
+    return abs(np.log(orbit.omega / omega)) + 0.5 * abs(np.log(orbit.amplitude / amplitude))
 
 
 def _amplitude_omega(guess, nstates):

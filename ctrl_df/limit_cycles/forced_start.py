@@ -8,8 +8,11 @@ import control as ct
 import numpy as np
 
 from ..df.describing import describing_function
+from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
+from .answer import responder
+from .waveform import WaveformOrbit
 
 _PERIODS = 40  # of forced motion before it is measured
 
@@ -48,6 +51,12 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, mo
     if nc and isinstance(controller, ct.StateSpace | Sampled):
         held = isinstance(controller, Sampled)
         a, b = controller.sampled[:2] if held else (np.asarray(controller.A), np.asarray(controller.B))
+        if (
+            len(U) > 2
+            and abs(Y[0]) > 1e-9 * np.abs(Y).max()
+            and np.linalg.matrix_rank(a - held * np.eye(len(a))) == len(a)
+        ):
+            x_control[: len(a)] = np.linalg.solve(held * np.eye(len(a)) - a, b[:, 0] * -Y[0].real)
         for k in range(1, len(Y)):
             inputs = np.array([-Y[k], 1j * k * omega * Y[k]])[: controller.ninputs]
             z = np.exp(1j * k * omega * loop.parts.dt) if held else 1j * k * omega
@@ -59,6 +68,11 @@ def _forced_motion(loop, U, omega, wanted):
     """State of the block alone at t = 0 under the guessed input, its mean position removed, and its Y_k."""
     block, amplitude = loop.parts.block, abs(U[1])
     if not block.nstates:
+        if len(U) > 2:
+            answer = responder(block, method_for(block))
+            Y = None if answer is None else answer[0](U, omega)
+            if Y is not None:
+                return np.zeros(0), Y
         return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])
     engine = Engine(block)
     core = getattr(block, "core", None)
@@ -78,6 +92,10 @@ def _forced_motion(loop, U, omega, wanted):
                     -core.masses[1] / core.masses[0] * x[3]
                 )  # no net momentum: the pair must not drift away
                 starts.append(x)
+    if len(U) > 2:  # a waveform comes from a known motion, which may repel: closed, not waited for
+        solver = WaveformOrbit(block, loop.output_labels[0])
+        if solver.respond(U, omega) is not None and solver.previous is not None:
+            return _measured(engine, core, row, solver.previous, U, omega)
     found = [_forced_from(engine, core, row, x, U, omega) for x in starts]
     if wanted is not None:
         return min(found, key=lambda f: abs(abs(f[1][1]) - wanted))
@@ -86,14 +104,24 @@ def _forced_motion(loop, U, omega, wanted):
 
 def _forced_from(engine, core, row, x0, U, omega):
     drive, period = harmonic_drive([U], omega), 2 * np.pi / omega
-    options = dict(rtol=1e-8, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=400_000)
-    state = engine.run(engine.start(x0), _PERIODS * period, drive, **options).state
-    if not np.all(np.isfinite(state.x)):
+    run = engine.run(engine.start(x0), _PERIODS * period, drive, **_options(period, U))
+    if not np.all(np.isfinite(run.state.x)):
         return np.zeros(engine.nstates), np.zeros(2, complex)
+    return _measured(engine, core, row, run.state, U, omega)
+
+
+def _options(period, U):
+    return dict(rtol=1e-8, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=400_000)
+
+
+def _measured(engine, core, row, state, U, omega):
+    """State of a periodic motion at t = 0, its mean position removed, and the harmonics of its output."""
+    drive, period = harmonic_drive([U], omega), 2 * np.pi / omega
+    state = state.copy()
     state.time, state.fresh = 0.0, True
     spectrum = np.zeros((engine.noutputs, len(U)), complex)
     ends = np.array([0.0, period])
-    run = engine.run(state, period, drive, ends, spectrum=spectrum, omega=omega, **options)
+    run = engine.run(state, period, drive, ends, spectrum=spectrum, omega=omega, **_options(period, U))
     x, Y = run.state.x.copy(), 2 * spectrum[row] / period
     drift = run.outputs[-1, row] - run.outputs[0, row]
     k = np.arange(1, len(U))

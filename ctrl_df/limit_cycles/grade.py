@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .path import Path
+
 TRUSTED, DOUBTFUL, UNRELIABLE = "trusted", "doubtful", "unreliable"
 
 # Thresholds of the grades; benchmarks of tests/problems.py stand behind them.
@@ -66,10 +68,10 @@ class LimitCycle:
         The reason, a sentence.
     regime : str
         What the block does there.
-    waveform : ndarray of complex or None
-        Fourier coefficients k = 0, 1, ... of the block's input on that corrected cycle.
+    path : Path or None
+        The way from this solution to the cycle with all its harmonics, where the block's answer to them is known.
     corrected : tuple of float or None
-        (amplitude, omega) with the fed-back harmonics taken into account, for memoryless blocks.
+        (amplitude, omega) with the fed-back harmonics taken into account, where that path leads so far.
     bound : tuple or None
         ((a low, a high), (omega low, omega high)) proven after Mees & Bergen, where the theorem applies.
     branch : str
@@ -94,7 +96,7 @@ class LimitCycle:
     why: str
     regime: str = ""
     corrected: tuple[float, float] | None = None
-    waveform: np.ndarray | None = field(default=None, repr=False, compare=False)
+    path: Path | None = field(default=None, repr=False, compare=False)
     bound: tuple[tuple[float, float], tuple[float, float]] | None = None
     branch: str = ""
     forced_multiplier: float = math.nan

@@ -20,6 +20,8 @@ from ..simulate.flow import rates
 from ..status import Status
 
 RTOL = 1e-11
+_REACH = 1e-6  # of a lap: the time over which rates of inputs are taken
+_TOLD = 1e-7  # of what the other states move a state by in a lap: a size below that is rounding
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class Tracer:
         self.n = engine.nstates
         self._work, *_ = driver.workspace(engine.program)
         self._g = np.zeros(int(engine.program.ints[layout.H_NG]) + 1)
+        self._reach = 1e-9  # [s], set by every lap
 
     def settle(self, state: State) -> State:
         """Return the state with its modes in line (no time passes)."""
@@ -65,18 +68,31 @@ class Tracer:
         rates(self.engine.program, self.drive, 0, t, x, mode, self._work, dx, self._g, margins)
         if margins and self.engine.program.ints[layout.H_TRACK]:
             driver.margins(
-                self.engine.program, self.drive, 0, t, x, mode, self._work, dx, self._g, 1e-6, -1, 0.0, 1
+                self.engine.program,
+                self.drive,
+                0,
+                t,
+                x,
+                mode,
+                self._work,
+                dx,
+                self._g,
+                self._reach,
+                -1,
+                0.0,
+                1,
             )
         return (dx, self._g.copy()) if margins else dx
 
     def lap(self, state: State, length: float, differentiate: bool = True, size=None) -> Period:
         """Follow the orbit for `length` seconds from `state`."""
         t_end = state.time + length
+        self._reach = _REACH * length
         now = self.settle(state) if state.fresh else state.copy()
         phi = np.eye(self.n)
         segments, grazing = [], 1.0
         status = Status.CONVERGED
-        size = np.maximum(np.abs(now.x), 1e-9) if size is None else size
+        size = self.sizes(now, length, np.abs(now.x)) if size is None else size
         while now.time < t_end:
             if len(segments) >= self.max_events:
                 status = Status.WORK_LIMIT
@@ -102,6 +118,32 @@ class Tracer:
             segments.append(Segment(now, span, kind, node, saltation))
             now = run.state
         return Period(now, phi, tuple(segments), status, grazing)
+
+    def sizes(self, state: State, length: float, largest) -> np.ndarray:
+        """Sizes of the states on an orbit, none smaller than what the others could tell apart.
+
+        A state that ought to be zero is rounding; its scale is what the other states move it by in a lap.
+
+        Parameters
+        ----------
+        state : State
+            A point of the orbit.
+        length : float
+            Of a lap [s].
+        largest : (n,) array
+            Largest absolute values met.
+        """
+        size = np.array(largest, float)
+        here = self.rate(state.time, state.x, state.mode)
+        slope = np.zeros((self.n, self.n))
+        for j in np.flatnonzero(size):
+            x = state.x.copy()
+            x[j] += 1e-4 * size[j]
+            slope[:, j] = np.abs(self.rate(state.time, x, state.mode) - here) / 1e-4
+        told = _TOLD * length * np.where(np.isfinite(slope), slope, 0.0).sum(axis=1)
+        size = np.maximum(size, np.maximum(told, _TOLD * length * np.abs(here)))
+        size[size == 0.0] = 1.0  # a state that is zero throughout may be measured by anything
+        return size
 
     def _owner(self, margin):
         for i, node in enumerate(self.engine.program.nodes):
@@ -140,7 +182,7 @@ class Tracer:
                 values.append(self.rate(t, x, mode, margins=True)[1][margin])
             normal[j] = (values[0] - values[1]) / (2 * h)
         # rate of the margin along the flow, its own dependence on time included
-        h = 1e-6 * max(np.min(size / np.maximum(np.abs(f_minus), 1e-300)), 1e-9)
+        h = 1e-6 * np.min(size / np.maximum(np.abs(f_minus), 1e-300))
         ahead = self.rate(t + h, before + h * f_minus, mode, margins=True)[1][margin]
         behind = self.rate(t - h, before - h * f_minus, mode, margins=True)[1][margin]
         speed = (ahead - behind) / (2 * h)
@@ -172,7 +214,18 @@ class Tracer:
         slot = run.margin - int(program.nodes[node, layout.G])
         rates(program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, False)
         modes.event(
-            program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, node, slot, 1e-10,
-            1e-6,
+            program,
+            self.drive,
+            0,
+            run.state.time,
+            x,
+            mode,
+            self._work,
+            dx,
+            self._g,
+            node,
+            slot,
+            1e-10,
+            self._reach,
         )
         return x

@@ -1,9 +1,9 @@
-"""An exact limit cycle as a value."""
+"""An exact limit cycle as a value, and the answer where none was found."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import control as ct
 import numpy as np
@@ -30,7 +30,8 @@ class Orbit:
         Multipliers without the trivial ones (a shift in time, and of a position that nothing feels), largest
         first; zeros where sticking or contact lose a direction.
     stable : bool or None
-        All multipliers inside the unit circle; None where they are not known (sampled loops).
+        All multipliers inside the unit circle; None where they are not known (sampled loops), or where one
+        stands on the circle.
     residual : float
         Mismatch after one period relative to the size of the orbit, a drift of free positions left out.
     events : tuple of Event
@@ -41,6 +42,8 @@ class Orbit:
         How squarely the events are crossed, 1 to 0; near 0 the multipliers are not to be trusted.
     time, outputs, states : ndarray
         One period, sampled; outputs (ny, nt), states (n, nt).
+    note : str
+        Empty, or that the guess led to another orbit than the one it speaks of.
     """
 
     omega: float
@@ -57,6 +60,7 @@ class Orbit:
     outputs: np.ndarray = field(repr=False)
     states: np.ndarray = field(repr=False)
     loop: Any = field(repr=False, default=None)
+    note: str = ""
 
     @property
     def peak(self) -> float:
@@ -81,3 +85,36 @@ class Orbit:
     def plot(self, **keywords) -> ct.ControlPlot:
         """Draw one period of outputs and the phase portrait."""
         return draw("orbit", self, **keywords)
+
+
+class Try(NamedTuple):
+    """Where an orbit was sought, and what came of it, in words."""
+
+    start: str
+    outcome: str
+
+
+@dataclass(frozen=True)
+class NoOrbit:
+    """The answer of a search that found no periodic orbit; false where a truth value is asked.
+
+    Attributes
+    ----------
+    status : Status
+        NOT_FOUND: nothing was reached, which proves nothing. NO_SUCH_ORBIT: the prediction was shown to belong
+        to no orbit. CENTRE: motions of every size repeat, none of them a limit cycle.
+    tried : tuple of Try
+        Every start, and what it came to.
+    """
+
+    status: Status
+    tried: tuple[Try, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Return False."""
+        return False
+
+    def __str__(self) -> str:
+        """Return the status, then a line for each try."""
+        lines = [f"no orbit: {self.status}"]
+        return "\n".join(lines + [f"  from {t.start}: {t.outcome}" for t in self.tried])

@@ -1,37 +1,62 @@
-"""A loop simulated from kicks of many sizes, swing by swing: the search for cycles without a guess."""
+"""A loop simulated from a start, swing by swing, to see what becomes of it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import control as ct
 import numpy as np
 
-from ..blocks.core import level
 from ..blocks.element import Element
 from ..simulate import driver
 from ..simulate.engine import Engine, State
 from ..simulate.layout import DELAY, H_OUT, KIND, X
-from ..simulate.sampled import Sampled
+from .kicks import Kicks
 
 _WORK = 300_000  # integration steps of one simulation
 _FEW = 12  # swings within that work, below which it is no use
 _QUIET = 40  # strides without a passage after which a loop is called at rest
 _DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
+_PEEKS = 129  # in a stride of about four swings, from which its peaks are read
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
-_GONE = 1e4  # times the largest kick: a loop beyond it has run away
+_FAINT = 1e-6  # of the highest peak met, below which swings count as rest
+_GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
+_STEADY = 1.05  # change of the swings over the second half of a course, below which they keep their size
+
+RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"
 
 
 class Lap(NamedTuple):
-    """An upward passage of the signal watched: when, in which state, and the largest state there."""
+    """An upward passage of the signal watched: when, in which state, and its peak in the lap before."""
 
     time: float
     state: np.ndarray
     peak: float
 
 
+@dataclass
+class Course:
+    """What became of one start.
+
+    Attributes
+    ----------
+    laps : list of Lap
+    fate : str
+        ``rests``, ``cycles`` (the passages repeat), ``diverges``, or ``undecided`` within the bound on work.
+    growth : float
+        Change of the swings over the second half, a ratio; nan with too few of them.
+    state : State
+        Where it ended.
+    """
+
+    laps: list[Lap]
+    fate: str
+    growth: float
+    state: State
+
+
 class Swings:
-    """Simulations of one loop from starts of its own choice.
+    """Simulations of one loop.
 
     The signal watched is the loop's first output; where the block is an element, whose output may jump or
     rest, it is the block's input.
@@ -56,12 +81,37 @@ class Swings:
         )  # a held input steps: no passage to locate
         ints = engine.program.ints
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
-        self.kicks = list(self._kicks())
-        self._farthest = _GONE * max(float(np.max(np.abs(x), initial=0.0)) for x in self.kicks)
+        self.kicks = Kicks(loop, engine)
+        self.stride = 20 * np.pi / self.kicks.pace  # ten swings at the loop's own pace
+        self._units: np.ndarray | None = None
+        self._unit = 1.0
 
-    def follow(
-        self, start, count: int, longest: float | None = None, until_repeated: bool = True
-    ) -> list[Lap]:
+    @property
+    def units(self) -> np.ndarray:
+        """What each state is measured in: the largest it becomes in the first swing from the largest kick."""
+        self._measure()
+        return self._units  # pyright: ignore[reportReturnType]
+
+    def _measure(self):
+        if self._units is not None:
+            return
+        x0 = self.kicks.all()[-1][1]
+        times = np.linspace(0.0, 0.1 * self.stride, 129)
+        run = self.engine.run(self.start(x0), times[-1], times=times, rtol=1e-6, log=1, max_steps=50_000)
+
+        def largest(values):
+            seen = np.abs(values[: max(run.recorded, 1)])
+            return np.where(np.isfinite(seen), seen, 0.0).max(axis=0)
+
+        states, swing = largest(run.states), float(largest(run.outputs)[self.row])
+        self._units = np.where(states > 0, states, max(float(states.max(initial=0.0)), 1e-300))
+        self._unit = swing if swing > 0 else 1.0
+
+    def size(self, x) -> float:
+        """Largest state in units of the loop."""
+        return float(np.max(np.abs(x) / self.units, initial=0.0))
+
+    def follow(self, start, count: int, longest: float | None = None, until_repeated: bool = True) -> Course:
         """Upward passages from a start on, until they repeat, the loop rests, or the bound on work is hit.
 
         Parameters
@@ -77,30 +127,41 @@ class Swings:
 
         Returns
         -------
-        list of Lap
-            Empty if the loop runs away, or spends all its work within a few swings.
+        Course
+            Without laps if all work is spent within a few swings.
         """
         state = start if isinstance(start, State) else self.start(start)
-        laps, quiet, work, largest = [], 0, 0, float(np.max(np.abs(state.x), initial=0.0))
+        laps: list[Lap] = []
+        quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
-        bound = max(self._farthest, _GONE * float(np.max(np.abs(state.x), initial=0.0)))
+        bound = _GONE * max(1.0, largest)
         stride = self._by_samples if self.held else self._by_passage
+        fate = ""
         while len(laps) < count and state.time < limit and quiet <= _QUIET and work <= _WORK:
             run, found = stride(state, laps, limit)
             state, work = run.state, work + run.steps
-            if not run.status.ok or not np.max(np.abs(state.x)) < bound:
-                return []
+            if not run.status.ok or not self.size(state.x) < bound:
+                return Course(laps, DIVERGES, np.inf, state)
             laps += found
             quiet = 0 if found else quiet + 1
-            size = float(np.max(np.abs(state.x), initial=0.0))
+            highest = max([highest, *(lap.peak for lap in found)])
+            if found and laps[-1].peak < _FAINT * highest:
+                fate = RESTS
+                break
+            size = self.size(state.x)
             largest = max(largest, size)
             if quiet and size < _DEAD * largest:
+                fate = RESTS
                 break
-            if until_repeated and len(laps) > 12 and repeats(laps, self.tight):
+            if until_repeated and len(laps) > 12 and self.repeats(laps):
+                fate = CYCLES if laps[-1].peak > _FAINT * max(lap.peak for lap in laps) else RESTS
                 break
+        growth = _growth(laps)
+        if not fate:
+            fate = RESTS if quiet > _QUIET else _tendency(laps)
         if work > _WORK and len(laps) < _FEW:
-            return []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
-        return laps
+            laps = []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
+        return Course(laps, fate, growth, state)
 
     def start(self, x0) -> State:
         """Return a fresh state; what the engine does not move (lags that stand for delays elsewhere) is 0."""
@@ -110,15 +171,29 @@ class Swings:
                 state.x[node[X]] = 0.0
         return state
 
+    def repeats(self, laps) -> bool:
+        """Whether the last two passages met the same state; near enough to be the answer if no Newton follows."""
+        sizes = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
+        largest = max(float(np.max(sizes / self.units)), 1e-300)
+        bound = (
+            1e-9 * np.maximum(sizes, 1e-6 * largest * self.units)
+            if self.tight
+            else 1e-7 * largest * self.units
+        )
+        return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
+
     def _by_passage(self, state, laps, limit):
         # ahead in bounded strides: a loop at rest never crosses again
-        ahead = 4 * (laps[-1].time - laps[-2].time) if len(laps) >= 2 else self._time_scale()
+        ahead = 4 * (laps[-1].time - laps[-2].time) if len(laps) >= 2 else self.stride
+        times = state.time + np.linspace(0.0, ahead, _PEEKS)
         run = self.engine.run(
-            state, min(state.time + ahead, limit), rtol=1e-8, watch=self._signal, direction=1, log=1,
+            state, min(state.time + ahead, limit), times=times, rtol=1e-8, watch=self._signal, direction=1, log=1,
             max_steps=400_000,
         )  # fmt: skip
         after = run.state
-        return run, [_lap(after.time, after.x)] if run.reason == driver.SECTION else []
+        if run.reason != driver.SECTION:
+            return run, []
+        return run, [self._lap(after.time, after.x, run.outputs[: run.recorded])]
 
     def _by_samples(self, state, laps, limit):
         """Passages between the samples of a held signal, looked at between the ticks."""
@@ -129,100 +204,34 @@ class Swings:
         y = run.outputs[:, self.row]
         ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
         passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
-        return run, [_lap(t, x) for t, x in zip(passing, run.states[ups + 1], strict=True)]
+        found = []
+        for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
+            begin = ups[k - 1] if k else 0
+            found.append(self._lap(t, x, run.outputs[begin : ups[k] + 1]))
+        return run, found
 
-    def _time_scale(self) -> float:
-        """Return a time within which the loop moves: ten over its fastest plausible rate."""
-        if self.parts is not None:
-            omega = _corner_frequency(self.parts)
-            if omega:
-                return 20 * np.pi / omega
-            controller = self.loop.syslist[0]
-            if isinstance(controller, ct.StateSpace) and controller.nstates:
-                fastest = float(np.max(np.abs(controller.poles())))
-                if fastest > 0:
-                    return 40 * np.pi / fastest
-        return 10.0
-
-    # --- starts ---------------------------------------------------------------------------------------------
-
-    def _kicks(self):
-        """Displaced starts at rest, from far below to far above the scale of the block's nonlinearity."""
-        block = self.parts.block if self.parts is not None else None
-        core = getattr(block, "core", None)
-        if core is None:
-            size = self._state_size(block)
-            for factor in (1.0, 0.1, 10.0, 0.01):
-                yield factor * size * np.ones(self.engine.nstates)
-            return
-        offset = self.loop.syslist[0].nstates or 0
-        scale = _length_scale(core, self.parts)
-        pace = _corner_frequency(self.parts) or 1.0
-        # nothing drives a loop closed on the velocity back to a place
-        by_speed = self.loop.output_labels[0].startswith("v")
-        for factor in (0.3, 1.0, 0.1, 3.0, 0.03, 10.0):
-            x = np.zeros(self.engine.nstates)
-            x[offset] = factor * scale
-            if core.bodies == 2:
-                x[offset + 2] = factor * scale + 0.5 * core.gap
-            if by_speed:
-                x[offset + 1 : offset + 2 * core.bodies : 2] = factor * scale * pace
-            if core.stop is not None:
-                low, high = core.stop.span
-                places = slice(offset, offset + 2 * core.bodies, 2)
-                x[places] = np.clip(x[places], 0.9 * low, 0.9 * high)
-            yield x
-
-    def _state_size(self, block) -> float:
-        """Size of the controller's states that bring the input of an element to its corners.
-
-        States of canonical forms may be millions of times their output.
-        """
-        controller = None if block is None else self.loop.syslist[0]
-        c = controller.sampled[2] if isinstance(controller, Sampled) else getattr(controller, "C", None)
-        gain = 0.0 if c is None else float(np.abs(np.asarray(c)).sum())
-        law = getattr(block, "primitive", None)
-        corners = [abs(corner) for corner in getattr(law, "corners", ())]
-        size = max([*corners, getattr(law, "step", 0.0), getattr(law, "gap", 0.0)])
-        return (size or 1.0) / (gain or 1.0)
+    def _lap(self, time, x, outputs) -> Lap:
+        return Lap(
+            float(time), np.array(x), float(np.max(np.abs(outputs[:, self.row]), initial=0.0)) / self._unit
+        )
 
 
-def _lap(time, x) -> Lap:
-    return Lap(float(time), np.array(x), float(np.max(np.abs(x))))
+def _growth(laps, ago: int = 0) -> float:
+    """Mean size of the swings in the last quarter over that in the quarter before, or so many quarters ago."""
+    quarter = len(laps) // 4
+    if quarter < 2:
+        return float("nan")
+    peaks = np.array([lap.peak for lap in laps])[: len(laps) - ago * quarter]
+    before = np.mean(peaks[-2 * quarter : -quarter])
+    return float(np.mean(peaks[-quarter:]) / before) if before > 0 else float("nan")
 
 
-def repeats(laps, tight=False) -> bool:
-    """Whether the last two passages met the same state; `tight`: near enough to be the answer."""
-    size = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
-    largest = float(np.max(size)) + 1e-300
-    bound = 1e-9 * np.maximum(size, 1e-6 * largest) if tight else 1e-7 * largest
-    return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
-
-
-def _corner_frequency(parts):
-    """Frequency at which the controller balances the block's inertia, |H(jw)| = m w^2 [rad/s].
-
-    A loop closed on the velocity has its corner elsewhere, for which this serves as well as a scale.
-    """
-    core = getattr(parts.block, "core", None)
-    if core is None or not callable(parts.controller):
-        return None
-    omega = np.geomspace(1e-2, 1e4, 400)
-    dt = getattr(parts.controller, "dt", 0)
-    s = 1j * omega if not dt else np.exp(1j * omega * float(dt))
-    gain = np.abs(np.asarray(parts.controller(s)).ravel())
-    above = gain > sum(core.masses) * omega**2
-    return float(omega[np.flatnonzero(above)[-1]]) if above.any() else float(omega[0])
-
-
-def _length_scale(core, parts) -> float:
-    """Displacement at which the block's nonlinearity matters [m]."""
-    stiffness = sum(core.masses) * (_corner_frequency(parts) or 1.0) ** 2
-    scales = [core.gap, sum(level(chain, 0.0, 1.0, 0.0) for chain in core.friction) / stiffness]
-    for element, _ in core.input_channel:
-        scales += [abs(c) / stiffness for c in getattr(element, "corners", ())]
-        scales.append(getattr(element, "step", 0.0))
-    scales += [getattr(element, "step", 0.0) for element, _ in core.output_channel]
-    if core.stop is not None:
-        scales.append(0.5 * (core.stop.span[1] - core.stop.span[0]))
-    return max(scales) if max(scales) > 0 else 1e-3
+def _tendency(laps) -> str:
+    """Fate of swings that grow or shrink without end: by a steady ratio, not towards some size."""
+    now, earlier = _growth(laps), _growth(laps, 1)
+    if not now > 0 or not earlier > 0 or max(now, 1 / now) < _STEADY:
+        return UNDECIDED
+    lasting = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
+    if lasting < 0.5:
+        return UNDECIDED
+    return DIVERGES if now > 1.0 else RESTS

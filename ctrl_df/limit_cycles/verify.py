@@ -9,21 +9,22 @@ import numpy as np
 
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
-from .finder import OrbitFinder
+from ..status import Status
+from .fate import Fate
+from .finder import SAME_CYCLE, OrbitFinder
 from .grade import LimitCycle
-from .orbit import Orbit
+from .orbit import NoOrbit, Orbit
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
-NONE, MISSED, UNTESTED = "no such orbit", "missed by the describing function", "not tested"
+NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
+MISSED = "missed by the describing function"
 
 DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simulation judges."
 
 _UNHELD = "Newton from the motion it stands on closes no orbit near"
 
-# Within 5 % in frequency and amplitude a prediction is called confirmed; up to a factor it is the same cycle,
-# shifted.
+# Within 5 % in frequency and amplitude a prediction is called confirmed; beyond that it is the same cycle, shifted.
 CONFIRMED_WITHIN = 0.05
-SHIFTED_WITHIN = (1.25, 2.0)  # frequency, amplitude
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,10 +41,11 @@ class Row:
     simulated : tuple of (omega, output amplitude) or None
         What a simulation started beside the orbit settles to; None where it leaves (an unstable orbit).
     verdict : str
-        ``confirmed``, ``shifted``, ``no such orbit``, ``missed by the describing function``, ``not tested``.
+        ``confirmed``, ``shifted``, ``no such orbit`` (shown), ``not found`` (which shows nothing), ``missed by the
+        describing function``, ``not tested``.
     why : str
-        What the verdict rests on where there is no exact orbit to rest on: of a prediction on a further
-        motion of the block (``predicted.branch``) the search from that motion.
+        What the verdict rests on where there is no exact orbit to rest on: with which prediction this one
+        merges, or what was tried and how each try ended.
     motion : Orbit or None
         Where the simulation alone judges (a pure delay): the motion it settles to, averaged over its swings.
     """
@@ -71,13 +73,11 @@ class Row:
         truth = self.exact or self.motion
         if self.predicted is None or truth is None:
             return None
-        low_w, high_w = self.predicted.omega_band
-        low_a, high_a = self.predicted.amplitude_band
-        return bool(low_w <= truth.omega <= high_w and low_a <= truth.amplitude <= high_a)
+        return _in_band(self.predicted, truth)
 
     def _error(self, name):
         truth = self.exact or self.motion
-        if self.predicted is None or truth is None or self.verdict == NONE:
+        if self.predicted is None or truth is None:
             return float("nan")
         return getattr(self.predicted, name) / getattr(truth, name) - 1.0
 
@@ -94,12 +94,16 @@ class Check:
         All exact orbits found, those the prediction missed included; none for loops with a pure delay.
     note : str
         What could not be tested, and why.
+    fate : Fate
+        What the loop does from the starts simulated: a row a start, ``rests``, ``cycles`` (on which orbit) or
+        ``diverges``, and the sizes at which that changes.
     """
 
     rows: tuple[Row, ...]
     orbits: list[Orbit]
     note: str = ""
     loop: Any = field(repr=False, default=None)
+    fate: Fate = field(default_factory=Fate)
 
     def table(self) -> str:
         """Return the rows as text: predicted | exact | simulated, errors and verdict."""
@@ -117,15 +121,14 @@ class Check:
         lines: list[tuple[str, ...]] = [head]
         for row in self.rows:
             p, e, s = row.predicted, row.exact, row.simulated
-            shown = None if row.verdict == NONE else e
             lines.append(
                 (
                     f"{p.amplitude:.6g} @ {p.omega:.6g}" if p else "-",
-                    f"{shown.amplitude:.7g} @ {shown.omega:.7g}" if shown else "-",
-                    _multiplier(shown),
+                    f"{e.amplitude:.7g} @ {e.omega:.7g}" if e else "-",
+                    _multiplier(e),
                     f"{s[1]:.4g} @ {s[0]:.6g}"
                     if s
-                    else ("leaves" if shown is not None and shown.stable is False else "-"),
+                    else ("leaves" if e is not None and e.stable is False else "-"),
                     _percent(row.amplitude_error),
                     _percent(row.omega_error),
                     p.grade if p else "-",
@@ -142,7 +145,8 @@ class Check:
         widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
         text = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
         text.insert(1, "  ".join("-" * w for w in widths))
-        return "\n".join(text + ([self.note] if self.note else []))
+        fate = [f"simulated {self.fate}."] if len(self.fate) else []
+        return "\n".join(text + fate + ([self.note] if self.note else []))
 
     def __str__(self) -> str:
         return self.table()
@@ -155,7 +159,7 @@ class Check:
 
 
 def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Check:
-    """Check every predicted limit cycle against the exact orbit and a simulation of the closed loop.
+    """Check every predicted limit cycle against the exact orbit and simulations of the closed loop.
 
     Parameters
     ----------
@@ -165,15 +169,16 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         The loop to simulate; default ``closed_loop(resp.H, resp.block)``. Give the sampled loop to see what
         sampling does.
     search : bool
-        Also search, from simulations of many sizes, for orbits that the prediction missed.
+        Also simulate the loop from starts of many sizes: orbits that the prediction missed, and what the loop
+        does from each start (``.fate``).
     search_time : float
         Longest simulation of that search [s].
 
     Returns
     -------
     Check
-        ``.rows``, ``.table()``, ``.orbits``. Where the loop cannot be simulated (H is measured points, or
-        more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure delay,
+        ``.rows``, ``.table()``, ``.orbits``, ``.fate``. Where the loop cannot be simulated (H is measured points,
+        or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure delay,
         whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why`` tells how.
         An unstable cycle cannot be seen that way and stays ``not tested``.
     """
@@ -208,27 +213,50 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         orbits.append(orbit)
         return orbit
 
+    led: dict[int, Orbit] = {}
+    sought: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
     for cycle in cycles if finder.parts is not None else []:
-        keep(finder.from_guess(cycle))
+        found = finder.from_guess(cycle)
+        orbit = keep(found)
+        sought[id(cycle)] = finder.none()
+        if found is not None and orbit is not None and not found.note:
+            led[id(cycle)] = orbit
+    fate = Fate()
     if search:
-        for orbit in finder.search(search_time):
-            keep(orbit)
-    partner = _pairs(cycles, orbits)
+        fate = finder.explorer.explore(search_time, edges=not finder.by_simulation)
+        for orbit in fate.orbits:
+            if orbit.status.ok or not orbits:
+                keep(orbit)
+    partner = _pairs(cycles, orbits, led)
     if finder.engine.delayed:
-        return Check(tuple(_by_simulation(cycles, orbits, partner)), [], DELAYED, loop)
+        return Check(tuple(_by_simulation(cycles, orbits, partner)), [], DELAYED, loop, fate)
     rows = []
     for cycle in cycles:
         match = partner.get(id(cycle))
         if match is None:
-            rows.append(Row(cycle, None, None, NONE, _UNHELD if cycle.branch else ""))
+            rows.append(_unpaired(cycle, sought.get(id(cycle))))
         else:
             rows.append(Row(cycle, match, simulated(finder, match), _verdict(cycle, match)))
     paired = {id(orbit) for orbit in partner.values()}
     for orbit in orbits:
         if id(orbit) not in paired:
             rows.append(Row(None, orbit, simulated(finder, orbit), MISSED))
-    return Check(tuple(rows), orbits, loop=loop)
+    return Check(tuple(rows), orbits, loop=loop, fate=fate)
+
+
+def _unpaired(cycle: LimitCycle, sought: NoOrbit | None) -> Row:
+    """Row of a prediction without an orbit: `no such orbit` only where that was e."""
+    if cycle.branch:
+        return Row(cycle, None, None, NOT_FOUND, _UNHELD)
+    if sought is not None and sought.status is Status.NO_SUCH_ORBIT:
+        return Row(cycle, None, None, NONE, next(t.outcome for t in sought.tried if "merge" in t.outcome))
+    tried = (
+        ""
+        if sought is None or not sought.tried
+        else "; ".join(f"{t.start}: {t.outcome}" for t in sought.tried)
+    )
+    return Row(cycle, None, None, NOT_FOUND, tried)
 
 
 def _verdict(cycle: LimitCycle, truth: Orbit) -> str:
@@ -247,7 +275,7 @@ def _by_simulation(cycles, motions, partner):
         elif cycle.stable is False:
             yield Row(cycle, None, None, UNTESTED, "no simulation stays on an unstable cycle")
         else:
-            yield Row(cycle, None, None, NONE, "no simulation settles near it")
+            yield Row(cycle, None, None, NOT_FOUND, "no simulation settles near it")
     paired = {id(motion) for motion in partner.values()}
     for motion in motions:
         if id(motion) not in paired:
@@ -255,22 +283,27 @@ def _by_simulation(cycles, motions, partner):
             yield Row(None, None, (motion.omega, motion.output_amplitude), MISSED, why, motion)
 
 
-def _pairs(cycles, orbits) -> dict[int, Orbit]:
-    """Pair predictions with orbits, nearest first, each once; agreeing on stability brings them nearer."""
+def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
+    """Pair predictions with orbits, each once: those their own path led to first, then the nearest.
+
+    An orbit within a prediction's stated band, or near it, is taken for it; agreeing on stability brings the
+    two nearer.
+    """
     near = []
     for cycle in cycles:
         for orbit in orbits:
-            if _close(cycle, orbit):
+            own = led.get(id(cycle)) is orbit
+            if own or _close(cycle, orbit) or _in_band(cycle, orbit):
                 distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(
                     np.log(cycle.amplitude / orbit.amplitude)
                 )
                 disagree = (
                     orbit.stable is not None and cycle.stable is not None and orbit.stable != cycle.stable
                 )
-                near.append((distance * (2.0 if disagree else 1.0), len(near), cycle, orbit))
+                near.append((not own, distance * (2.0 if disagree else 1.0), len(near), cycle, orbit))
     partner: dict[int, Orbit] = {}
     taken: set[int] = set()
-    for _, _, cycle, orbit in sorted(near, key=lambda n: n[:2]):
+    for *_, cycle, orbit in sorted(near, key=lambda n: n[:3]):
         if id(cycle) not in partner and id(orbit) not in taken:
             partner[id(cycle)] = orbit
             taken.add(id(orbit))
@@ -285,7 +318,7 @@ def simulated(
         return None
     if orbit.stable is None:
         return orbit.omega, orbit.output_amplitude
-    swings = finder.swings.follow(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps)
+    swings = finder.swings.follow(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps).laps
     if len(swings) < 8:
         return None
     t = np.array([s[0] for s in swings])
@@ -308,7 +341,13 @@ def simulated(
 
 def _close(cycle: LimitCycle, orbit: Orbit) -> bool:
     ratio_w, ratio_a = cycle.omega / orbit.omega, cycle.amplitude / orbit.amplitude
-    return max(ratio_w, 1 / ratio_w) <= SHIFTED_WITHIN[0] and max(ratio_a, 1 / ratio_a) <= SHIFTED_WITHIN[1]
+    return max(ratio_w, 1 / ratio_w) <= SAME_CYCLE[0] and max(ratio_a, 1 / ratio_a) <= SAME_CYCLE[1]
+
+
+def _in_band(cycle: LimitCycle, orbit: Orbit) -> bool:
+    low_w, high_w = cycle.omega_band
+    low_a, high_a = cycle.amplitude_band
+    return bool(low_w <= orbit.omega <= high_w and low_a <= orbit.amplitude <= high_a)
 
 
 def _multiplier(orbit) -> str:

@@ -174,7 +174,12 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         mode[mo] = aux[at + slot]
         row_a, row_b = po + 4 * before, po + 4 * mode[mo]
         jump = par[row_a + 3] + par[row_a + 2] * value - par[row_b + 3] - par[row_b + 2] * value
-        sizes = abs(par[row_a + 3]) + abs(par[row_a + 2] * value) + abs(par[row_b + 3]) + abs(par[row_b + 2] * value)
+        sizes = (
+            abs(par[row_a + 3])
+            + abs(par[row_a + 2] * value)
+            + abs(par[row_b + 3])
+            + abs(par[row_b + 2] * value)
+        )
         return E_SWITCH if abs(jump) > 1e-12 * sizes else E_CORNER
     if kind == QUANTIZER:
         mode[mo] += 1 if slot == 1 else -1

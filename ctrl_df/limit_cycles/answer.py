@@ -1,0 +1,183 @@
+"""The steady answer of a block to a periodic waveform: harmonics out for harmonics in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import control as ct
+import numpy as np
+
+from ..blocks.element import Element
+from ..blocks.primitives import PiecewiseAffine, Play, Quantizer
+from ..df.dispatch import Method
+
+SAMPLES = 2048
+STATIC_HARMONICS, DYNAMIC_HARMONICS = 63, 21
+
+
+def responder(F, method: Method) -> tuple[Callable, int] | None:
+    """Return how the block answers a waveform, and the harmonics to keep; None where that is not known.
+
+    The answer is a function ``respond(U, omega) -> Y``: coefficients k = 0, 1, ... of the steady output for
+    those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic answer.
+    """
+    if method.name == "element":
+        cells = _element_cells(method.subject)
+        return None if cells is None else (_sampled(cells), STATIC_HARMONICS)
+    if method.name == "law" and callable(method.subject):
+        return _sampled(_cell_means(_pointwise(method.subject))), STATIC_HARMONICS
+    if method.name in ("friction", "backlash", "orbit") and isinstance(F, ct.NonlinearIOSystem):
+        return _orbits(F, method.output), DYNAMIC_HARMONICS
+    return None
+
+
+def _sampled(cells):
+    """Answer of a law on waveforms; `cells` maps samples of the input to means of the output between them.
+
+    Means, not samples: a jump then moves the answer smoothly with its place instead of from sample to sample.
+    """
+
+    def respond(U, omega):
+        full = np.zeros(SAMPLES // 2 + 1, dtype=complex)
+        full[: U.size] = U * SAMPLES / 2
+        full[0] *= 2
+        k = np.arange(U.size)
+        Y = np.fft.rfft(cells(np.fft.irfft(full, SAMPLES)))[: U.size] * 2 / SAMPLES
+        Y *= np.sinc(k / SAMPLES) * np.exp(-1j * np.pi * k / SAMPLES)
+        Y[0] /= 2
+        return Y
+
+    return respond
+
+
+_INSIDE = (np.arange(64) + 0.5) / 64
+
+
+def _cell_means(law):
+    """Means of a static law between samples: trapezoids, but where it jumps many points of the chord."""
+
+    def cells(u):
+        after = np.roll(u, -1)
+        y = np.asarray(law(u), dtype=float)
+        ahead = np.roll(y, -1)
+        mean = 0.5 * (y + ahead)
+        rise = np.abs(ahead - y)
+        jumps = rise > 20 * np.median(rise) + 1e-9 * np.abs(y).max()
+        if jumps.any():
+            chord = u[jumps, None] + (after - u)[jumps, None] * _INSIDE
+            mean[jumps] = np.asarray(law(chord.ravel()), dtype=float).reshape(chord.shape).mean(axis=1)
+        return mean
+
+    return cells
+
+
+def _orbits(block, output):
+    """Answer of a block with dynamics: its forced periodic orbit under the whole waveform."""
+    from .waveform import WaveformOrbit
+
+    solver = WaveformOrbit(block, output)
+
+    def respond(U, omega):
+        return solver.respond(U, omega)
+
+    return respond
+
+
+def _element_cells(block: Element):
+    """Map samples of one period to means of the steady output between them."""
+    primitive = block.primitive
+    if isinstance(primitive, Play):
+        return lambda u: _between(_played(u, primitive.gap / 2))
+    if isinstance(primitive, PiecewiseAffine) and primitive.hysteretic:
+        return (lambda u: _switched(u, primitive)) if len(primitive.slope) == 2 else None
+    if isinstance(primitive, PiecewiseAffine):
+        return _exact_means(primitive.value, _broken_line_integral(primitive))
+    if isinstance(primitive, Quantizer):
+        return _exact_means(primitive.value, _staircase_integral(primitive.step))
+    value = getattr(primitive, "value", None)
+    return None if value is None else _cell_means(value)
+
+
+def _exact_means(law, integral):
+    """Means of a law over the chords between samples, by its integral: smooth however the law jumps."""
+
+    def cells(u):
+        after = np.roll(u, -1)
+        rise = after - u
+        flat = np.abs(rise) < 1e-9 * np.abs(u).max()
+        with np.errstate(all="ignore"):
+            mean = (integral(after) - integral(u)) / rise
+        return np.where(flat, law(0.5 * (u + after)), mean)
+
+    return cells
+
+
+def _broken_line_integral(line: PiecewiseAffine):
+    corners = np.array(line.corners)
+    slope, intercept = np.array(line.slope), np.array(line.intercept)
+    steps = np.diff(corners)
+    inner = intercept[1:-1] * steps + 0.5 * slope[1:-1] * (corners[1:] ** 2 - corners[:-1] ** 2)
+    upto = np.concatenate([[0.0], np.cumsum(inner)])  # integral from the first corner to each
+
+    def integral(u):
+        i = np.searchsorted(corners, u)
+        base = np.clip(i - 1, 0, None)
+        at = corners[base]
+        return upto[base] + intercept[i] * (u - at) + 0.5 * slope[i] * (u * u - at * at)
+
+    return integral
+
+
+def _staircase_integral(step: float):
+    def integral(u):
+        stairs = np.floor(np.abs(u) / step + 0.5)
+        return step * stairs * (np.abs(u) - 0.5 * step * stairs)
+
+    return integral
+
+
+def _between(y):
+    return 0.5 * (y + np.roll(y, -1))
+
+
+def _pointwise(f):
+    def law(u):
+        try:
+            y = np.asarray(f(u), dtype=float)
+            if y.shape == u.shape and y[0] == f(float(u[0])):
+                return y
+        except Exception:  # written for scalars: whatever it raises on an array, it is asked point by point
+            pass
+        return np.array([float(np.squeeze(f(float(v)))) for v in u])
+
+    return law
+
+
+def _played(u, half):
+    center, out = 0.0, np.empty_like(u)
+    for _ in range(2):
+        for i, v in enumerate(u.tolist()):
+            center = v - half if center < v - half else v + half if center > v + half else center
+            out[i] = center
+    return out
+
+
+def _switched(u, loop: PiecewiseAffine):
+    """Relay with hysteresis: the branch last forced, filled forward; switchings lie between samples."""
+    n = u.size
+    twice = np.concatenate([u, u])
+    forced = np.where(twice > loop.high[0], 1, np.where(twice < loop.low[1], 0, -1))
+    last = np.maximum.accumulate(np.where(forced >= 0, np.arange(2 * n), -1))[n:]
+    upper = np.where(last >= 0, forced[np.maximum(last, 0)], 1) == 1
+    before = np.where(upper, 1, 0)
+    after = np.roll(before, -1)
+    edge = np.where(after == 1, loop.high[0], loop.low[1])
+    span = np.roll(u, -1) - u
+    with np.errstate(all="ignore"):
+        share = np.where(
+            before == after, 1.0, np.clip((edge - u) / span, 0, 1)
+        )  # of the cell on the old branch
+    slope, intercept = np.array(loop.slope), np.array(loop.intercept)
+    middle = 0.5 * (u + np.roll(u, -1))
+    old, new = (intercept[i] + slope[i] * middle for i in (before, after))
+    return share * old + (1 - share) * new

@@ -1,0 +1,309 @@
+"""An exact orbit from a state near it: Newton on the event-located flow, with Floquet multipliers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..simulate.engine import Engine, Event
+from ..simulate.layout import AUX, KIND, MECHANISM, MODE
+from ..status import Status
+from .monodromy import RTOL, Tracer
+from .orbit import Orbit
+from .symmetry import shift_directions, transverse
+
+_CLOSED = 3e-10  # mismatch after a lap, relative to the size of each state
+_ACCEPTED = 1e-7  # the same where events limit what can be reached
+_STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
+_MOST_STEPS = 120  # along the path of a shrinking mismatch
+_MOST_LAPS = 32  # an orbit closed after so many laps or fewer is told from the one of a single lap
+_ON_CIRCLE = 1e-6  # distance from the unit circle below which a multiplier says nothing of stability
+
+
+class NoClosure(Exception):
+    """No orbit was closed; the message says why, `mismatch` how near it came (relative to the orbit's size)."""
+
+    def __init__(self, why: str, mismatch: float = np.inf):
+        super().__init__(why)
+        self.mismatch = mismatch
+
+
+class Merged(NoClosure):
+    """What is missing to a closed lap cannot be made to vanish: the orbit has merged with a neighbour."""
+
+
+class Centre(NoClosure):
+    """Motions of every size repeat: a multiplier 1 beside that of a shift in time."""
+
+
+class Closing:
+    """Closes orbits of one loop.
+
+    Parameters
+    ----------
+    loop : ct.NonlinearIOSystem
+    engine : Engine
+        Of that loop, without pure delays.
+    max_iterations : int
+        Bound on Newton steps.
+    """
+
+    def __init__(self, loop, engine: Engine, max_iterations: int = 40):
+        self.loop, self.engine, self.max_iterations = loop, engine, max_iterations
+        self.tracer = Tracer(engine)
+        self.parts: Any = getattr(loop, "parts", None)
+
+    def close(self, x0, period: float) -> Orbit:
+        """Newton from a state near the orbit and an estimate of the period; NoClosure if it fails."""
+        start, size = self._free_state(np.array(x0, float), period)
+        status, best, grown = Status.NOT_CONVERGED, np.inf, 0
+        lap = beside = None
+        for _ in range(self.max_iterations):
+            lap = self.tracer.lap(start, period, size=size)
+            if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
+                raise NoClosure(f"no lap could be followed ({lap.status.name.lower().replace('_', ' ')})")
+            if beside is None:
+                # shifts that the loop does not notice: an orbit closes up to them
+                free = shift_directions(self.tracer, lap.segments, size)
+                beside = np.eye(self.tracer.n) - free @ free.T
+            residual = beside @ ((lap.end.x - start.x) / size)
+            mismatch = float(np.max(np.abs(residual)))
+            if mismatch < _CLOSED:
+                status, best = Status.CONVERGED, mismatch
+                break
+            if mismatch > 0.9 * best:
+                grown += 1
+                if grown > 6:
+                    break
+            best = min(best, mismatch)
+            step = self._newton(start, lap, period, size, beside, residual)
+            period += step[-1]
+            if period <= 0:
+                raise NoClosure("Newton left for a negative period")
+            start = self._rebuilt(start.x + step[:-1])
+        if lap is None or self._at_rest(start, lap, period, size):
+            raise NoClosure("Newton ended at rest")
+        if status is not Status.CONVERGED and best > _ACCEPTED:
+            raise NoClosure(f"Newton came no nearer than {best:.1g} of the orbit's size", best)
+        lap, period = self._single(start, period, lap, size, beside)
+        return self._finished(start, period, lap, size)
+
+    def trace(self, x0, period: float) -> Orbit:
+        """Let what is missing to a closed lap shrink little by little, from a state near the orbit.
+
+        ``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1. At
+        share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns back to 1
+        first, the orbit and its neighbour have merged: there is none near (`Merged`).
+
+        References
+        ----------
+        Keller (1978), Global homotopies and Newton methods.
+        """
+        start, size = self._free_state(np.array(x0, float), period)
+        origin, rate = start.x.copy(), self.tracer.rate(start.time, start.x, start.mode)
+        phase = rate * period / size
+        phase = phase / max(np.linalg.norm(phase), 1e-300)
+        n = self.tracer.n
+        beside = free = None
+
+        def mismatch(y):
+            nonlocal beside, free
+            here = self._rebuilt(origin + y[:n] * size)
+            lap = self.tracer.lap(here, period * np.exp(y[n]), size=size)
+            if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
+                raise NoClosure("no lap could be followed")
+            if beside is None:
+                free = shift_directions(self.tracer, lap.segments, size)
+                beside = np.eye(n) - free @ free.T
+            gap = beside @ ((lap.end.x - here.x) / size)
+            f_end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
+            slope = np.zeros((n, n + 1))
+            slope[:, :n] = beside @ (lap.monodromy * size / size[:, None] - np.eye(n))
+            slope[:, n] = beside @ (f_end * period * np.exp(y[n]) / size)
+            return gap, slope
+
+        first, _ = mismatch(np.zeros(n + 1))
+        scale = float(np.max(np.abs(first)))
+        if scale < _CLOSED:
+            return self.close(x0, period)
+
+        def equations(y):
+            gap, slope = mismatch(y[:-1])
+            held = np.append(phase, [0.0, 0.0])
+            J = np.vstack([np.column_stack([slope, -first]), held])
+            return np.append(gap - y[-1] * first, phase @ y[:n]), J
+
+        y = np.zeros(n + 2)
+        y[-1] = 1.0
+        _, J = equations(y)
+        border = _tangent(J, -np.eye(n + 2)[-1])
+        step, least = 0.1 * min(1.0, scale), 1.0
+        for _ in range(_MOST_STEPS):
+            ahead = y + step * border
+            try:
+                found, J = _onto(equations, ahead, border, 1e-4 * scale)
+            except NoClosure:
+                found = None
+            turned = None if found is None else _tangent(J, border)
+            if turned is None or turned @ border < 0.8:
+                step *= 0.5
+                if step < 1e-4 * scale:
+                    break
+                continue
+            y, border = found, turned
+            least = min(least, float(y[-1]))
+            if y[-1] <= 0.0:
+                return self.close(origin + y[:n] * size, period * np.exp(y[n]))
+            if y[-1] >= 1.0:
+                raise Merged(
+                    f"what is missing to a closed lap falls to {least:.0%} of {scale:.1g} and grows again: the orbit "
+                    "and its neighbour have merged",
+                    least * scale,
+                )
+            if np.max(np.abs(y[: n + 1])) > 2.0:
+                break
+            step = min(1.5 * step, 0.2)
+        raise NoClosure("what is missing to a closed lap could not be followed to zero", least * scale)
+
+    def _newton(self, start, lap, period, size, beside, residual):
+        """Step of state and period, bounded to three tenths of the orbit's size."""
+        n = self.tracer.n
+        f_end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
+        f_start = self.tracer.rate(start.time, start.x, start.mode)
+        system = np.zeros((n + 1, n + 1))
+        scale = np.append(size, period)
+        # in units of the orbit: states by their sizes, time by the period
+        system[:n, :n] = lap.monodromy * size / size[:, None] - np.eye(n)
+        system[:n, n] = f_end * period / size
+        system[n, :n] = f_start * period / size
+        system[:n] = beside @ system[:n]
+        change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=1e-12)[0]
+        shorten = min(1.0, 0.3 / max(float(np.max(np.abs(change))), 1e-300))
+        return shorten * change * scale
+
+    def _single(self, start, period, lap, size, beside):
+        """Return the lap and period of an orbit that may have been closed after going round several times."""
+        parts = np.arange(_MOST_LAPS, 1, -1)
+        run = self.engine.run(start, period, times=np.sort(period / parts), rtol=RTOL, log=1)
+        mismatch = np.max(np.abs(((run.states - start.x) / size) @ beside.T), axis=1)
+        for k in np.argsort(period / parts):  # the shortest first
+            part = int(parts[k])
+            if mismatch[k] < 100 * _ACCEPTED:
+                short = self.tracer.lap(start, period / part, size=size)
+                if np.max(np.abs(beside @ ((short.end.x - start.x) / size))) < 100 * _ACCEPTED:
+                    return short, period / part
+        return lap, period
+
+    def _free_state(self, x0, period) -> tuple[Any, Any]:
+        """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
+        state = self.engine.start(x0)
+        lap = self.tracer.lap(state, period, differentiate=False)
+        if not lap.status.ok or not lap.segments:
+            raise NoClosure(f"no lap could be followed ({lap.status.name.lower().replace('_', ' ')})")
+        times = np.linspace(0, period, 65)[1:]
+        run = self.engine.run(self.engine.start(x0), period, times=times, rtol=1e-8, log=1)
+        largest = np.max(np.abs([s.start.x for s in lap.segments] + [lap.end.x]), axis=0)
+        largest = np.maximum(largest, np.nanmax(np.abs(run.states), axis=0))
+        constraints = [self._constraints(s.start.mode) for s in lap.segments]
+        least = min(constraints)
+        length, k = max((s.length, i) for i, s in enumerate(lap.segments) if constraints[i] == least)
+        begin = lap.segments[k].start
+        size = self.tracer.sizes(begin, period, largest)
+        middle = self.engine.run(begin, begin.time + 0.5 * length, rtol=RTOL, locate=False, log=1).state
+        middle.time, middle.mode = 0.0, begin.mode.copy()
+        middle.fresh = True
+        return self.tracer.settle(middle), size
+
+    def _constraints(self, mode):
+        """Count the constraints active in a mode: stuck bodies, closed impact joints, walls."""
+        count = 0
+        program = self.engine.program
+        for node in program.nodes:
+            if node[KIND] == MECHANISM:
+                m = mode[node[MODE] : node[MODE] + 4]
+                bodies = program.ints[node[AUX]]
+                count += (
+                    int(m[0] == 0) + (int(m[1] == 0) if bodies == 2 else 0) + int(m[2] != 0) + int(m[3] != 0)
+                )
+        return count
+
+    def _at_rest(self, start, lap, period, size):
+        """Whether Newton ended on an equilibrium, which is periodic with any period."""
+        speed = np.abs(self.tracer.rate(start.time, start.x, start.mode)) * period
+        moved = np.max([np.abs(s.start.x - start.x) for s in lap.segments], axis=0)
+        return bool(np.max(speed / size) < 1e-6) and bool(np.max(moved / size) < 1e-6)
+
+    def _rebuilt(self, x):
+        """Return a state in freshly settled modes: rigid joints closed, within gaps and stops."""
+        state = self.tracer.settle(self.engine.start(self.feasible(x)))
+        if not np.all(np.isfinite(state.x)):
+            raise NoClosure("Newton left every bound")
+        return state
+
+    def feasible(self, x):
+        """Return the nearest state with rigid joints closed, within gaps and stops."""
+        core = getattr(self.parts.block, "core", None) if self.parts is not None else None
+        x = np.array(x, dtype=float)
+        if core is None:
+            return x
+        o = self.loop.syslist[0].nstates or 0
+        if core.stop is not None:
+            at = o + 2 * core.driven
+            x[at] = np.clip(x[at], *core.stop.span)
+        if core.joint == "rigid":
+            x[o : o + 2] = x[o + 2 : o + 4]
+        elif core.joint == "impact":
+            x[o + 2] = x[o] + np.clip(x[o + 2] - x[o], 0.0, core.gap)
+        return x
+
+    def _finished(self, start, period, lap, size) -> Orbit:
+        times = np.linspace(0.0, period, 1025)
+        omega = 2 * np.pi / period
+        spectrum = np.zeros((self.engine.noutputs, 2), complex)
+        run = self.engine.run(
+            start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
+        )
+        if np.max(np.ptp(run.states, axis=0) / size) < _STILL:
+            raise NoClosure("Newton ended at rest")  # an equilibrium, periodic with any period
+        # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
+        across = transverse(shift_directions(self.tracer, lap.segments, size))
+        carried = across.T @ (lap.monodromy * size / size[:, None]) @ across
+        values = np.linalg.eigvals(carried)
+        trivial = int(np.argmin(np.abs(values - 1.0)))
+        floquet = np.delete(values, trivial)
+        floquet = floquet[np.argsort(-np.abs(floquet))]
+        if np.any(np.abs(floquet - 1.0) < _ON_CIRCLE):
+            raise Centre("motions of every size repeat (a centre)")
+        outside = np.abs(floquet) - 1.0
+        stable = None if np.any(np.abs(outside) < _ON_CIRCLE) else bool(np.all(outside < 0.0))
+        residual = float(np.max(np.abs(across.T @ ((lap.end.x - start.x) / size)), initial=0.0))
+        events, t = [], 0.0
+        for s in lap.segments:
+            t += s.length
+            if s.event:
+                events.append(Event(t, s.node, s.event))
+        amplitudes = 2 * np.abs(spectrum[:, 1]) / period
+        return Orbit(
+            float(omega), float(period), float(amplitudes[-1]), float(amplitudes[0]), floquet, stable, residual,
+            tuple(events), Status.CONVERGED, lap.grazing, times, run.outputs.T, run.states.T, self.loop,
+        )  # fmt: skip
+
+
+def _tangent(J, along):
+    """Direction in which the equations with Jacobian J stay fulfilled, the side of `along`."""
+    right = np.zeros(J.shape[0] + 1)
+    right[-1] = 1.0
+    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-12)[0]
+    return t / np.linalg.norm(t)
+
+
+def _onto(equations, y, border, tolerance):
+    """Newton onto the path within the plane through y across `border`."""
+    offset = border @ y
+    for _ in range(8):
+        r, J = equations(y)
+        if np.max(np.abs(r)) < tolerance:
+            return y, J
+        y = y + np.linalg.lstsq(np.vstack([J, border]), -np.append(r, border @ y - offset), rcond=1e-12)[0]
+    raise NoClosure("no point of the path was reached")

@@ -1,0 +1,239 @@
+"""What a loop does from starts of many sizes, and what stands between starts of different fate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .orbit import Orbit
+from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, Swings
+
+_SWINGS = 1000  # of one simulation
+_HALVINGS = 40  # of the interval between two starts of different fate
+_ASKED = (6, 12, 18, 26, 40)  # halvings after which the motion on the border is tried for an orbit
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start and what became of it.
+
+    Attributes
+    ----------
+    size : float
+        Displacement at rest [m], or amplitude at the input of an element.
+    fate : str
+        ``rests``, ``cycles``, ``diverges``, or ``undecided`` within the bound on work.
+    orbit : Orbit or None
+        The one it cycles on.
+    growth : float
+        Change of the swings at the end, a ratio a quarter of the course.
+    wind_up : float
+        Factor by which the controller's integral outgrew the block's output, where it did; else 1.
+    """
+
+    size: float
+    fate: str
+    orbit: Orbit | None = None
+    growth: float = float("nan")
+    wind_up: float = 1.0
+
+    @property
+    def told(self) -> str:
+        """The fate in words."""
+        if self.fate == CYCLES and self.orbit is not None:
+            return f"cycles at {self.orbit.omega:.5g} rad/s, amplitude {self.orbit.amplitude:.5g}"
+        if self.fate == DIVERGES:
+            return "diverges" + (", the controller's integral winding up" if self.wind_up > 1 else "")
+        return {RESTS: "comes to rest"}.get(self.fate, "settles to nothing within the bound on work")
+
+
+@dataclass(frozen=True)
+class Border:
+    """Two sizes of start, as near as simulations tell, with different fates.
+
+    Attributes
+    ----------
+    below, above : float
+        Sizes on either side.
+    fates : tuple of str
+        Below and above.
+    orbit : Orbit or None
+        The unstable orbit on the border, if one was closed.
+    """
+
+    below: float
+    above: float
+    fates: tuple[str, str]
+    orbit: Orbit | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Fate:
+    """What a loop does from the starts tried, a row a start, by size.
+
+    Attributes
+    ----------
+    rows : tuple of Start
+    borders : tuple of Border
+        Where the fate changes along the starts: the size of the regions of attraction, as far as they tell.
+    unit : str
+        Of the sizes.
+    orbits : list of Orbit
+        All that were met, those on borders last.
+    """
+
+    rows: tuple[Start, ...] = ()
+    borders: tuple[Border, ...] = ()
+    unit: str = ""
+    orbits: list[Orbit] = field(default_factory=list, repr=False)
+
+    def __iter__(self):
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def _of(self, fate):
+        return tuple(row for row in self.rows if row.fate == fate)
+
+    @property
+    def rests(self) -> tuple[Start, ...]:
+        """Starts from which the loop comes to rest."""
+        return self._of(RESTS)
+
+    @property
+    def cycles(self) -> tuple[Start, ...]:
+        """Starts from which it ends on a cycle."""
+        return self._of(CYCLES)
+
+    @property
+    def diverges(self) -> tuple[Start, ...]:
+        """Starts from which it grows without end."""
+        return self._of(DIVERGES)
+
+    def __str__(self) -> str:
+        """Return a sentence: what the loop does from which starts."""
+        if not self.rows:
+            return "no simulation was made"
+        runs: list[list[Start]] = []
+        for row in self.rows:
+            same = runs and runs[-1][-1].told == row.told
+            if same:
+                runs[-1].append(row)
+            else:
+                runs.append([row])
+        parts = []
+        for run in runs:
+            low, high = run[0].size, run[-1].size
+            sizes = f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+            parts.append(f"{run[0].told} from {sizes}")
+        text = (
+            f"from starts of {self.rows[0].size:.3g} to {self.rows[-1].size:.3g} {self.unit} the loop "
+            + "; ".join(parts)
+        )
+        for border in self.borders:
+            text += f"; the border lies at {0.5 * (border.below + border.above):.6g}"
+        return text
+
+
+class Explorer:
+    """Simulations of one loop from starts of many sizes.
+
+    Parameters
+    ----------
+    swings : Swings
+    close : callable
+        ``close(x0, course, complete) -> Orbit or None``: the orbit that a course comes near.
+    """
+
+    def __init__(self, swings: Swings, close: Callable):
+        self.swings, self.close = swings, close
+
+    def explore(self, longest=None, edges=True) -> Fate:
+        """Simulate every start; with `edges` close in on the borders between starts of different fate."""
+        kicks, orbits = self.swings.kicks, []
+        courses: dict[float, Course] = {}
+        rows = []
+        for size, x0 in kicks.all():
+            course = courses[size] = self.swings.follow(x0, _SWINGS, longest)
+            orbit = _kept(orbits, self.close(x0, course, True))
+            rows.append(self._row(size, course, orbit, x0))
+        rows.sort(key=lambda row: row.size)
+        borders = []
+        if edges:
+            for low, high in zip(rows[:-1], rows[1:], strict=True):
+                if low.fate != high.fate and UNDECIDED not in (low.fate, high.fate):
+                    border = self._border(low, high, longest)
+                    borders.append(border)
+                    _kept(orbits, border.orbit)
+        return Fate(tuple(rows), tuple(borders), kicks.unit, orbits)
+
+    def _row(self, size, course, orbit, x0) -> Start:
+        fate = course.fate
+        if orbit is not None and fate == UNDECIDED:
+            fate = CYCLES
+        elif fate == CYCLES and orbit is None:
+            fate = UNDECIDED
+        on = orbit if fate == CYCLES else None
+        return Start(size, fate, on, course.growth, self._wound(course, x0) if fate == DIVERGES else 1.0)
+
+    def _wound(self, course, x0) -> float:
+        """Factor by which controller states outgrew the block's during a divergence; 1 where they did not."""
+        nc = self.swings.loop.syslist[0].nstates or 0 if self.swings.parts is not None else 0
+        core = self.swings.kicks.core
+        if not nc or core is None or not course.laps:
+            return 1.0
+        if not any(getattr(e, "corners", ()) for e, _ in core.input_channel):
+            return 1.0
+        gains = np.abs(course.state.x) / self.swings.units
+        return float(max(gains[:nc].max() / max(gains[nc:].max(), 1e-300), 1.0 + 1e-9))
+
+    def _border(self, low: Start, high: Start, longest) -> Border:
+        below, above, fates, orbit = low.size, high.size, (low.fate, high.fate), None
+        for count in range(1, _HALVINGS + 1):
+            middle = float(np.sqrt(below * above))
+            if not below < middle < above:
+                break
+            x0 = self.swings.kicks.state(middle)
+            course = self.swings.follow(x0, _SWINGS, longest)
+            if course.fate == fates[0]:
+                below = middle
+            elif course.fate == fates[1]:
+                above = middle
+            else:
+                break
+            if count in _ASKED:
+                orbit = self._slowest(x0, course)
+                if orbit is not None and orbit.stable is False:
+                    break
+        return Border(below, above, fates, orbit if orbit is not None and orbit.stable is False else None)
+
+    def _slowest(self, x0, course: Course) -> Orbit | None:
+        """Orbit near which a course lingers: its passages change least there."""
+        laps = course.laps
+        if len(laps) < 4:
+            return None
+        change = [
+            float(np.max(np.abs(b.state - a.state) / self.swings.units) / max(b.peak, 1e-300))
+            for a, b in zip(laps[:-1], laps[1:], strict=True)
+        ]
+        k = int(np.argmin(change))
+        if change[k] > 0.3:
+            return None
+        near = laps[max(k - 4, 0) : k + 2]
+        fate = UNDECIDED if len(near) >= 6 else course.fate
+        padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near
+        return self.close(x0, Course(padded, fate, 1.0, course.state), False)
+
+
+def _kept(orbits, orbit):
+    """Return the known orbit that this one is, or the orbit itself, now known."""
+    if orbit is None:
+        return None
+    for known in orbits:
+        if orbit.same_as(known, 1e-4 if orbit.status.ok else 2e-2):
+            return known
+    orbits.append(orbit)
+    return orbit

@@ -1,0 +1,222 @@
+"""Starts for the simulations of a loop: displaced by shares of the scale at which its nonlinearity matters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks.core import level
+from ..simulate.sampled import Sampled
+
+FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)  # of the scale, in the order tried
+_DECADES = np.arange(-40.0, 41.0)  # over which a smooth law is asked where it bends
+_BENT = 0.01  # change of a slope, relative, from which on a law counts as bent
+
+
+class Kicks:
+    """Starts of one loop, by size.
+
+    Parameters
+    ----------
+    loop : ct.NonlinearIOSystem
+    engine : Engine
+
+    Attributes
+    ----------
+    unit : str
+        What a size is measured in: ``m`` of displacement, ``at the block's input``, or ``of every state``.
+    scale : float
+        The size at which the block's nonlinearity matters.
+    pace : float
+        A frequency at which the loop moves [rad/s].
+    """
+
+    def __init__(self, loop, engine):
+        self.loop, self.engine = loop, engine
+        self.parts: Any = getattr(loop, "parts", None)
+        self.block = None if self.parts is None else self.parts.block
+        self.core = getattr(self.block, "core", None)
+        if self.core is not None:
+            self.pace = corner_frequency(self.parts)
+            self.scale, self.unit = self._length_scale(), "m"
+        elif self.parts is not None:
+            self.pace = _pole_frequency(self._controller())
+            self.scale, self.unit = self._corner(), "at the block's input"
+        else:
+            self.pace, self.scale, self.unit = 1.0, 1.0, "of every state"
+
+    def all(self) -> list[tuple[float, np.ndarray]]:
+        """(size, state) of every start, in the order in which they are tried."""
+        return [(f * self.scale, self.state(f * self.scale)) for f in FACTORS]
+
+    def state(self, size: float) -> np.ndarray:
+        """Return the start of a size: a displacement at rest, or what brings the block's input there."""
+        if self.core is not None:
+            return self._displaced(size)
+        if self.parts is not None:
+            return self._swung(size)
+        return size * np.ones(self.engine.nstates)
+
+    def _displaced(self, size):
+        core, offset = self.core, self.loop.syslist[0].nstates or 0
+        x = np.zeros(self.engine.nstates)
+        x[offset] = size
+        if core.bodies == 2:
+            x[offset + 2] = size + 0.5 * core.gap
+        if self.loop.output_labels[0].startswith("v"):
+            # nothing drives a loop closed on the velocity back to a place
+            x[offset + 1 : offset + 2 * core.bodies : 2] = size * self.pace
+        if core.stop is not None:
+            low, high = core.stop.span
+            places = slice(offset, offset + 2 * core.bodies, 2)
+            x[places] = np.clip(x[places], 0.9 * low, 0.9 * high)
+        return x
+
+    def _swung(self, size):
+        """States of the linear part as a harmonic output of the block leaves them, its input that large."""
+        x = np.zeros(self.engine.nstates)
+        a, b, c, dt = self._controller()
+        if len(a):
+            z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
+            swing = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
+            seen = complex((c[:1] @ swing)[0])
+            if seen != 0:
+                x[: len(a)] = np.real(size * swing / seen)
+        return x
+
+    def _controller(self):
+        controller = self.loop.syslist[0]
+        if isinstance(controller, Sampled):
+            a, b, c, _, dt = controller.sampled
+            return a, b, c, dt
+        if isinstance(controller, ct.StateSpace) and controller.nstates:
+            return *(np.asarray(m, float) for m in (controller.A, controller.B, controller.C)), 0.0
+        return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), 0.0
+
+    def _corner(self) -> float:
+        """Input at which an element or a law bends; of one that jumps at zero, what its jump drives."""
+        primitive = getattr(self.block, "primitive", None)
+        corners = [abs(corner) for corner in getattr(primitive, "corners", ())]
+        size = max([*corners, getattr(primitive, "step", 0.0), getattr(primitive, "gap", 0.0)])
+        if size > 0:
+            return size
+        if self.block.nstates:
+            return 1.0
+        least = 10.0 ** _DECADES[0]
+        law = self._law
+        gain = self._gain()
+        jump = 0.5 * abs(law(least) - law(-least))
+        if jump > 1e-6 * abs(law(1e6 * least)):
+            return jump * gain or 1.0
+        return _bend(law, 1 / gain if gain else 0.0) or 1.0
+
+    def _gain(self) -> float:
+        """Gain of the linear part at the loop's pace."""
+        a, b, c, dt = self._controller()
+        z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
+        return (
+            float(np.abs(c[:1] @ np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]))[0, 0]) if len(a) else 0.0
+        )
+
+    def _law(self, u) -> float:
+        return float(
+            np.squeeze(np.asarray(self.block.outfcn(0.0, np.zeros(0), np.array([u]), self.block.params))[0])
+        )
+
+    def _length_scale(self) -> float:
+        """Displacement at which the block's nonlinearity matters [m]."""
+        core = self.core
+        stiffness = sum(core.masses) * self.pace**2
+        scales = [core.gap, sum(level(chain, 0.0, 1.0, 0.0) for chain in core.friction) / stiffness]
+        for element, _ in core.input_channel:
+            scales += [abs(c) / stiffness for c in getattr(element, "corners", ())]
+            scales.append(getattr(element, "step", 0.0) / stiffness)
+        scales += [getattr(element, "step", 0.0) for element, _ in core.output_channel]
+        if core.stop is not None:
+            scales.append(0.5 * (core.stop.span[1] - core.stop.span[0]))
+        if max(scales) > 0:
+            return max(scales)
+        return self._smooth_scale() or 1.0
+
+    def _smooth_scale(self):
+        """Where a law that bends smoothly over place or speed has as much to say as the loop's own stiffness."""
+        n, mass = self.block.nstates, sum(self.core.masses)
+
+        def force(place, speed):
+            x = np.zeros(n)
+            x[0 : 2 * self.core.bodies : 2], x[1 : 2 * self.core.bodies : 2] = place, speed
+            dx = np.asarray(self.block.updfcn(0.0, x, np.zeros(1), self.block.params), float)
+            return mass * dx[2 * self.core.driven + 1]
+
+        stiffness = mass * self.pace**2
+        bends = [_bend(lambda x: stiffness * x + force(x, 0.0))]
+        slow = _bend(lambda v: stiffness / self.pace * v + force(0.0, v))
+        bends.append(None if slow is None else slow / self.pace)
+        known = [b for b in bends if b]
+        return min(known) if known else None
+
+
+def _bend(law, least=0.0):
+    """Smallest argument at which a law leaves the line of its slope at zero, by a share of that or `least`."""
+    sizes = 10.0**_DECADES
+    with np.errstate(all="ignore"):
+        slopes = np.array([(law(u) - law(0.0)) / u for u in sizes])
+    if not np.isfinite(slopes[0]):
+        return None
+    straight = slopes[np.isfinite(slopes)][0]
+    for u, slope in zip(sizes, slopes, strict=True):
+        if np.isfinite(slope) and abs(slope - straight) > _BENT * max(abs(straight), least):
+            low, high = u / 10.0, u
+            for _ in range(60):  # to the argument itself: decades belong to a unit
+                middle = np.sqrt(low * high)
+                now = (law(middle) - law(0.0)) / middle
+                if abs(now - straight) > _BENT * max(abs(straight), least):
+                    high = middle
+                else:
+                    low = middle
+            return float(high)
+    return None
+
+
+def _pole_frequency(controller) -> float:
+    """Geometric mean of the pole frequencies of a linear part [rad/s]."""
+    a, _, _, dt = controller
+    if not len(a):
+        return 1.0
+    poles = np.linalg.eigvals(a)
+    if dt:
+        poles = np.log(poles[np.abs(poles) > 1e-12]) / dt
+    sizes = np.abs(poles)
+    sizes = sizes[sizes > 1e-9 * sizes.max(initial=0.0)]
+    return float(np.exp(np.mean(np.log(sizes)))) if sizes.size else (1.0 if not dt else 0.1 / dt)
+
+
+def corner_frequency(parts) -> float:
+    """Highest frequency at which the controller balances the block's inertia, |H(jw)| = m w^2 [rad/s].
+
+    A loop closed on the velocity has its corner elsewhere, for which this serves as well as a scale.
+    """
+    mass = sum(parts.block.core.masses)
+    controller = parts.controller
+    if isinstance(controller, int | float):
+        controller = ct.tf([float(controller)], [1.0])
+    dt = float(getattr(controller, "dt", 0) or 0)
+    if not dt:
+        num, den = (np.asarray(p[0][0], float) for p in (ct.tf(controller).num, ct.tf(controller).den))
+        gap = np.polysub(_power(num), mass**2 * np.concatenate([_power(den), [0.0, 0.0, 0.0, 0.0]]))
+        roots = np.roots(np.trim_zeros(gap, "f"))
+        real = roots[(np.abs(roots.imag) < 1e-6 * np.abs(roots)) & (roots.real > 0)].real
+        return float(real.max()) if real.size else 1.0
+    omega = np.geomspace(1e-6, 1.0, 600) * np.pi / dt
+    gain = np.abs(np.asarray(controller(np.exp(1j * omega * dt))).ravel())
+    above = gain > mass * omega**2
+    return float(omega[np.flatnonzero(above)[-1]]) if above.any() else float(omega[0])
+
+
+def _power(p):
+    """Coefficients of |p(jw)|^2 as a polynomial of w."""
+    n = len(p) - 1
+    turned = p * (1j ** np.arange(n, -1, -1))
+    return np.real(np.polymul(turned, np.conj(turned)))

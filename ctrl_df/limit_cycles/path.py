@@ -1,0 +1,281 @@
+"""The way from a describing function's solution to the cycle with all its harmonics.
+
+A describing function drops the harmonics that H returns to the block's input. Here a share of them is fed
+back, ``u = a cos(omega t) + Re sum U_k exp(j k omega t)`` with ``U_k = -share H(j k omega) Y_k(u)`` for k other
+than 1, and ``1 + H(j omega) Y_1(u) / a = 0``: share 0 is the prediction, share 1 the cycle (up to the harmonics
+kept). The solutions form a curve, followed by its arclength, which passes folds. Where the curve comes back
+to share 0 it ends on another prediction: the two have merged on the way, and no cycle belongs to either.
+
+References
+----------
+Keller (1977), Numerical solution of bifurcation and nonlinear eigenvalue problems; Mees (1981), Dynamics of
+Feedback Systems, ch. 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+_CLOSED = 1e-7  # defect, relative to the fundamental, of a point on the curve
+_NUDGE = 1e-5  # of the difference quotients; all unknowns are relative
+_LONGEST, _SHORTEST, _FIRST = 0.25, 1e-3, 0.1  # steps along the curve
+_MOST_STEPS = 80
+_REACH = np.log([30.0, 10.0])  # in amplitude and frequency, beyond which a curve is given up
+_ODD = 1e-7  # even harmonics and mean of the answer to an odd waveform, below which a block is odd
+
+
+class End(Enum):
+    """How a curve ended; the value says it in words."""
+
+    REACHED = "all harmonics are fed back"
+    MERGED = "the prediction merges with another one before all harmonics are fed back"
+    LEFT = "with its harmonics the cycle moves out of reach"
+    UNANSWERED = "the block has no periodic answer to the waveform"
+    STOPPED = "the curve could not be followed"
+
+
+@dataclass(frozen=True)
+class Path:
+    """Where the curve that begins at a prediction leads.
+
+    Attributes
+    ----------
+    end : End
+    share : float
+        Largest share of the harmonics that was fed back.
+    omega : float
+        At the end [rad/s].
+    waveform : ndarray of complex
+        Fourier coefficients k = 0, 1, ... of the block's input at the end, phase of the fundamental 0.
+    answer : ndarray of complex
+        Those of the block's output.
+    folds : int
+        Times the curve turned back.
+    """
+
+    end: End
+    share: float
+    omega: float
+    waveform: np.ndarray
+    answer: np.ndarray
+    folds: int = 0
+
+    @property
+    def solution(self) -> tuple[float, float]:
+        """(amplitude, omega) at the end."""
+        return float(self.waveform[1].real), self.omega
+
+
+def follow_path(respond: Callable, harmonics: int, linear, amplitude, omega) -> Path:
+    """Follow the curve from a prediction until all harmonics are fed back, or it comes back.
+
+    Parameters
+    ----------
+    respond : callable
+        As `ctrl_df.limit_cycles.answer.responder` returns it.
+    harmonics : int
+        Highest harmonic kept.
+    linear : LinearPart
+    amplitude, omega : float
+        The prediction.
+    """
+    curve = _Curve(respond, harmonics, linear, amplitude, omega)
+    return curve.follow()
+
+
+def corrected_near(respond: Callable, harmonics: int, linear, amplitude, omega) -> Path | None:
+    """Balance all harmonics at once, from a guess at which no prediction need stand; None if that fails."""
+    curve = _Curve(respond, harmonics, linear, amplitude, omega)
+    z = curve.begin()
+    for share in (0.0, 0.5, 1.0):
+        z[-1] = share
+        r, _ = curve.defect(z)
+        J = None if r is None else curve.jacobian(z, r)
+        found = None if J is None else curve.corrected(z, curve.level(), J)
+        if found is None:
+            return None
+        z, Y, J = found
+    return curve.path(End.REACHED, z, 1.0, Y, 0)
+
+
+class _Curve:
+    """Unknowns z = (ln a, ln omega, U_k / a for k other than 1, share) and their equations."""
+
+    def __init__(self, respond, harmonics, linear, amplitude, omega):
+        self.respond, self.harmonics, self.linear = respond, harmonics, linear
+        self.first = np.log([amplitude, omega])
+        self.kept = np.array([0, *range(2, harmonics + 1)])
+        U = np.zeros(harmonics + 1, complex)
+        U[1], U[3] = amplitude, 0.05 * amplitude * np.exp(0.7j)
+        Y = respond(U, omega)
+        if Y is not None and np.abs(Y[0::2]).max() < _ODD * np.abs(Y).max():
+            self.kept = np.arange(3, harmonics + 1, 2)
+        gain = linear.static_gain
+        self.fixed_mean = bool(np.isnan(gain)) and not linear.measured
+        self.static_gain = 0.0 if np.isnan(gain) else gain
+
+    def waveform(self, z):
+        """Return U_k, a and omega of the unknowns."""
+        U = np.zeros(self.harmonics + 1, complex)
+        a = float(np.exp(z[0]))
+        count = self.kept.size
+        parts = z[2:-1]
+        V = parts[:count].astype(complex)
+        imaginary = self.kept != 0
+        V[imaginary] += 1j * parts[count:]
+        U[self.kept] = a * V
+        U[1] = a
+        return U, a, float(np.exp(z[1]))
+
+    def defect(self, z):
+        """Return what is missing to the balance of each harmonic, and the block's answer; (None, None) if it has none."""
+        U, a, omega = self.waveform(z)
+        Y = self.respond(U, omega)
+        if Y is None or not np.isfinite(Y).all():
+            return None, None
+        return self._defect(z, U / a, Y / a, omega), Y
+
+    def _defect(self, z, V, y, omega):
+        k = np.concatenate([[1], self.kept])
+        H, _ = self.linear.clamped(np.maximum(k, 1) * omega)
+        H = np.where(np.isfinite(H), H, 0)
+        share = z[-1]
+        r = V[self.kept] + share * H[1:] * y[self.kept]
+        if self.kept[0] == 0:
+            if self.fixed_mean:  # an integrator in H: the mean of the output must vanish
+                r[0] = (1 - share) * V[0] + share * y[0] / abs(y[1])
+            else:
+                r[0] = V[0] + share * self.static_gain * y[0]
+        first = 1 + H[0] * y[1]
+        return np.concatenate([[first.real, first.imag], r.real, r.imag[self.kept != 0]])
+
+    def jacobian(self, z, r):
+        """Derivatives of the defect by all unknowns, share included; None where the block does not answer."""
+        columns = []
+        for i in range(z.size):
+            moved = z.copy()
+            moved[i] += _NUDGE if i < z.size - 1 or z[i] < 0.5 else -_NUDGE
+            there, _ = self.defect(moved)
+            if there is None:
+                return None
+            columns.append((there - r) / (moved[i] - z[i]))
+        return np.array(columns).T
+
+    def begin(self):
+        """Return the unknowns of the prediction."""
+        z = np.zeros(2 + 2 * self.kept.size - int(self.kept[0] == 0) + 1)
+        z[:2] = self.first
+        return z
+
+    def level(self):
+        """Return the border that holds the share."""
+        border = np.zeros(self.begin().size)
+        border[-1] = 1.0
+        return border
+
+    def follow(self) -> Path:
+        """Follow the curve from share 0 to 1, or back to 0."""
+        z = self.begin()
+        r, Y = self.defect(z)
+        J = None if r is None else self.jacobian(z, r)
+        border = self.level()
+        if r is None or J is None:
+            return self.path(End.UNANSWERED, z, 0.0, np.zeros(self.harmonics + 1, complex), 0)
+        found = self.corrected(z, border, J)  # the prediction itself, to the accuracy of the samples
+        if found is None:
+            return self.path(End.STOPPED, z, 0.0, Y, 0)
+        z, Y, J = found
+        border = _tangent(J, border)
+        step, share, folds = _FIRST, 0.0, 0
+        reason = End.STOPPED
+        for _ in range(_MOST_STEPS):
+            ahead = z + step * border
+            target = None
+            if ahead[-1] >= 1.0:
+                target = 1.0
+            elif ahead[-1] <= 0.0 and (border[-1] < 0.0):
+                target = 0.0
+            if target is not None:
+                ahead = z + (target - z[-1]) / border[-1] * border
+                found = self.corrected(ahead, self.level(), J)
+                if found is not None and np.abs(found[0] - ahead).max() < 0.5:
+                    z, Y, J = found
+                    end = End.REACHED if target == 1.0 else End.MERGED
+                    return self.path(end, z, max(share, z[-1]), Y, folds)
+            else:
+                found = self.corrected(ahead, border, J)
+            turned = None
+            if found is not None and target is None:
+                turned = _tangent(found[2], border)
+            # a step that bends the curve sharply, or that went far to find it, is taken shorter
+            if turned is None or turned @ border < 0.8 or np.abs(found[0] - ahead).max() > 0.3 * step:
+                step *= 0.5
+                if step < _SHORTEST:
+                    break
+                fresh, _ = self.defect(z)
+                J = J if fresh is None else self.jacobian(z, fresh)
+                if J is None:
+                    reason = End.UNANSWERED
+                    break
+                border = _tangent(J, border)
+                continue
+            if turned[-1] * border[-1] < 0.0:
+                folds += 1
+            z, Y, J = found
+            border = turned
+            share = max(share, float(z[-1]))
+            step = min(1.6 * step, _LONGEST)
+            if (np.abs(z[:2] - self.first) > _REACH).any():
+                reason = End.LEFT
+                break
+        return self.path(reason, z, share, Y, folds)
+
+    def corrected(self, z, border, J):
+        """Newton onto the curve within the plane through z across `border`; (z, Y, J) or None."""
+        z = z.copy()
+        offset = border @ z
+        r, Y = self.defect(z)
+        if r is None:
+            return None
+        fresh, before = False, np.inf
+        for _ in range(12):
+            size = float(np.abs(r).max())
+            if size < _CLOSED:
+                return z, Y, J
+            if size > 0.5 * before:
+                if fresh and size > 0.9 * before:
+                    return (z, Y, J) if size < 100 * _CLOSED else None
+                J = self.jacobian(z, r)
+                fresh = True
+                if J is None:
+                    return None
+            before = size
+            change = np.linalg.lstsq(np.vstack([J, border]), -np.append(r, border @ z - offset), rcond=1e-10)[
+                0
+            ]
+            if np.abs(change).max() > 1.0:
+                return None
+            there, Y = self.defect(z + change)
+            if there is None:
+                return None
+            if change @ change > 0:  # Broyden's update
+                J = J + np.outer(there - r - J @ change, change) / (change @ change)
+            z, r = z + change, there
+        return None
+
+    def path(self, end, z, share, Y, folds) -> Path:
+        """Return where the curve stands."""
+        U, _, omega = self.waveform(z)
+        return Path(end, share, omega, U, Y, folds)
+
+
+def _tangent(J, along):
+    """Direction of the curve, the side of `along`."""
+    right = np.zeros(J.shape[1])
+    right[-1] = 1.0
+    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-10)[0]
+    return t / np.linalg.norm(t)
