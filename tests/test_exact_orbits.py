@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.status import Status
 
 FRICTION, BACKLASH = cdf.pid(2000, 44250, 130), cdf.pid(1800, 19500, 100)
 
@@ -30,7 +31,9 @@ def test_hunting_is_found_by_search_alone(static, omega):
 
 
 def test_no_hunting_above_the_limit():
-    assert cdf.find_limit_cycle(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5, static=6.0))) is None
+    answer = cdf.find_limit_cycle(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5, static=6.0)))
+    assert not answer and answer.status is Status.NOT_FOUND
+    assert len(answer.tried) == 6 and {t.outcome for t in answer.tried} == {"diverges"}
 
 
 def test_the_impact_orbit_with_chatter():

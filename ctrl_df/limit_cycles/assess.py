@@ -12,7 +12,7 @@ from .answer import responder
 from .bound import mees_bergen
 from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros
-from .grade import UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
+from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
 from .path import End, follow_path
 from .scan_grid import FAST, grid_slope, noisy
 
@@ -22,6 +22,7 @@ SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can b
 # 0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79).
 MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
 FLOOR = 1e-3  # least half width of a band
+FOLD = (1.5, 1.15)  # times the harmonics there are, at which a fold makes a prediction doubtful, unreliable
 VAGUE = 0.3  # |1 + N H| beyond which an average over irregular motion places no crossing, however it spreads
 
 
@@ -42,7 +43,7 @@ class Assessor:
         """All cycles of the scan and of the branches, by rising amplitude."""
         found = [self._cycle(c) for c in self.scan.crossings] + self._irregular()
         found += [self._on_branch(b) for b in self.branched]
-        return sorted(without_doubles(found), key=lambda c: (c.amplitude, c.omega))
+        return sorted(near_folds(found), key=lambda c: (c.amplitude, c.omega))
 
     def _irregular(self) -> list[LimitCycle]:
         """Crossings among averages over irregular motion: the interpolant's zeros, one a neighbourhood."""
@@ -201,20 +202,29 @@ class Assessor:
         return False
 
 
-def without_doubles(cycles):
-    """Mark predictions that become the same cycle once harmonics are kept: the nearest stands for it."""
+def near_folds(cycles):
+    """Grade down pairs of predictions that come together as their harmonics are fed back.
+
+    Near a fold the distance of two solutions goes with the square root of what is missing to it: from d0 as
+    predicted and d1 with all harmonics, the two merge at ``1 / (1 - (d1 / d0)^2)`` times the harmonics there are.
+    """
     out = list(cycles)
     for i, one in enumerate(cycles):
         for other in cycles:
             if other is one or one.corrected is None or other.corrected is None:
                 continue
-            same = np.abs(np.log(np.divide(one.corrected, other.corrected))).max() < 0.01
-            mine, its = (abs(math.log(c.corrected[0] / c.amplitude)) for c in (one, other))
-            if same and mine > its:
-                text = (
-                    f"With its harmonics kept it becomes the cycle predicted at {other.amplitude:.4g} @ "
-                    f"{other.omega:.4g} "
-                    "rad/s: there is hardly a cycle of its own. "
-                )
-                out[i] = replace(one, grade=UNRELIABLE, why=text + one.why)
+            before = np.log([one.amplitude / other.amplitude, one.omega / other.omega])
+            after = np.log(np.divide(one.corrected, other.corrected))
+            ratio = np.abs(after).max() / max(np.abs(before).max(), 1e-12)
+            margin = math.inf if ratio >= 1 else 1 / (1 - ratio**2)
+            if margin > FOLD[0]:
+                continue
+            near = margin < FOLD[1]
+            text = (
+                f"As its harmonics are fed back it nears the cycle predicted at {other.amplitude:.4g} @ "
+                f"{other.omega:.4g} rad/s: the two would merge at {margin:.2f} times the harmonics there are"
+                f"{'; there may be neither' if near else ''}. "
+            )
+            grade = UNRELIABLE if near or one.grade == UNRELIABLE else DOUBTFUL
+            out[i] = replace(one, grade=grade, why=text + out[i].why)
     return out

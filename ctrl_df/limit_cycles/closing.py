@@ -15,6 +15,7 @@ from .symmetry import shift_directions, transverse
 
 _CLOSED = 3e-10  # mismatch after a lap, relative to the size of each state
 _ACCEPTED = 1e-7  # the same where events limit what can be reached
+_STRETCH = 4.0  # of the period on the way
 _STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
 _MOST_STEPS = 120  # along the path of a shrinking mismatch
 _MOST_LAPS = 32  # an orbit closed after so many laps or fewer is told from the one of a single lap
@@ -57,7 +58,7 @@ class Closing:
     def close(self, x0, period: float) -> Orbit:
         """Newton from a state near the orbit and an estimate of the period; NoClosure if it fails."""
         start, size = self._free_state(np.array(x0, float), period)
-        status, best, grown = Status.NOT_CONVERGED, np.inf, 0
+        status, best, grown, first = Status.NOT_CONVERGED, np.inf, 0, period
         lap = beside = None
         for _ in range(self.max_iterations):
             lap = self.tracer.lap(start, period, size=size)
@@ -79,8 +80,8 @@ class Closing:
             best = min(best, mismatch)
             step = self._newton(start, lap, period, size, beside, residual)
             period += step[-1]
-            if period <= 0:
-                raise NoClosure("Newton left for a negative period")
+            if not first / _STRETCH < period < first * _STRETCH:
+                raise NoClosure("Newton left for another period", best)
             start = self._rebuilt(start.x + step[:-1])
         if lap is None or self._at_rest(start, lap, period, size):
             raise NoClosure("Newton ended at rest")
@@ -148,9 +149,12 @@ class Closing:
             turned = None if found is None else _tangent(J, border)
             if turned is None or turned @ border < 0.8:
                 step *= 0.5
-                if step < 1e-4 * scale:
+                if step > 1e-5 * scale:
+                    continue
+                round_it = _round_corner(equations, y, border, 1e-3 * scale, 1e-4 * scale)
+                if round_it is None:
                     break
-                continue
+                (found, turned), step = round_it, 1e-3 * scale
             y, border = found, turned
             least = min(least, float(y[-1]))
             if y[-1] <= 0.0:
@@ -296,6 +300,27 @@ def _tangent(J, along):
     right[-1] = 1.0
     t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-12)[0]
     return t / np.linalg.norm(t)
+
+
+def _round_corner(equations, y, border, step, tolerance):
+    """Go on beyond a corner of the path, where an event begins or ends to take part and the Jacobian jumps.
+
+    The path beyond is a tangent of the Jacobian there; of its two directions the one is right that stays there.
+    """
+    try:
+        _, before = equations(y - step * border)
+        _, beyond = equations(y + step * border)
+    except NoClosure:
+        return None
+    along = _tangent(beyond, border)
+    for direction in (along, -along):
+        try:
+            found, J = _onto(equations, y + step * direction, direction, tolerance)
+        except NoClosure:
+            continue
+        if np.abs(J - beyond).max() < 0.5 * np.abs(J - before).max():
+            return found, direction
+    return None
 
 
 def _onto(equations, y, border, tolerance):

@@ -21,7 +21,9 @@ _PEEKS = 129  # in a stride of about four swings, from which its peaks are read
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
 _GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
-_STEADY = 1.05  # change of the swings over the second half of a course, below which they keep their size
+# Change of the swings from the third to the last quarter of a course below which they keep their size, and the
+# share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if quadratic).
+_STEADY, _LASTING_GROWTH, _LASTING_DECAY = 1.25, 0.5, 0.9
 
 RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"
 
@@ -232,6 +234,6 @@ def _tendency(laps) -> str:
     if not now > 0 or not earlier > 0 or max(now, 1 / now) < _STEADY:
         return UNDECIDED
     lasting = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
-    if lasting < 0.5:
-        return UNDECIDED
-    return DIVERGES if now > 1.0 else RESTS
+    if now > 1.0:
+        return DIVERGES if lasting > _LASTING_GROWTH else UNDECIDED
+    return RESTS if lasting > _LASTING_DECAY else UNDECIDED
