@@ -40,8 +40,10 @@ class Affine:
             for row, constant, following in self.modes[mode][2]:
                 here, there = row @ x + constant, row @ ahead + constant
                 if there < 0 <= here or (here < 0 and there < here):
+
                     def guard(s, row=row, constant=constant):
                         return row @ self.flow(mode, x, s) + constant
+
                     at = 0.0 if here <= 0 else brentq(guard, 0.0, h, xtol=1e-15 * span, rtol=1e-15)
                     if first is None or at < first:
                         first, after = at, following
@@ -165,7 +167,9 @@ def _gap(loop, orbit, x0, size):
         return 0, z
 
     row = np.array([0, -1, 0, 1, 0], float)
-    modes = {0: (M, np.zeros(5), [(row, 0.0, lambda z: knock(z, False)), (-row, gap, lambda z: knock(z, True))])}
+    modes = {
+        0: (M, np.zeros(5), [(row, 0.0, lambda z: knock(z, False)), (-row, gap, lambda z: knock(z, True))])
+    }
     if any(event.kind == "contact" for event in orbit.events):
         return float("nan")  # chatter that ends in contact: not written here
     z = Affine(modes).run(0, z0, orbit.period)

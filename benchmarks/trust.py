@@ -97,7 +97,9 @@ def judge(loop, tally: Tally, rng, name):
             bad = error > LAP * max(1.0, orbit.multiplier)
             tally.wrong += bad
             if bad:
-                tally.remarks.append(f"{name}: orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} closes to {error:.1g}")
+                tally.remarks.append(
+                    f"{name}: orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} closes to {error:.1g}"
+                )
     return response, check
 
 
@@ -181,8 +183,12 @@ def report(tally: Tally, seconds):
     print(f"| loops | {tally.loops}, {seconds:.0f} s |")
     print(f"| `no such orbit` said | {tally.denied}, of orbits that exist: {tally.falsely_denied} |")
     print(f"| orbits that exist near a prediction and were not found | {tally.overlooked} |")
-    print(f"| unstable orbits near a trusted or doubtful prediction, found | {found:.1f} % of {tally.unstable} |")
-    print(f"| exact orbits wrong by an integrator of its own | {tally.wrong} of {tally.checked} ({tally.orbits} in all) |")
+    print(
+        f"| unstable orbits near a trusted or doubtful prediction, found | {found:.1f} % of {tally.unstable} |"
+    )
+    print(
+        f"| exact orbits wrong by an integrator of its own | {tally.wrong} of {tally.checked} ({tally.orbits} in all) |"
+    )
     print(f"| trusted or doubtful answers that change with the grid | {tally.grids} |")
     print(f"| loops that answer otherwise in other units | {tally.units_wrong} of {tally.units} |")
 
@@ -192,7 +198,9 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--loops", type=int, default=20, help="of each family")
-    parser.add_argument("--units", type=int, default=10, help="of each family, written in other units as well")
+    parser.add_argument(
+        "--units", type=int, default=10, help="of each family, written in other units as well"
+    )
     parser.add_argument("--families", nargs="*", default=FAMILIES)
     parser.add_argument("--grids", action=argparse.BooleanOptionalAction, default=True)
     chosen = parser.parse_args(arguments)

@@ -192,7 +192,9 @@ def _steps(rng):
     den = np.polymul([1.0, 0.0], [1.0, pace])
     if rng.random() < 0.5:
         den = np.polymul(den, [1.0, pace * _log(rng, 1.0, 8.0)])
-    num = np.array([float(np.prod(np.abs(np.roots(den)[np.abs(np.roots(den)) > 0]))) * pace * _log(rng, 0.6, 4.0)])
+    num = np.array(
+        [float(np.prod(np.abs(np.roots(den)[np.abs(np.roots(den)) > 0]))) * pace * _log(rng, 0.6, 4.0)]
+    )
     return _element(rng, "steps", "play", (num, den), 0.5 * gap, (1.02, 200.0), pace,
                     lambda u: cdf.play(gap * u.force))  # fmt: skip
 

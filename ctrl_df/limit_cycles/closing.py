@@ -10,6 +10,7 @@ from ..simulate.engine import Engine, Event
 from ..simulate.layout import AUX, KIND, MECHANISM, MODE
 from ..status import Status
 from .monodromy import RTOL, Tracer
+from .multiple_shooting import shoot
 from .orbit import Orbit
 from .symmetry import shift_directions, transverse
 
@@ -89,6 +90,15 @@ class Closing:
             raise NoClosure(f"Newton came no nearer than {best:.1g} of the orbit's size", best)
         lap, period = self._single(start, period, lap, size, beside)
         return self._finished(start, period, lap, size)
+
+    def close_along(self, states, period: float) -> Orbit:
+        """Close an orbit from states at equal steps of time along it, by multiple shooting."""
+        largest = np.abs(states).max(axis=0)
+        size = self.tracer.sizes(self._rebuilt(states[0]), period, largest)
+        met = shoot(self.tracer, self._rebuilt, np.asarray(states, float), period, size)
+        if met is None:
+            raise NoClosure("the pieces of multiple shooting do not meet")
+        return self.close(*met)
 
     def trace(self, x0, period: float) -> Orbit:
         """Let what is missing to a closed lap shrink little by little, from a state near the orbit.

@@ -24,6 +24,7 @@ from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
 
 # A prediction and an orbit within these factors of frequency and amplitude are taken for one cycle.
 SAME_CYCLE = (1.25, 2.0)
+_PIECES = 8  # of multiple shooting
 _NEAR_MISS = 0.3  # mismatch of a lap, relative to the orbit, from which it is worth following
 _ENOUGH = 6  # swings from which an orbit can be judged
 
@@ -225,10 +226,18 @@ class OrbitFinder:
         if path.end is not End.REACHED:
             self.tried.append(Try(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)"))
             return None
+        self.missed = np.inf
         start, period = harmonic_start(self.loop, path.waveform, path.omega), 2 * np.pi / path.omega
         orbit = self._closed(start, period, name)
+        if orbit is None:
+            k = np.arange(len(path.waveform))
+            along = [start] + [
+                harmonic_start(self.loop, path.waveform * np.exp(2j * np.pi * k * i / _PIECES), path.omega)
+                for i in range(1, _PIECES)
+            ]
+            orbit = self._closed(np.array(along), period, "states all along it", self.closing.close_along)
         if orbit is None and self.missed < _NEAR_MISS:
-            orbit = self._closed(start, period, "the mismatch after a lap, let shrink", trace=True)
+            orbit = self._closed(start, period, "the mismatch after a lap, let shrink", self.closing.trace)
         return orbit
 
     def _belongs(self, orbit, path) -> bool:
@@ -313,13 +322,13 @@ class OrbitFinder:
         self.tried.append(Try(name, words))
         return orbit, course
 
-    def _closed(self, start, period, name, trace=False) -> Orbit | None:
+    def _closed(self, start, period, name, close=None) -> Orbit | None:
         try:
-            orbit = (self.closing.trace if trace else self.closing.close)(start, period)
+            orbit = (close or self.closing.close)(start, period)
         except NoClosure as why:
             self.centre = self.centre or isinstance(why, Centre)
             self.merged = self.merged or isinstance(why, Merged)
-            self.missed = why.mismatch
+            self.missed = min(self.missed, why.mismatch)
             self.tried.append(Try(name, str(why)))
             return None
         self.tried.append(Try(name, f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s"))

@@ -20,6 +20,7 @@ _DEAD = 1e-9  # of the largest state met, below which a loop without passages is
 _PEEKS = 129  # in a stride of about four swings, from which its peaks are read
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
+_BEYOND = 10.0  # times the largest kick's first swing: growth at a steady ratio from there has no bound
 _GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
 # Change of the swings from the third to the last quarter of a course below which they keep their size, and the
 # share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if quadratic).
@@ -155,6 +156,8 @@ class Swings:
             if quiet and size < _DEAD * largest:
                 fate = RESTS
                 break
+            if found and laps[-1].peak > _BEYOND and _explodes(laps):
+                return Course(laps, DIVERGES, np.inf, state)
             if until_repeated and len(laps) > 12 and self.repeats(laps):
                 fate = CYCLES if laps[-1].peak > _FAINT * max(lap.peak for lap in laps) else RESTS
                 break
@@ -226,6 +229,14 @@ def _growth(laps, ago: int = 0) -> float:
     peaks = np.array([lap.peak for lap in laps])[: len(laps) - ago * quarter]
     before = np.mean(peaks[-2 * quarter : -quarter])
     return float(np.mean(peaks[-quarter:]) / before) if before > 0 else float("nan")
+
+
+def _explodes(laps, count: int = 8) -> bool:
+    """Whether the last swings grew at a steady ratio."""
+    if len(laps) < count:
+        return False
+    ratios = np.diff(np.log([max(lap.peak, 1e-300) for lap in laps[-count:]]))
+    return bool(ratios.min() > 1e-3 and ratios.max() < 1.05 * ratios.min())
 
 
 def _tendency(laps) -> str:

@@ -1,0 +1,91 @@
+"""Multiple shooting: an orbit from states all along it, where one lap would lose a guess that is not exact.
+
+Over a lap errors grow by the largest multiplier, over an eighth of it by that to the power of an eighth. So
+orbits that repel strongly are closed from what harmonic balance knows of them.
+
+References
+----------
+Bock & Plitt (1984), A multiple shooting algorithm for direct solution of optimal control problems.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_ITERATIONS = 30
+_CLOSED = 1e-9  # mismatch at every joint, relative to the size of each state
+_LONGEST = 0.5  # largest change of a state in a step, relative to its size
+
+
+def shoot(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:
+    """Make the pieces of an orbit meet.
+
+    Parameters
+    ----------
+    tracer : Tracer
+    rebuilt : callable
+        ``rebuilt(x) -> State`` with modes in line.
+    states : (m, n) array
+        Estimates at times 0, period/m, ...
+    period : float
+        Estimate [s].
+    size : (n,) array
+        Scale of each state.
+
+    Returns
+    -------
+    (state, period) or None
+        A point of the orbit, or None where the pieces do not meet.
+    """
+    m, n = states.shape
+    z = np.append((states / size).ravel(), 0.0)  # the last one: logarithm of the period's change
+    best = None
+    for _ in range(_ITERATIONS):
+        pieces = _pieces(tracer, rebuilt, z, m, n, period, size)
+        if pieces is None:
+            return None
+        residual, J = pieces
+        worst = float(np.max(np.abs(residual)))
+        if worst < _CLOSED:
+            return z[:n] * size, period * float(np.exp(z[-1]))
+        step = np.linalg.lstsq(J, -residual, rcond=1e-12)[0]
+        step *= min(1.0, _LONGEST / max(float(np.max(np.abs(step))), 1e-300))
+        norm = float(np.linalg.norm(residual))
+        for _halving in range(6):  # shorter while the pieces come apart
+            trial = _pieces(tracer, rebuilt, z + step, m, n, period, size, differentiate=False)
+            if trial is not None and np.linalg.norm(trial[0]) < norm:
+                break
+            step *= 0.5
+        else:
+            if best is not None and worst > 0.9 * best:
+                return None
+        best = worst if best is None else min(best, worst)
+        z = z + step
+        if abs(z[-1]) > 1.0:
+            return None
+    return None
+
+
+def _pieces(tracer, rebuilt, z, m, n, period, size, differentiate=True):
+    """Mismatch at all joints and the phase, with its derivatives; None where a piece cannot be followed."""
+    span = period * np.exp(z[-1]) / m
+    residual = np.zeros(m * n + 1)
+    J = np.zeros((m * n + 1, m * n + 1))
+    for i in range(m):
+        start = rebuilt(z[i * n : (i + 1) * n] * size)
+        lap = tracer.lap(start, span, differentiate=differentiate, size=size)
+        if not lap.status.ok or not np.all(np.isfinite(lap.end.x)):
+            return None
+        after = (i + 1) % m
+        rows = slice(i * n, (i + 1) * n)
+        residual[rows] = lap.end.x / size - z[after * n : (after + 1) * n]
+        if differentiate:
+            if not np.all(np.isfinite(lap.monodromy)):
+                return None
+            J[rows, rows] += lap.monodromy * size / size[:, None]
+            J[rows, after * n : (after + 1) * n] -= np.eye(n)
+            J[rows, -1] = tracer.rate(lap.end.time, lap.end.x, lap.end.mode) * span / size
+            if i == 0:
+                rate = tracer.rate(start.time, start.x, start.mode) * period / size
+                J[-1, :n] = rate / max(np.linalg.norm(rate), 1e-300)
+    return residual, J
