@@ -1,15 +1,15 @@
-"""Compiled functions and where their machine code is kept: `njit` and `cfunc` for the files of this package.
+"""Compiled functions and where their machine code is kept: `njit` and `cfunc` for this package.
 
-numba keeps machine code beside the source or, failing that, under the home directory, refuses to decorate where
-neither can be written, reads only where it can write, and takes code for fresh while the file of the function
-itself is unchanged. Here the code is
+numba keeps machine code beside the source or, failing that, under the home directory, refuses to decorate
+where neither can be written, reads only where it can write, and takes code for fresh while the file of the
+function itself is unchanged. Here the code is
 
-- read from every place that may hold it: ``NUMBA_CACHE_DIR``, the ``__pycache__`` beside the source (also where
-  that cannot be written: an image built by root and run by another), the user's cache folder;
-- written to the first of these that takes it; where none does, everything runs as well, compiled anew in memory
-  by every process, and one warning names the remedy;
-- fresh as long as nothing has changed that it was compiled from: the file and all it imports, so that a function
-  edited in one file is never called in its old form from another.
+- read from every place that may hold it: ``NUMBA_CACHE_DIR``, the ``__pycache__`` beside the source (also
+  where that cannot be written: an image built by root and run by another), the user's cache folder;
+- written to the first of these that takes it; where none does, everything runs as well, compiled anew in
+  memory by every process, and one warning names the remedy;
+- fresh as long as nothing has changed that it was compiled from: the file and all it imports, so that a
+  function edited in one file is never called in its old form from another.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import inspect
-import os
 import re
 import warnings
 from pathlib import Path
