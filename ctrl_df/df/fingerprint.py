@@ -1,10 +1,10 @@
 """A digest of a computation: equal if and only if everything that decides its numbers is.
 
 Blocks, systems, functions and data are followed to plain numbers, names and bytecode. A function is its code,
-its constants, defaults, closure and the globals it uses; an object its class and its state; what belongs to an
-installed package is its name and the package's version. Names that the user gives for reading (of systems,
-signals, functions), memory addresses and the order of dicts and sets do not count, so that the same lines
-give the same digest in every process. What hides its state from Python is refused rather than guessed.
+its constants, defaults, closure and the globals it uses; an object its class and its state; what belongs to
+an installed package is its name and the package's version. Names that the user gives for reading (of
+systems, signals, functions), memory addresses and the order of dicts and sets do not count, so that the same
+lines give the same digest in every process. What hides its state from Python is refused rather than guessed.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _NAMES = {
 _BOOKKEEPING = {
     "__dict__", "__weakref__", "__module__", "__doc__", "__qualname__", "__annotations__", "__annotate__",
     "__dataclass_fields__", "__dataclass_params__", "__match_args__", "__firstlineno__",
-    "__static_attributes__", "__parameters__", "__orig_bases__", "_abc_impl", "__abstractmethods__", "__classcell__", "__classdict__",
-    "__annotations_cache__", "__annotate_func__", "__slotnames__",
+    "__static_attributes__", "__parameters__", "__orig_bases__", "_abc_impl", "__abstractmethods__",
+    "__classcell__", "__classdict__", "__annotations_cache__", "__annotate_func__", "__slotnames__",
 }  # fmt: skip
 _CODE = (
     "co_code", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_flags", "co_argcount",

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .dispatch import Method, _Guarded
-from .executors import by_executor, check_executor
+from .executors import by_executor, check_executor, check_picklable
 from .family import FORMAT, Family, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
@@ -21,6 +21,7 @@ LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
 _HERE = 1 << 15  # points of a closed form computed at a time: some tenths of a second
 _LAW_ROWS = 64  # amplitudes of a static law computed together: its corners are looked for once for them
+_BRIEF = ("linear",)  # computed sooner than sent
 _IRREGULAR = 64  # points of backlash at a time: each takes up to 10 ms where its motion has no period
 
 
@@ -68,7 +69,11 @@ class Work:
     def run(self, executor, progress):
         """Compute what is still to do; `executor` and `progress` as in `describing_function_family`."""
         if executor is not None:
-            check_executor(executor, (self.method, self.orders))
+            check_executor(executor)
+            if self.method.name in _BRIEF:
+                executor = None
+            else:
+                check_picklable(executor, (self.method, self.orders))
         try:
             parts = self._parts(executor is not None)
             if len(parts) > 1 or executor is not None:
