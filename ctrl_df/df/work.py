@@ -55,16 +55,16 @@ class Work:
         require_room(*shape, orders)
         self.save = None if save is None else _save_path(save)
         self.fingerprint = "" if save is None else self._fingerprint()
-        self.harmonics = np.full((*shape, orders + 1), np.nan + 0j)
-        self.regime = np.full(shape, "", dtype=_REGIME)
-        self.residual = np.full(shape, np.nan)
+        self.harmonics = np.empty((*shape, orders + 1), dtype=complex)
+        self.regime = np.empty(shape, dtype=_REGIME)
+        self.residual = np.empty(shape)
         # along amplitudes one orbit starts the next: keep columns whole
         self.by_omega = method.name == "orbit"
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
         self.journal: Journal | None = None
         self.written = False
         if self.save is not None and self.save.exists():
-            self._resume()
+            self._resume(self.save)
 
     def run(self, executor, progress):
         """Compute what is still to do; `executor` and `progress` as in `describing_function_family`."""
@@ -165,9 +165,9 @@ class Work:
             lines=self.done.size,
         )
 
-    def _resume(self):
-        unfinished = is_journal(self.save)
-        data = read_header(self.save) if unfinished else read_arrays(self.save)
+    def _resume(self, path):
+        unfinished = is_journal(path)
+        data = read_header(path) if unfinished else read_arrays(path)
         if str(data.get("fingerprint", "")) != self.fingerprint:
             old = int(data.get("format", FORMAT)) < FORMAT
             why = (
@@ -175,9 +175,9 @@ class Work:
                 if old
                 else "holds another computation (block, grid, orders, output or options differ)"
             )
-            raise ValueError(f"save={str(self.save)!r} {why}. Give another path, or remove that file.")
+            raise ValueError(f"save={str(path)!r} {why}. Give another path, or remove that file.")
         if unfinished:
-            journal, records = Journal.resume(self.save)
+            journal, records = Journal.resume(path)
             for record in records:
                 self._take(record["lines"], (record["harmonics"], record["regime"], record["residual"]))
             self.journal = journal

@@ -149,8 +149,9 @@ def folders(source: Path) -> list[Path]:
     """Return the folders that may hold the machine code of a file, the one to write to first."""
     apart = f"{source.parent.name}_{hashlib.sha1(str(source.parent).encode()).hexdigest()}"
     found = [source.parent / "__pycache__", Path(AppDirs("numba", False).user_cache_dir) / apart]
-    if config.CACHE_DIR:
-        found.insert(0, Path(config.CACHE_DIR) / apart)
+    chosen = getattr(config, "CACHE_DIR", "")  # NUMBA_CACHE_DIR
+    if chosen:
+        found.insert(0, Path(chosen) / apart)
     return found
 
 
