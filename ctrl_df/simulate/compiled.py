@@ -47,15 +47,21 @@ def njit(cache=True, **options) -> Any:
 def cfunc(signature, law) -> Any:
     """Compile a law as ``numba.cfunc(signature, cache=True)`` does; one that has no file is not kept."""
     args, returns = sigutils.normalize_signature(signature)
-    compiled = ccallback.CFunc(law, (args, returns), {}, {})
+
+    def uncompiled() -> Any:
+        return ccallback.CFunc(law, (args, returns), {}, {})
+
+    compiled = uncompiled()
     if _is_ours(law):
         _keep(compiled, law)
-    else:
-        try:
-            compiled.enable_caching()
-        except RuntimeError:  # typed at the prompt, or in a folder that numba cannot write to
-            pass
-    compiled.compile()
+        compiled.compile()
+        return compiled
+    try:
+        compiled.enable_caching()
+        compiled.compile()
+    except (RuntimeError, OSError):  # typed at the prompt, or in a place that cannot be written
+        compiled = uncompiled()
+        compiled.compile()
     return compiled
 
 
