@@ -103,6 +103,37 @@ def test_where_the_search_is_cut_short_it_looks_where_zeros_are_likeliest(monkey
     assert few.crossings[0].omega == pytest.approx(whole.crossings[0].omega, rel=1e-10)
 
 
+def zeros_one_by_one(log_a, log_w, values, chosen):
+    found = []
+    for i, k in zip(*np.nonzero(chosen), strict=True):
+        for corner, along_a, along_w, sign in (
+            ((i, k), (i + 1, k), (i, k + 1), 1),
+            ((i + 1, k + 1), (i, k + 1), (i + 1, k), -1),
+        ):
+            D0 = values[corner]
+            Da, Dw = values[along_a] - D0, values[along_w] - D0
+            M = np.array([[Da.real, Dw.real], [Da.imag, Dw.imag]])
+            if np.isfinite(M).all():
+                s, t = np.linalg.solve(M, [-D0.real, -D0.imag])
+                if s >= 0 and t >= 0 and s + t <= 1:
+                    step = s * (log_a[i + 1] - log_a[i]), t * (log_w[k + 1] - log_w[k])
+                    found.append((log_a[corner[0]] + sign * step[0], log_w[corner[1]] + sign * step[1]))
+    return np.array(found)
+
+
+def test_zeros_of_the_interpolant_are_found_all_at_once(monkeypatch):
+    monkeypatch.setattr(crossings, "_AT_ONCE", 100)
+    rng = np.random.default_rng(2)
+    a, w = np.sort(rng.random(40)), np.sort(rng.random(30))
+    values = rng.normal(size=(40, 30)) + 1j * rng.normal(size=(40, 30))
+    values[rng.random(values.shape) < 0.1] = np.nan
+    chosen = rng.random((39, 29)) < 0.7
+    expected = zeros_one_by_one(a, w, values, chosen)
+    assert len(expected) > 100
+    assert np.allclose(crossings.linear_zeros(a, w, values, chosen), expected, rtol=1e-9, atol=1e-12)
+    assert crossings.linear_zeros(a, w, values, chosen & False).shape == (0, 2)
+
+
 LONG = {
     "one line of orbits": """
         block = cdf.Mass(9).with_effect(cdf.Stribeck(6.0, 0.01)).with_effect(cdf.Coulomb(5.0))

@@ -231,20 +231,30 @@ def linear_zeros(log_a, log_w, values, chosen):
     chosen : ndarray of bool, shape (na - 1, nw - 1)
         Cells to look at.
     """
-    zeros = []
-    for i, k in zip(*np.nonzero(chosen), strict=True):
+    zeros, order = [], []
+    rows, columns = np.nonzero(chosen)
+    for first in range(0, rows.size, _AT_ONCE):
+        i, k = rows[first : first + _AT_ONCE], columns[first : first + _AT_ONCE]
         da, dw = log_a[i + 1] - log_a[i], log_w[k + 1] - log_w[k]
-        for corner, sign in (((i, k), 1.0), ((i + 1, k + 1), -1.0)):
-            D0 = values[corner]
-            Da = values[i + 1, k] - D0 if sign > 0 else values[i, k + 1] - D0
-            Dw = values[i, k + 1] - D0 if sign > 0 else values[i + 1, k] - D0
-            M = np.array([[Da.real, Dw.real], [Da.imag, Dw.imag]])
-            if not np.isfinite(M).all() or abs(np.linalg.det(M)) < 1e-300:
-                continue
-            s, t = np.linalg.solve(M, [-D0.real, -D0.imag])
-            if s >= 0 and t >= 0 and s + t <= 1:
-                zeros.append((log_a[corner[0]] + sign * s * da, log_w[corner[1]] + sign * t * dw))
-    return np.array(zeros).reshape(-1, 2)
+        by_a, by_w = values[i + 1, k], values[i, k + 1]  # from the near corner along a and along omega
+        for half, (a, w, one, other, sign) in enumerate(
+            ((i, k, by_a, by_w, 1.0), (i + 1, k + 1, by_w, by_a, -1.0))
+        ):
+            D0 = values[a, w]
+            with np.errstate(all="ignore"):
+                Da, Dw = one - D0, other - D0
+                det = Da.real * Dw.imag - Da.imag * Dw.real
+                s = (Dw.real * D0.imag - Dw.imag * D0.real) / det
+                t = (Da.imag * D0.real - Da.real * D0.imag) / det
+                inside = (s >= 0) & (t >= 0) & (s + t <= 1) & (np.abs(det) >= 1e-300)
+            inside &= np.isfinite(D0) & np.isfinite(Da) & np.isfinite(Dw)
+            here = np.nonzero(inside)[0]
+            place = log_a[a] + sign * s * da, log_w[w] + sign * t * dw
+            zeros.append(np.stack(place, axis=1)[here])
+            order.append(2 * (first + here) + half)
+    if not zeros:
+        return np.zeros((0, 2))
+    return np.concatenate(zeros)[np.argsort(np.concatenate(order))]
 
 
 def _solve(J, value):
