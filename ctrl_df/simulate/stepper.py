@@ -10,9 +10,9 @@ that is too much.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.integrate import DOP853, RK23, RK45
 
+from .compiled import njit
 from .flow import rates
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
