@@ -10,6 +10,8 @@ import sys
 import textwrap
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import control as ct
@@ -322,9 +324,23 @@ def test_a_damaged_file_gives_one_clear_error(name, saved):
         family(FRICTION, saved, [4.0, 8.0, 12.0], [2.0, 5.0], orders=3)
 
 
-def test_a_missing_file_is_missing(tmp_path):
+def test_what_is_no_file_is_said(saved, tmp_path):
     with pytest.raises(FileNotFoundError):
         cdf.load_family(tmp_path / "none.npz")
+    with pytest.raises(TypeError, match="needs the path of a file"):
+        cdf.load_family(0)  # to open() a number is an open file
+    for place, error in ((3, TypeError), (tmp_path, IsADirectoryError)):
+        with pytest.raises(error, match="save needs the path"):
+            cdf.load_family(saved).save(place)
+
+
+@pytest.mark.parametrize("executor", [None, ThreadPoolExecutor])
+def test_a_finished_file_is_taken_up_as_it_is(executor, saved):
+    before, when = saved.read_bytes(), saved.stat().st_mtime_ns
+    with (executor or nullcontext)(**({"max_workers": 1} if executor else {})) as pool:
+        again = family(FRICTION, saved, [4.0, 8.0, 12.0], [2.0, 5.0], orders=3, executor=pool)
+    assert saved.read_bytes() == before and saved.stat().st_mtime_ns == when
+    assert np.array_equal(again.harmonics, cdf.load_family(saved).harmonics, equal_nan=True)
 
 
 def test_a_file_of_format_1_is_read_but_not_taken_up(saved):
@@ -425,6 +441,26 @@ def test_a_record_torn_by_a_crash_is_computed_anew(tmp_path, monkeypatch):
         file.truncate(path.stat().st_size - 10)
     assert lines_done(path) == 2
     assert np.array_equal(family(block, path, **grid).harmonics, whole.harmonics)
+
+
+def test_a_journal_cut_anywhere_gives_the_lines_before_the_cut(tmp_path):
+    path = tmp_path / "f.npz"
+    journal = Journal.begin(path, {"lines": 3})
+    ends = [path.stat().st_size]
+    for line in range(3):
+        journal.append(
+            lines=np.array([line]), harmonics=np.full((1, 2, 2), line + 1j), regime=np.array([["slip"] * 2])
+        )
+        ends.append(path.stat().st_size)
+    journal.close()
+    whole = path.read_bytes()
+    for cut in range(ends[0], len(whole) + 1):
+        path.write_bytes(whole[:cut])
+        assert lines_done(path) == sum(end <= cut for end in ends[1:])
+    for flipped in range(ends[1], ends[2], 7):  # in the second record
+        path.write_bytes(whole[:flipped] + bytes([whole[flipped] ^ 1]) + whole[flipped + 1 :])
+        assert lines_done(path) == 1
+        assert [int(i) for i, _ in _records(path)] == [0] and path.stat().st_size == ends[1]
 
 
 def _interrupted(block, path, grid, monkeypatch, after):

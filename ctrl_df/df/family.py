@@ -139,10 +139,13 @@ def load_family(path) -> Family:
     ------
     FileNotFoundError
         There is no such file.
+    TypeError
+        `path` is no path.
     ValueError
         The file is damaged, holds no family or no complete one (interrupted work is finished by the call that
         began it), or needs pickle.
     """
+    path = _as_path("load_family", path)
     if is_journal(path):
         done, lines = lines_done(path), read_header(path)["lines"]
         raise ValueError(_incomplete(path, done, lines))
@@ -174,11 +177,27 @@ def minus_inverse(N) -> np.ndarray:
         return np.where(N == 0, complex(-np.inf, 0.0), -1 / np.where(N == 0, 1.0, N))
 
 
-def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
-    """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
-    path = Path(path)
+def place_for(save) -> Path:
+    """Return the path of a file to be written, or say why there can be none: to be asked before work."""
+    path = _as_path("save", save)
     if not path.parent.is_dir():
         raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
+    if path.is_dir():
+        raise IsADirectoryError(f"save needs the path of a file; got the folder {path}. Add a name, f.npz.")
+    if not os.access(path.parent, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
+        raise PermissionError(f"save needs a file that can be written; got {path}. Choose another folder.")
+    return path
+
+
+def _as_path(what, path) -> Path:
+    if not isinstance(path, str | os.PathLike) or isinstance(path, bytes):
+        raise TypeError(f"{what} needs the path of a file (text or Path); got {path!r}.")
+    return Path(path)
+
+
+def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
+    """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
+    path = place_for(path)
     arrays = {k: np.asarray(v) for k, v in arrays.items()}
     write = np.savez_compressed if sum(a.nbytes for a in arrays.values()) < _COMPRESSED else np.savez
     temporary = path.with_name(f"{path.name}.{os.getpid()}.part")

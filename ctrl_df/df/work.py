@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import copy
 import math
-import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .dispatch import Method, _Guarded
 from .executors import by_executor, check_executor, check_picklable
-from .family import FORMAT, Family, read_arrays, write_arrays
+from .family import FORMAT, Family, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
 
@@ -53,7 +51,7 @@ class Work:
         self.F, self.method, self.A, self.omega, self.orders = F, method, A, omega, orders
         shape = (A.size, 1 if omega is None else omega.size)
         require_room(*shape, orders)
-        self.save = None if save is None else _save_path(save)
+        self.save = None if save is None else place_for(save)
         self.fingerprint = "" if save is None else self._fingerprint()
         self.harmonics = np.empty((*shape, orders + 1), dtype=complex)
         self.regime = np.empty(shape, dtype=_REGIME)
@@ -76,7 +74,7 @@ class Work:
                 check_picklable(executor, (self.method, self.orders))
         try:
             parts = self._parts(executor is not None)
-            if len(parts) > 1 or executor is not None:
+            if len(parts) > 1 or (parts and executor is not None):
                 self._compute(parts, executor, progress)
             elif parts:  # no bar: importing one takes longer than most of them
                 self._take(parts[0], compute_part(self.method, *self._grid(parts[0]), self.orders))
@@ -266,25 +264,6 @@ def copied(method: Method) -> Method:
 
 def _multiples(size):
     return np.arange(_LAW_ROWS, size, _LAW_ROWS)
-
-
-def _save_path(save) -> Path:
-    """Return the path of a file that can be made, before the work and not after it."""
-    if not isinstance(save, str | os.PathLike):
-        raise TypeError(f"save needs the path of a file (text or Path); got {save!r}.")
-    path = in_a_folder(Path(save))
-    if path.is_dir():
-        raise IsADirectoryError(f"save needs the path of a file; got the folder {path}. Add a name, f.npz.")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise PermissionError(f"save needs a file that can be written; got {path}. Choose another folder.")
-    return path
-
-
-def in_a_folder(path: Path) -> Path:
-    """Refuse a file in a folder that does not exist, before the work and not after it."""
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
-    return path
 
 
 def describe(F) -> str:
