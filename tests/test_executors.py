@@ -16,6 +16,8 @@ import ctrl_df as cdf
 from ctrl_df.df import executors, work
 from ctrl_df.df.journal import lines_done
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # Python 3.12, with threads about
+
 A, OMEGA = [6.0, 8.0, 12.0, 20.0], [20.0, 30.0]
 BACKLASH = cdf.backlash_masses(1, 8, 0.018, 0.2)
 

@@ -170,7 +170,7 @@ def test_an_interrupt_ends_compiled_work_within_a_second(kind):
         sent = time.monotonic()
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=30)
-        assert time.monotonic() - sent < 2  # a second, and the interpreter's end
+        assert time.monotonic() - sent < 3  # 0.5 s measured; with the interpreter's end, on a busy machine
         assert re.search(r"KeyboardInterrupt: stopped. \d+ of \d+ lines", errors.splitlines()[-1])
     finally:
         process.kill()
