@@ -294,7 +294,7 @@ def test_interrupted_work_resumes(tmp_path, monkeypatch):
     monkeypatch.setattr(work, "compute_part", interrupted)
     with ThreadPoolExecutor(1) as pool, pytest.raises(KeyboardInterrupt):
         describing_function_family(block, A, [5.0, 9.0], executor=pool, save=path)
-    with pytest.raises(ValueError, match="2 of 4"):
+    with pytest.raises(ValueError, match="[23] of 4"):
         load_family(path)
     with ThreadPoolExecutor(2) as pool:
         family = describing_function_family(block, A, [5.0, 9.0], executor=pool, save=path)

@@ -22,8 +22,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..simulate.compiled import njit
 from .friction import _require, checked_orders, positive_axis
 from .wall_map import two_impact as _two_impact
 from .wall_map import two_impact_harmonics as _two_impact_harmonics

@@ -22,8 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..simulate.compiled import njit
 from .backlash import _STARTS, BACKLASH_REGIMES, _name
 from .branch import Branch, Motions
 from .wall_map import EXACT, flight, stays, wrap

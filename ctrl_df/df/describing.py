@@ -96,13 +96,15 @@ def describing_function_family(
     orders : int
         Highest harmonic, >= 1.
     executor : concurrent.futures.Executor, optional
-        Computes amplitudes in parallel; anything with ``submit(f, *args).result()``. F must then be
-        picklable.
+        Computes amplitudes in parallel, with bitwise the same result; anything with
+        ``submit(f, *args).result()``. For processes F must be picklable.
     output : str or int, optional
         Output to describe; default the first.
     save : path, optional
-        ``.npz`` file the result goes to; long work saves its finished part there, and the same call resumes
-        it.
+        ``.npz`` file the result goes to. Every finished line of long work is kept there at once, whatever
+        ends the process, and the same call computes the others. The file is taken up only if everything that
+        decides N is the same, the code of a callable included; F needs an attribute ``fingerprint``, a text
+        of yours, where that cannot be told (a function of a C library).
     progress : bool, optional
         Progress bar; default: only on a terminal and only after two seconds.
     try_method, num_points, **options
@@ -115,7 +117,15 @@ def describing_function_family(
     Raises
     ------
     ValueError
-        As `describing_function`; also an empty grid, or a `save` file that belongs to another computation.
+        As `describing_function`; also an empty grid, one whose result would take more than 2 GB, a `save`
+        file that is damaged or belongs to another computation, an F that cannot be told from others.
+    TypeError
+        As `describing_function`; also an executor without ``submit``, or a process pool and an F that cannot
+        be pickled.
+    RuntimeError
+        A worker process died, or the executor is shut down.
+    OSError
+        `save` is no place for a file, or written by another process.
     """
     A = _axis("A", _amplitudes(A), "unit of the input")
     if (A <= 0).any():

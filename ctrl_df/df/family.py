@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +12,11 @@ import control as ct
 import numpy as np
 
 from ..drawing import draw
+from .journal import is_journal, lines_done, read_header
 
-FORMAT = 1
+FORMAT = 2
+"""Of saved families: 1 to version 0.1.0; raised when files, or the numbers in them, change their meaning."""
+_COMPRESSED = 64 << 20  # [bytes] up to which a file is made small: beyond, that takes too long
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,21 +133,25 @@ class Family:
 
 
 def load_family(path) -> Family:
-    """Read a family written by `Family.save`.
+    """Read a family written by `Family.save`, or by ``save=`` of `describing_function_family`.
 
     Raises
     ------
+    FileNotFoundError
+        There is no such file.
+    TypeError
+        `path` is no path.
     ValueError
-        The file holds no complete family (interrupted work is finished by the call that began it), or needs
-        pickle.
+        The file is damaged, holds no family or no complete one (interrupted work is finished by the call that
+        began it), or needs pickle.
     """
+    path = _as_path("load_family", path)
+    if is_journal(path):
+        done, lines = lines_done(path), read_header(path)["lines"]
+        raise ValueError(_incomplete(path, done, lines))
     data = read_arrays(path)
-    if not bool(np.all(data.get("done", True))):
-        raise ValueError(
-            f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of "
-            f"{data['done'].size} parts. "
-            "Repeat the call of describing_function_family with the same save= to finish it."
-        )
+    if "done" in data and not data["done"].all():  # format 1
+        raise ValueError(_incomplete(path, int(data["done"].sum()), data["done"].size))
     return Family(
         amplitudes=data["amplitudes"],
         omega=data["omega"],
@@ -158,6 +163,13 @@ def load_family(path) -> Family:
     )
 
 
+def _incomplete(path, done, lines) -> str:
+    return (
+        f"load_family needs a complete family; {path} holds {done} of {lines} lines. Repeat the call of "
+        "describing_function_family with the same save= to finish it."
+    )
+
+
 def minus_inverse(N) -> np.ndarray:
     """-1/N; NaN stays NaN, and N = 0 gives minus infinity."""
     N = np.asarray(N, dtype=complex)
@@ -165,42 +177,116 @@ def minus_inverse(N) -> np.ndarray:
         return np.where(N == 0, complex(-np.inf, 0.0), -1 / np.where(N == 0, 1.0, N))
 
 
-def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
-    """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
-    path = Path(path)
+def place_for(save) -> Path:
+    """Return the path of a file to be written, or say why there can be none: to be asked before work."""
+    path = _as_path("save", save)
     if not path.parent.is_dir():
         raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    if path.is_dir():
+        raise IsADirectoryError(f"save needs the path of a file; got the folder {path}. Add a name, f.npz.")
+    if not os.access(path.parent, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
+        raise PermissionError(f"save needs a file that can be written; got {path}. Choose another folder.")
+    return path
+
+
+def _as_path(what, path) -> Path:
+    if not isinstance(path, str | os.PathLike) or isinstance(path, bytes):
+        raise TypeError(f"{what} needs the path of a file (text or Path); got {path!r}.")
+    return Path(path)
+
+
+def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
+    """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
+    path = place_for(path)
+    arrays = {k: np.asarray(v) for k, v in arrays.items()}
+    write = np.savez_compressed if sum(a.nbytes for a in arrays.values()) < _COMPRESSED else np.savez
+    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **{k: np.asarray(v) for k, v in arrays.items()})
+        with open(temporary, "wb") as file:
+            write(file, allow_pickle=False, **arrays)
         os.replace(temporary, path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
     return path
 
 
 def read_arrays(path) -> dict[str, np.ndarray]:
-    """Read an npz file of a family, refusing pickles and strangers."""
+    """Read an npz file of a family, refusing pickles, strangers and what is damaged."""
     try:
         with open(path, "rb") as handle:
             file = np.load(handle, allow_pickle=False)
             if isinstance(file, np.ndarray):
                 raise ValueError("it holds one bare array")
             data = {key: file[key] for key in file.files}
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        if isinstance(error, FileNotFoundError):
-            raise
-        raise ValueError(f"a family file must be an npz without pickled objects; {path}: {error}.") from None
-    needed = {"format", "amplitudes", "omega", "harmonics", "regime", "residual", "description", "output"}
-    if not needed <= data.keys():
-        raise ValueError(f"{path} is no family file: it lacks {', '.join(sorted(needed - data.keys()))}.")
+    except (FileNotFoundError, IsADirectoryError, PermissionError):
+        raise
+    except Exception as error:  # a damaged zip fails in many ways, each with an error of its own
+        raise ValueError(
+            f"{path} is no family file or a damaged one (half copied, cut off): {error}. A family file is an "
+            "npz without pickled objects. Remove it and compute the family anew, or copy it again."
+        ) from None
+    missing = _KEYS - data.keys()
+    if missing:
+        raise ValueError(
+            f"{path} is no family file: it lacks {', '.join(sorted(missing))}. Give a file that "
+            "Family.save or save= wrote."
+        )
+    wrong = _wrong(data)
+    if wrong:
+        raise ValueError(f"{path} holds no sound family: {wrong}. Remove it and compute the family anew.")
     if int(data["format"]) > FORMAT:
         raise ValueError(
             f"{path} was written by a newer ctrl_df (format {int(data['format'])}); update the package."
         )
     return data
+
+
+_KEYS = {"format", "amplitudes", "omega", "harmonics", "regime", "residual", "description", "output"}
+
+
+def _wrong(data) -> str:
+    """Say which rule the arrays of a family break, "" if none."""
+    kinds = {"format": "iu", "amplitudes": "fiu", "omega": "fiu", "harmonics": "c", "residual": "fiu"}
+    kinds |= {"regime": "U", "description": "U", "output": "U"}
+    words = {"fiu": "real numbers", "iu": "an integer", "c": "complex numbers", "U": "text"}
+    for key, kind in kinds.items():
+        if data[key].dtype.kind not in kind:
+            return f"{key} must be {words[kind]}, and is of type {data[key].dtype}"
+    for key in ("format", "description", "output"):
+        if data[key].ndim:
+            return f"{key} must be one value, and has shape {data[key].shape}"
+    A, omega, harmonics = data["amplitudes"], data["omega"], data["harmonics"]
+    if A.ndim != 1 or not A.size or not (np.isfinite(A) & (A > 0)).all():
+        return "amplitudes must be a 1-D array of positive finite numbers"
+    if omega.ndim != 1 or not omega.size:
+        return "omega must be a 1-D array"
+    if not ((np.isfinite(omega) & (omega > 0)).all() or (omega.size == 1 and np.isnan(omega[0]))):
+        return "omega must be positive and finite (one NaN for a family without frequencies)"
+    grid = (A.size, omega.size)
+    if harmonics.ndim != 3 or harmonics.shape[:2] != grid or harmonics.shape[2] < 2:
+        return f"harmonics must have shape {grid + ('orders + 1',)}, and has {harmonics.shape}".replace(
+            "'", ""
+        )
+    for key in ("regime", "residual"):
+        if data[key].shape != grid:
+            return f"{key} must have shape {grid}, and has {data[key].shape}"
+    whole = _whole(data)
+    if np.isinf(harmonics[whole]).any():
+        return "harmonics must be finite, or NaN where there is no periodic answer"
+    if (data["residual"][whole] < 0).any():
+        return "residual must not be negative"
+    if (data["regime"][whole] == "").any():
+        return "regime must name every point"
+    return ""
+
+
+def _whole(data):
+    """Select what is done of a family of format 1, everything of others."""
+    done, shape = data.get("done"), data["regime"].shape
+    if done is None:
+        return np.ones(shape, dtype=bool)
+    return np.broadcast_to(done[:, None] if done.size == shape[0] else done[None, :], shape)
 
 
 def _arrays(family: Family) -> dict[str, Any]:

@@ -27,7 +27,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ..simulate.compiled import njit
 
 FRICTION_REGIMES = ("slip", "stick-slip", "stuck")
 SLIP, STICK_SLIP, STUCK = 0, 1, 2

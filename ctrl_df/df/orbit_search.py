@@ -129,6 +129,7 @@ class OrbitSearch:
         self.previous = self.first = None
         self.shot.jacobian[:] = np.nan
         self.shot.size[:] = 0.0
+        self.shot.clock[:] = 0.0  # the step of the last run: a line must not depend on the one before
 
     # --- the search -----------------------------------------------------------------------------------------
 

@@ -39,6 +39,7 @@ without and with sustained contact; one period but no half-wave symmetry althoug
 periods; none; no dry friction and no contact; the state runs away (NaN); the bound on work was hit (NaN);
 the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
+_AT_ONCE = 64  # points of a line between two chances to interrupt it
 
 
 def orbit_family(
@@ -149,12 +150,16 @@ class OrbitSolver(OrbitSearch):
             past[0, : len(units)] = self.previous.x / units
             past[3, 0] = 0.02
             mode = self.previous.mode.copy()
-            done, _, _ = sweep(
-                self.shot, samples, scratch, A[p:], omega[p:], self.least, power, self.inertia, past, mode, 1,
-                self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[p:], ends[p:],
-                miss[p:], kinds[p:], still[p:],
-            )  # fmt: skip
-            self._raise_if_raised()
+            done, known, goes_on = 0, 1, True
+            while goes_on and p + done < n:  # compiled code hears no Ctrl-C: some points at a time
+                one, end = p + done, min(p + done + _AT_ONCE, n)
+                more, _, known = sweep(
+                    self.shot, samples, scratch, A[one:end], omega[one:end], self.least, power, self.inertia,
+                    past, mode, known, self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end],
+                    ends[one:end], miss[one:end], kinds[one:end], still[one:end],
+                )  # fmt: skip
+                self._raise_if_raised()
+                done, goes_on = done + more, one + more == end
             for q in range(p, p + done):
                 self._aim(A[q], omega[q])
                 y = self._coefficients(out[q, self.row], ends[q, :, self.row], 1, self.mirrored)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .dispatch import Method
+from .work import compute_part
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
 
@@ -39,20 +40,20 @@ def points(method: Method, A, omega, zero_check=False):
         return N, regime, residual
     levels, row = np.unique(a[live], return_inverse=True)
     if not method.needs_omega or omega is None:
-        y, kind, error = method.harmonics(levels, None, 1)
+        y, kind, error = compute_part(method, levels, None, 1)
         flat[live], names[live], errors[live] = y[row, 0, 1], kind[row, 0], error[row, 0]
         return N, regime, residual
     w = omega.reshape(-1)[live]
     frequencies, column = np.unique(w, return_inverse=True)
     if levels.size * frequencies.size <= _RECTANGLE * live.size:
-        y, kind, error = method.harmonics(levels, frequencies, 1)
+        y, kind, error = compute_part(method, levels, frequencies, 1)
         flat[live], names[live] = y[row, column, 1], kind[row, column]
         errors[live] = error[row, column]
         return N, regime, residual
     for k, frequency in enumerate(frequencies):
         mine = np.nonzero(column == k)[0]
         some, where = np.unique(row[mine], return_inverse=True)
-        y, kind, error = method.harmonics(levels[some], np.array([frequency]), 1)
+        y, kind, error = compute_part(method, levels[some], np.array([frequency]), 1)
         flat[live[mine]], names[live[mine]] = y[where, 0, 1], kind[where, 0]
         errors[live[mine]] = error[where, 0]
     return N, regime, residual

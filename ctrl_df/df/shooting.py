@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from ..simulate import driver
+from ..simulate.compiled import njit
 from ..simulate.driver import copy
 from .native import call_native
 from .shot import coordinates, place

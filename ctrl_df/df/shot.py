@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..simulate import driver
 from ..simulate import layout as L
+from ..simulate.compiled import njit
 from ..simulate.driver import run
 from ..simulate.engine import harmonic_drive
 from ..simulate.flow import combine, external, signals

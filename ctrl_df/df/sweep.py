@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from ..simulate import layout as L
+from ..simulate.compiled import njit
 from ..simulate.layout import Drive
 from .shooting import CLOSED, close_orbit
 from .shot import coordinates, place

@@ -17,7 +17,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from ..simulate.compiled import njit
 
 CHATTER = 3e-4  # [rad] remaining time of a chatter below which contact is sustained
 # The time of an impact is taken when Halley's step is this part of it, and the step is still made: it is then

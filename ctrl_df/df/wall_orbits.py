@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..simulate.compiled import njit
 from .wall_map import EXACT, ROUGH, flight, lag, place, stays, wrap
 
 NEAR = 1e-5  # distance of a recurrence from which Newton's method is tried

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-import hashlib
-import time
-from pathlib import Path
+import copy
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from .dispatch import Method
-from .family import FORMAT, Family, read_arrays, write_arrays
+from .dispatch import Method, _Guarded
+from .executors import by_executor, check_executor, check_picklable
+from .family import FORMAT, Family, place_for, read_arrays, write_arrays
+from .fingerprint import fingerprint
+from .journal import Journal, is_journal, read_header
 
-_PARTIAL_EVERY = 5.0  # [s] between saved parts
+LARGEST = 2 << 30  # [bytes] of a family in memory
+_REGIME = "U16"
+_HERE = 1 << 15  # points of a closed form computed at a time: some tenths of a second
+_LAW_ROWS = 64  # amplitudes of a static law computed together: its corners are looked for once for them
+_BRIEF = ("linear",)  # computed sooner than sent
+_IRREGULAR = 64  # points of backlash at a time: each takes up to 10 ms where its motion has no period
 
 
 class Work:
@@ -31,105 +39,165 @@ class Work:
         Highest harmonic.
     save : path or None
         ``.npz`` file; if it holds a part of this very computation, that part is taken over.
+
+    Raises
+    ------
+    ValueError
+        The family is too large, a `save` file that belongs to another computation or is damaged, a block that
+        cannot be identified.
     """
 
     def __init__(self, F, method: Method, A, omega, orders, save):
         self.F, self.method, self.A, self.omega, self.orders = F, method, A, omega, orders
         shape = (A.size, 1 if omega is None else omega.size)
-        self.harmonics = np.full((*shape, orders + 1), np.nan + 0j)
-        self.regime = np.full(shape, "", dtype="U24")
-        self.residual = np.full(shape, np.nan)
-        self.by_omega = (
-            method.name == "orbit"
-        )  # along amplitudes one orbit starts the next: keep columns whole
+        require_room(*shape, orders)
+        self.save = None if save is None else place_for(save)
+        self.fingerprint = "" if save is None else self._fingerprint()
+        self.harmonics = np.empty((*shape, orders + 1), dtype=complex)
+        self.regime = np.empty(shape, dtype=_REGIME)
+        self.residual = np.empty(shape)
+        # along amplitudes one orbit starts the next: keep columns whole
+        self.by_omega = method.name == "orbit"
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
-        self.save = None if save is None else in_a_folder(Path(save))
-        self.saved_at = time.monotonic()
+        self.journal: Journal | None = None
+        self.written = False
         if self.save is not None and self.save.exists():
-            self._resume()
+            self._resume(self.save)
 
     def run(self, executor, progress):
         """Compute what is still to do; `executor` and `progress` as in `describing_function_family`."""
-        lines = np.nonzero(~self.done)[0]
-        if lines.size == 0:
-            return
-        quick = self.method.name != "orbit" and self.method.name not in ("backlash", "memory")
-        parts = [lines] if quick and executor is None else [lines[i : i + 1] for i in range(lines.size)]
-        if len(parts) == 1 and executor is None:  # no bar: importing one takes longer than most of them
-            self._take(parts[0], compute_part(self.method, *self._grid(parts[0]), self.orders))
-            return self._finish()
-        bar = progress_bar(lines.size, progress)
-        try:
-            if executor is None:
-                for part in parts:
-                    self._take(part, compute_part(self.method, *self._grid(part), self.orders))
-                    bar.update(len(part))
+        if executor is not None:
+            check_executor(executor)
+            if self.method.name in _BRIEF:
+                executor = None
             else:
-                pending = [
-                    (part, executor.submit(compute_part, self.method, *self._grid(part), self.orders))
-                    for part in parts
-                ]
-                for part, future in pending:
-                    self._take(part, future.result())
-                    bar.update(len(part))
-        finally:  # an interruption must not lose what is done
-            bar.close()
+                check_picklable(executor, (self.method, self.orders))
+        try:
+            parts = self._parts(executor is not None)
+            if len(parts) > 1 or (parts and executor is not None):
+                self._compute(parts, executor, progress)
+            elif parts:  # no bar: importing one takes longer than most of them
+                self._take(parts[0], compute_part(self.method, *self._grid(parts[0]), self.orders))
             self._finish()
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"stopped. {self._kept()}") from None
+        finally:
+            if self.journal is not None:
+                self.journal.close()
 
-    def _finish(self):
-        if self.save is not None and self.done.any():
-            self._write()
+    def _compute(self, parts, executor, progress):
+        if self.save is not None and self.journal is None:
+            self.journal = Journal.begin(self.save, self._header())
+        bar = progress_bar(sum(map(len, parts)), progress)
+
+        def take(part, values):
+            self._take(part, values)
+            bar.update(len(part))
+
+        method = self.method
+        try:
+            if executor is None or (method.name == "memory" and copied(method) is method):
+                for part in parts:
+                    take(part, compute_part(method, *self._grid(part), self.orders))
+            else:
+                tasks = ((part, (copied(method), *self._grid(part), self.orders)) for part in parts)
+                by_executor(executor, compute_part, tasks, take, self._kept)
+        except BaseException:
+            if self.journal is not None and not self.done.any():
+                self.journal.close()
+                self.journal.path.unlink(missing_ok=True)  # nothing in it
+            raise
+        finally:
+            bar.close()
+
+    def _parts(self, spread) -> list[np.ndarray]:
+        """Lines still to do, in parts; the numbers do not depend on how they are cut.
+
+        A static law's corners are looked for over the amplitudes of a part: these are always the same.
+        """
+        lines = np.nonzero(~self.done)[0]
+        if self.method.name in ("law", "element"):
+            return [p for p in np.split(lines, np.searchsorted(lines, _multiples(self.A.size))) if p.size]
+        quick = self.method.name in ("friction", "linear", "rate")
+        most = max(1, _HERE // self._omega.size) if quick and not spread else 1
+        return [lines[i : i + most] for i in range(0, lines.size, most)]
 
     def _grid(self, part):
         return (self.A, self._omega[part]) if self.by_omega else (self.A[part], self.omega)
 
     def _take(self, part, values):
         where = (slice(None), part) if self.by_omega else part
-        self.harmonics[where], self.regime[where], self.residual[where] = values
+        y, regime, residual = values
+        if regime.dtype.itemsize > self.regime.dtype.itemsize:
+            self.regime = self.regime.astype(regime.dtype)
+        self.harmonics[where], self.regime[where], self.residual[where] = y, regime, residual
         self.done[part] = True
-        if self.save is not None and time.monotonic() - self.saved_at > _PARTIAL_EVERY:
-            self._write()
+        if self.journal is not None:
+            self.journal.append(lines=part, harmonics=y, regime=regime, residual=residual)
 
-    def _write(self):
-        arrays = dict(
-            format=FORMAT,
+    # --- the file -------------------------------------------------------------------------------------------
+
+    def _finish(self):
+        if self.save is None or self.written:
+            return
+        if self.journal is not None:
+            self.journal.close()
+        write_arrays(self.save, self._arrays())
+
+    def _arrays(self):
+        return dict(
+            self._header(),
             amplitudes=self.A,
             omega=self._omega,
             harmonics=self.harmonics,
             regime=self.regime,
             residual=self.residual,
+        )
+
+    def _header(self) -> dict:
+        return dict(
+            format=FORMAT,
+            fingerprint=self.fingerprint,
             description=describe(self.F),
             output=self.method.output,
-            done=self.done,
-            fingerprint=self._fingerprint(),
+            lines=self.done.size,
         )
-        write_arrays(self.save, arrays)
-        self.saved_at = time.monotonic()
 
-    def _resume(self):
-        data = read_arrays(self.save)
-        if str(data.get("fingerprint", "")) != self._fingerprint():
-            raise ValueError(
-                f"save={str(self.save)!r} holds another computation (block, grid, orders or output differ). "
-                "Give another path, or remove that file."
+    def _resume(self, path):
+        unfinished = is_journal(path)
+        data = read_header(path) if unfinished else read_arrays(path)
+        if str(data.get("fingerprint", "")) != self.fingerprint:
+            old = int(data.get("format", FORMAT)) < FORMAT
+            why = (
+                "was written by an earlier ctrl_df, which could not tell all blocks apart"
+                if old
+                else "holds another computation (block, grid, orders, output or options differ)"
             )
-        done = data["done"]
-        self.done[:] = done
-        for mine, name in (
-            (self.harmonics, "harmonics"),
-            (self.regime, "regime"),
-            (self.residual, "residual"),
-        ):
-            where = (slice(None), done) if self.by_omega else done
-            mine[where] = data[name][where]
+            raise ValueError(f"save={str(path)!r} {why}. Give another path, or remove that file.")
+        if unfinished:
+            journal, records = Journal.resume(path)
+            for record in records:
+                self._take(record["lines"], (record["harmonics"], record["regime"], record["residual"]))
+            self.journal = journal
+        else:
+            self.harmonics, self.regime, self.residual = data["harmonics"], data["regime"], data["residual"]
+            self.done[:] = self.written = True
+
+    def _kept(self) -> str:
+        """Say what of the work is kept, and how to go on."""
+        number = f"{int(self.done.sum())} of {self.done.size} lines"
+        if self.save is None:
+            return f"{number} were done and are lost; save= keeps them."
+        if not self.done.any():
+            return f"No line was done; nothing is kept in {str(self.save)!r}."
+        return f"{number} are kept in {str(self.save)!r}: the same call computes the others."
 
     def _fingerprint(self) -> str:
-        text = hashlib.sha256(
-            f"{identity(self.F)}|{self.method.output}|{self.orders}|{self.method.options}".encode()
-        )
-        text.update(self.A.tobytes())
-        text.update(self._omega.tobytes())
-        return text.hexdigest()
+        method, labels = self.method, list(getattr(self.F, "output_labels", []))
+        output = labels.index(method.output) if method.output in labels else method.output
+        law = method.subject.law if isinstance(method.subject, _Guarded) else method.subject
+        how = (method.name, output, method.order, method.own_method, method.samples, method.options)
+        return fingerprint(FORMAT, law, how, self.A, self._omega, self.orders)
 
     @property
     def _omega(self):
@@ -151,31 +219,57 @@ class Work:
         )
 
 
-def in_a_folder(path: Path) -> Path:
-    """Refuse a file in a folder that does not exist, before the work and not after it."""
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
-    return path
+def require_room(na: int, nw: int, orders: int) -> None:
+    """Refuse a family that would not fit into memory, with the size that would."""
+    point = 16 * (orders + 1) + np.dtype(_REGIME).itemsize + 8
+    if na * nw * point > LARGEST:
+        side = math.isqrt(LARGEST // point)
+        raise ValueError(
+            f"a family of {na} x {nw} points with {orders} harmonics needs {na * nw * point / 1e9:.3g} GB; "
+            f"at most {LARGEST / 1e9:.3g} GB are computed at once. Give at most {side} x {side} points or "
+            f"{LARGEST // point} in all, fewer harmonics, or several families side by side."
+        )
 
 
 def compute_part(method: Method, A, omega, orders):
-    """Compute a few lines of a family; a plain function, so that it can be sent to another process."""
-    return method.harmonics(A, omega, orders)
+    """Compute a few lines of a family; a plain function, so that it can be sent to another process.
+
+    Compiled closed forms hear no Ctrl-C: they are asked for some points at a time.
+    """
+    most = {"friction": _HERE, "backlash": _IRREGULAR}.get(method.name)
+    if most is None or A.size * omega.size <= most:
+        return copied(method).harmonics(A, omega, orders)
+    rows = max(1, most // omega.size)
+    pieces = [
+        _row_of_pieces(method, A[i : i + rows], omega, orders, max(1, most // rows))
+        for i in range(0, A.size, rows)
+    ]
+    return pieces[0] if len(pieces) == 1 else [np.concatenate(p) for p in zip(*pieces, strict=True)]
+
+
+def _row_of_pieces(method, A, omega, orders, most):
+    pieces = [method.harmonics(A, omega[k : k + most], orders) for k in range(0, omega.size, most)]
+    return [np.concatenate(p, axis=1) for p in zip(*pieces, strict=True)]
+
+
+def copied(method: Method) -> Method:
+    """Return the method with its law copied if that keeps a memory: parts must not disturb each other."""
+    if method.name != "memory":
+        return method
+    try:
+        return replace(method, subject=copy.deepcopy(method.subject))
+    except Exception:  # whatever cannot be copied: one part after the other, then
+        return method
+
+
+def _multiples(size):
+    return np.arange(_LAW_ROWS, size, _LAW_ROWS)
 
 
 def describe(F) -> str:
     """Return a block in words: its value where it has one, else its name."""
     text = repr(F) if type(F).__module__.startswith("ctrl_df") else getattr(F, "__name__", None)
     return text or getattr(F, "name", None) or type(F).__name__
-
-
-def identity(F) -> str:
-    """Return a text that changes when the block does, to the last digit of its parameters."""
-    parameters = getattr(F, "parameters", None)
-    if parameters is None:
-        return f"{describe(F)}|{getattr(F, 'params', '')}"
-    numbers = {name: float(p).hex() for name, p in parameters.items()}
-    return f"{describe(F)}|{numbers}|{getattr(F, 'values', '')}|{getattr(F, 'measured', '')}"
 
 
 def progress_bar(total: int | None, progress, what="describing function", unit="line") -> Any:

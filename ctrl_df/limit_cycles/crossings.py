@@ -16,6 +16,7 @@ import numpy as np
 
 _MARGIN = 0.3  # of a cell's spread of values, by which a zero may hide beyond its corners
 _CUTS = 4
+_AT_ONCE = 1 << 18  # grid points looked at together: what bounds the memory of a large grid
 _MOST_STARTS = 600
 _MOST_PER_CELL = 4
 _STEP = 1e-5  # of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10
@@ -66,11 +67,13 @@ def find_crossings(D: Callable, log_a, log_w, values, refine=True) -> Scan:
     if rows.size == 0:
         return Scan([], cells, missing, 0, False)
     truncated = rows.size > _MOST_STARTS
-    rows, columns = rows[:_MOST_STARTS], columns[:_MOST_STARTS]
-    p, q, reach = _cut(D, log_a, log_w, rows, columns)
+    if truncated:
+        rows, columns = _nearest(values, rows, columns, _MOST_STARTS)
+    p, q, reach, size = _cut(D, log_a, log_w, rows, columns)
     if p.size > _MOST_STARTS:
         truncated = True
-        p, q, reach = p[:_MOST_STARTS], q[:_MOST_STARTS], reach[:_MOST_STARTS]
+        best = _least(size, _MOST_STARTS)
+        p, q, reach = p[best], q[best], reach[best]
     box = (log_a[0], log_a[-1], log_w[0], log_w[-1])
     found, unresolved = _polish(D, p, q, reach, box, refine)
     return Scan(found, cells, missing, unresolved, truncated)
@@ -86,8 +89,29 @@ def jacobian(D: Callable, p, q) -> np.ndarray:
     return np.stack([np.stack([by_p.real, by_q.real], -1), np.stack([by_p.imag, by_q.imag], -1)], -2)
 
 
+def _nearest(values, rows, columns, most):
+    """Select the cells whose corners are least, in the order given: they are where zeros are likeliest."""
+    size = np.zeros(rows.size)
+    for i, k in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        corner = np.abs(values[rows + i, columns + k])
+        size = np.maximum(size, np.where(np.isfinite(corner), corner, 0))  # not all four are NaN
+    chosen = _least(size, most)
+    return rows[chosen], columns[chosen]
+
+
+def _least(size, most):
+    """Return the indices of the least values, in rising order."""
+    return np.sort(np.argsort(size, kind="stable")[:most])
+
+
 def _may_hold_zero(values):
     """Cells whose corners leave room for a zero; corners without an answer widen the room."""
+    rows = max(1, _AT_ONCE // values.shape[1])
+    blocks = (values[i : i + rows + 1] for i in range(0, values.shape[0] - 1, rows))
+    return np.concatenate([_block_may_hold_zero(block) for block in blocks])
+
+
+def _block_may_hold_zero(values):
     corners = np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]])
     known = np.isfinite(corners)
     partial = ~known.all(axis=0)
@@ -102,27 +126,27 @@ def _may_hold_zero(values):
 
 
 def _cut(D, log_a, log_w, rows, columns):
-    """Cut candidate cells; return the centres of the small cells that may hold a zero, and their reach."""
+    """Cut candidate cells; return the centres of small cells that may hold a zero, their reach and |D|."""
     t = np.linspace(0, 1, _CUTS + 1)
-    starts_p, starts_q, reach = [], [], []
+    starts_p, starts_q, reach, sizes = [], [], [], []
     da, dw = log_a[rows + 1] - log_a[rows], log_w[columns + 1] - log_w[columns]
     P = np.broadcast_to((log_a[rows][:, None] + da[:, None] * t)[:, :, None], (rows.size, t.size, t.size))
     Q = np.broadcast_to((log_w[columns][:, None] + dw[:, None] * t)[:, None, :], (rows.size, t.size, t.size))
     values = D(P.ravel(), Q.ravel()).reshape(P.shape)
     for i in range(rows.size):
         r, c = np.nonzero(_may_hold_zero(values[i]))
+        middle = np.abs(values[i][r, c] + values[i][r + 1, c] + values[i][r, c + 1] + values[i][r + 1, c + 1])
+        middle = np.where(np.isfinite(middle), middle, np.inf)
         if r.size > _MOST_PER_CELL:  # neighbours of one zero; the nearest few suffice
-            middle = np.abs(
-                values[i][r, c] + values[i][r + 1, c] + values[i][r, c + 1] + values[i][r + 1, c + 1]
-            )
-            best = np.argsort(np.where(np.isfinite(middle), middle, np.inf))[:_MOST_PER_CELL]
-            r, c = r[best], c[best]
+            best = np.argsort(middle)[:_MOST_PER_CELL]
+            r, c, middle = r[best], c[best], middle[best]
         starts_p.append(log_a[rows[i]] + da[i] * (t[r] + 0.5 / _CUTS))
         starts_q.append(log_w[columns[i]] + dw[i] * (t[c] + 0.5 / _CUTS))
         reach.append(np.tile([da[i], dw[i]], (r.size, 1)))
+        sizes.append(middle)
     if not starts_p:
-        return np.zeros(0), np.zeros(0), np.zeros((0, 2))
-    return np.concatenate(starts_p), np.concatenate(starts_q), np.concatenate(reach)
+        return np.zeros(0), np.zeros(0), np.zeros((0, 2)), np.zeros(0)
+    return tuple(np.concatenate(part) for part in (starts_p, starts_q, reach, sizes))
 
 
 def _polish(D, p, q, reach, box, refine):
@@ -207,20 +231,30 @@ def linear_zeros(log_a, log_w, values, chosen):
     chosen : ndarray of bool, shape (na - 1, nw - 1)
         Cells to look at.
     """
-    zeros = []
-    for i, k in zip(*np.nonzero(chosen), strict=True):
+    zeros, order = [], []
+    rows, columns = np.nonzero(chosen)
+    for first in range(0, rows.size, _AT_ONCE):
+        i, k = rows[first : first + _AT_ONCE], columns[first : first + _AT_ONCE]
         da, dw = log_a[i + 1] - log_a[i], log_w[k + 1] - log_w[k]
-        for corner, sign in (((i, k), 1.0), ((i + 1, k + 1), -1.0)):
-            D0 = values[corner]
-            Da = values[i + 1, k] - D0 if sign > 0 else values[i, k + 1] - D0
-            Dw = values[i, k + 1] - D0 if sign > 0 else values[i + 1, k] - D0
-            M = np.array([[Da.real, Dw.real], [Da.imag, Dw.imag]])
-            if not np.isfinite(M).all() or abs(np.linalg.det(M)) < 1e-300:
-                continue
-            s, t = np.linalg.solve(M, [-D0.real, -D0.imag])
-            if s >= 0 and t >= 0 and s + t <= 1:
-                zeros.append((log_a[corner[0]] + sign * s * da, log_w[corner[1]] + sign * t * dw))
-    return np.array(zeros).reshape(-1, 2)
+        by_a, by_w = values[i + 1, k], values[i, k + 1]  # from the near corner along a and along omega
+        for half, (a, w, one, other, sign) in enumerate(
+            ((i, k, by_a, by_w, 1.0), (i + 1, k + 1, by_w, by_a, -1.0))
+        ):
+            D0 = values[a, w]
+            with np.errstate(all="ignore"):
+                Da, Dw = one - D0, other - D0
+                det = Da.real * Dw.imag - Da.imag * Dw.real
+                s = (Dw.real * D0.imag - Dw.imag * D0.real) / det
+                t = (Da.imag * D0.real - Da.real * D0.imag) / det
+                inside = (s >= 0) & (t >= 0) & (s + t <= 1) & (np.abs(det) >= 1e-300)
+            inside &= np.isfinite(D0) & np.isfinite(Da) & np.isfinite(Dw)
+            here = np.nonzero(inside)[0]
+            place = log_a[a] + sign * s * da, log_w[w] + sign * t * dw
+            zeros.append(np.stack(place, axis=1)[here])
+            order.append(2 * (first + here) + half)
+    if not zeros:
+        return np.zeros((0, 2))
+    return np.concatenate(zeros)[np.argsort(np.concatenate(order))]
 
 
 def _solve(J, value):

@@ -12,6 +12,7 @@ from ..df.points import points
 from .linear import LinearPart
 
 FAST = ("element", "law", "rate", "linear", "friction")
+_AT_ONCE = 1 << 16  # points of a closed form between two chances to interrupt it
 _NOISE = 1e-6  # spread of an average from which N jumps from point to point
 
 
@@ -42,12 +43,24 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
         a = _refined(coarse, 160 if not method.needs_omega else 60)
         if method.needs_omega and a.size * w.size > 60_000:
             a = coarse
-        N = method.harmonics(a, w if method.needs_omega else None, 1)[0][..., 1]
+        N = _fundamental(method, a, w, family)
     else:
         a, N = family.amplitudes, _interpolated(np.log(family.omega), family.N, np.log(w))
     with np.errstate(all="ignore"):
-        values = 1 + np.broadcast_to(N, (a.size, w.size)) * linear(w)
+        values = np.broadcast_to(N, (a.size, w.size)) * linear(w)
+        values += 1
     return np.log(a), np.log(w), values
+
+
+def _fundamental(method, a, w, family):
+    """N on a grid, the family's own where it is the same; some rows at a time, so that Ctrl-C is heard."""
+    if not method.needs_omega:
+        return method.harmonics(a, None, 1)[0][..., 1]
+    if a is family.amplitudes and w is family.omega:
+        return family.N
+    rows = max(1, _AT_ONCE // w.size)
+    parts = (a[i : i + rows] for i in range(0, a.size, rows))
+    return np.concatenate([method.harmonics(part, w, 1)[0][..., 1] for part in parts])
 
 
 def _refined(grid, least):

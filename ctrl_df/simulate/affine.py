@@ -16,9 +16,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from . import layout as L
+from .compiled import njit
 from .flow import rates
 from .layout import (
     A_BODIES,

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from .compiled import njit
 from .flow import node_input, refresh
 from .layout import (
     A_BODIES,

@@ -7,10 +7,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from . import history
 from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
+from .compiled import njit
 from .flow import rates
 from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from .compiled import njit
 from .history import delayed
 from .layout import (
     A_MEASURED,

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .layout import AUX, DELAY, H_DELAYS, H_HISTORY, KIND, PAR
 
 RING = 4096

@@ -7,8 +7,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .flow import input_rates, rates
 from .layout import (
     A_BODIES,

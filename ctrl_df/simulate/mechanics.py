@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from .compiled import njit
 from .layout import (
     A_BODIES,
     A_BRISTLE,

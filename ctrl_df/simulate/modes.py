@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from .compiled import njit
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .layout import (

@@ -7,9 +7,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from . import history
+from .compiled import njit
 from .flow import combine, external, node_input, refresh, signals
 from .layout import DELAY, H_DELAYS, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
 from .modes import advance_state, answers_at_once, hold, settle

@@ -17,6 +17,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from .compiled import cfunc
+
 _D, _P = types.float64, types.CPointer(types.float64)
 SIGNATURES = {
     # t, x, v, z, p, dz -> force
@@ -51,15 +53,11 @@ def address(law: Callable, kind: str) -> int:
 
 
 def _compile(law, kind):
-    for cache in (True, False):
-        try:
-            compiled = numba.cfunc(SIGNATURES[kind], cache=cache)(law)
-            return compiled.address, compiled
-        except RuntimeError:  # no place to keep the cache (a law typed at the prompt)
-            continue
-        except numba.core.errors.NumbaError:  # pyright: ignore[reportAttributeAccessIssue]
-            break
-    return callback(law, kind)
+    try:
+        compiled = cfunc(SIGNATURES[kind], law)
+    except numba.core.errors.NumbaError:  # pyright: ignore[reportAttributeAccessIssue]
+        return callback(law, kind)
+    return compiled.address, compiled
 
 
 def callback(function: Callable, kind: str) -> tuple[int, object]:

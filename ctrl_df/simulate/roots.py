@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from .compiled import njit
 
 
 @njit(cache=True, error_model="numpy", _nrt=False)

@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from scipy.integrate import DOP853, RK23, RK45
 
+from .compiled import njit
 from .flow import node_input, rates
 from .layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
 from .mechanics import dry_level

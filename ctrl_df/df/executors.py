@@ -1,0 +1,105 @@
+"""Parts of a computation by an executor: in order, no more ahead than needed, every failure said once."""
+
+from __future__ import annotations
+
+import pickle
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from typing import Any
+
+_AHEAD = 256  # parts submitted before the first is taken: what is done and waits takes memory
+
+
+def check_executor(executor) -> None:
+    """Refuse what has no method ``submit`` (TypeError)."""
+    if not callable(getattr(executor, "submit", None)) or isinstance(executor, type):
+        raise TypeError(
+            f"executor needs a method submit, such as concurrent.futures.ProcessPoolExecutor() has; got "
+            f"{executor!r}. Leave it out to compute here."
+        )
+
+
+def check_picklable(executor, example) -> None:
+    """Refuse a process pool for work that cannot be sent to one (TypeError), before it begins."""
+    if isinstance(executor, ProcessPoolExecutor):
+        try:
+            pickle.dumps(example)
+        except Exception as error:  # pickle has many ways to refuse
+            raise _unpicklable(error) from None
+
+
+def by_executor(
+    executor: Any, function: Callable, tasks: Iterable[tuple[Any, tuple]], take: Callable, kept: Callable
+):
+    """Call ``take(key, function(*arguments))`` for every task, in order.
+
+    Whatever ends it early cancels what has not begun, and takes first what is done.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor or alike
+    function : callable
+        Of a module, so that it can be sent.
+    tasks : iterable of (key, arguments)
+    take : callable
+    kept : callable
+        Says in a sentence what of the work is kept, for the errors.
+
+    Raises
+    ------
+    RuntimeError
+        A worker died, or the executor is shut down.
+    TypeError
+        The work cannot be sent to the workers.
+    """
+    waiting: deque = deque()
+    tasks = iter(tasks)
+    try:
+        while True:
+            for key, arguments in tasks:
+                waiting.append((key, executor.submit(function, *arguments)))
+                if len(waiting) >= _AHEAD:
+                    break
+            if not waiting:
+                return
+            value = waiting[0][1].result()
+            take(waiting.popleft()[0], value)
+    except BaseException as error:
+        for _, future in waiting:
+            getattr(future, "cancel", bool)()
+        for key, future in waiting:
+            if _succeeded(future):
+                take(key, future.result())
+        explained = _explained(error, kept)
+        if explained is error:
+            raise
+        raise explained from error
+
+
+def _succeeded(future) -> bool:
+    try:
+        return bool(future.done() and not future.cancelled() and future.exception() is None)
+    except AttributeError:  # a future that only knows result()
+        return False
+
+
+def _explained(error, kept):
+    if isinstance(error, BrokenExecutor):
+        return RuntimeError(
+            f"a worker process died. {kept()} Usual causes: no memory left (give fewer workers), a block "
+            "from the prompt or a notebook, which workers cannot import (write it into a module), or a "
+            'script without `if __name__ == "__main__":` around what it runs.'
+        )
+    if isinstance(error, RuntimeError) and "schedule new futures after" in str(error):
+        return RuntimeError(f"the executor is shut down. {kept()} Give one that is open.")
+    if isinstance(error, pickle.PicklingError) or "pickle" in str(error).lower().split("(")[0]:
+        return _unpicklable(error)
+    return error
+
+
+def _unpicklable(error):
+    return TypeError(
+        f"a process pool needs a block that can be pickled; got {error}. Write the function with def at the "
+        "top of a module, use a ThreadPoolExecutor, or leave executor out."
+    )

@@ -1,0 +1,184 @@
+"""Installations that cannot be written: machine code is read where it lies, else compiled anew in memory,
+with one warning that names the remedy. Edited sources never leave machine code of their callers behind."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import ctrl_df
+from ctrl_df import cli
+from ctrl_df.model_file import EXAMPLE
+from ctrl_df.simulate import compiled
+
+PACKAGE = Path(ctrl_df.__file__).parent
+NOWHERE = "/dev/null/nowhere"  # not even root can make it
+FRICTION = "import ctrl_df as cdf; print(cdf.describing_function(cdf.friction_mass(9, 5, .5), 10., 5.))"
+COUNTED = FRICTION + (
+    "; from ctrl_df.df.friction import _family; print('hits', sum(_family.stats.cache_hits.values()))"
+)
+
+SMALL = "from ctrl_df.df.wall_map import wrap; print(wrap(7.0), 'hits', sum(wrap.stats.cache_hits.values()))"
+MODULES = {
+    "sizes": "FIVE = 5.0\n",
+    "inner": """
+from .compiled import njit
+from .sizes import FIVE
+
+@njit()
+def inner(x):
+    return FIVE * x
+""",
+    "outer": """
+from .compiled import njit
+from .inner import (  # over several lines
+    inner as called,
+)
+
+@njit()
+def outer(x):
+    return called(x) + 1.0
+""",
+}
+
+
+def run(folder, *arguments, home=NOWHERE, locked=False, **environment):
+    """Run Python on the package in `folder`, where nothing can be written but what `environment` names."""
+    environment = {
+        **{k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")},
+        "PYTHONPATH": str(folder),
+        "HOME": str(home),
+        "LOCALAPPDATA": str(home),
+        "MPLCONFIGDIR": str(folder.parent),
+        **{k: str(v) for k, v in environment.items()},
+    }
+    # root writes through permissions unless it gives that right up
+    drop = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"] if locked and os.geteuid() == 0 else []
+    return subprocess.run(
+        [*drop, sys.executable, *arguments],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+
+
+@pytest.fixture
+def cold(tmp_path):
+    """A copy of the package without machine code, and with files where it would go."""
+    folder = tmp_path / "cold"
+    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    for place in ("simulate", "df", "blocks/effects"):
+        (folder / "ctrl_df" / place / "__pycache__").write_text("no folder")
+    return folder
+
+
+@pytest.fixture
+def warm(tmp_path):
+    """A copy of the package with its machine code, which cannot be written."""
+    if os.geteuid() == 0 and shutil.which("setpriv") is None:
+        pytest.skip("root without setpriv writes everywhere")
+    folder = tmp_path / "warm"
+    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    for place in ("simulate", "df", "blocks/effects"):
+        (into := folder / "ctrl_df" / place / "__pycache__").mkdir()
+        for kept in compiled.folders(PACKAGE / place / "_.py"):
+            for file in kept.glob("*.nb*") if kept.is_dir() else ():
+                if not (into / file.name).exists():
+                    shutil.copy(file, into)
+    locked = [folder, *folder.rglob("*")]
+    for path in locked:
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    yield folder
+    for path in locked:
+        path.chmod(0o755)
+
+
+def test_a_read_only_installation_without_a_home_compiles_in_memory_and_says_so_once(cold):
+    done = run(cold, "-c", COUNTED)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("(-0.00218") and "hits 0" in done.stdout
+    assert done.stderr.count("Warning") == 1
+    assert re.search("no place to keep.*Set NUMBA_CACHE_DIR to a folder that can be written", done.stderr)
+
+
+def test_an_unwritable_cache_folder_compiles_in_memory_too(cold):
+    done = run(cold, "-c", SMALL, NUMBA_CACHE_DIR=NOWHERE)
+    assert done.returncode == 0 and done.stderr.count("NUMBA_CACHE_DIR") == 1, done.stderr
+
+
+def test_a_law_of_the_users_compiles_where_nothing_can_be_kept(cold):
+    (cold / "own.py").write_text("def law(t, x, v, z, p, dz):\n    return -p[0] * x\n")
+    (cold / "__pycache__").write_text("no folder")
+    code = (
+        "from ctrl_df.simulate import pointers as p; import own; "
+        "print(p.address(own.law, 'force') != 0, 'CFunc' in repr(type(p._compiled[own.law][1])))"
+    )
+    done = run(cold, "-c", code)
+    assert done.stdout == "True True\n" and not done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "home"])
+def test_where_the_package_cannot_be_written_the_next_place_is_used(place, cold, tmp_path):
+    done = run(cold, "-c", SMALL, **{place: tmp_path / "place"})
+    assert "hits 0" in done.stdout and not done.stderr, done.stderr
+    assert len(list((tmp_path / "place").rglob("wall_map.wrap*.nbi"))) == 1
+
+
+def test_machine_code_in_a_read_only_place_is_used(warm):
+    ctrl_df.describing_function(ctrl_df.friction_mass(9, 5, 0.5), 10.0, 5.0)
+    done = run(warm, "-c", COUNTED, locked=True)
+    assert done.returncode == 0 and "hits 1" in done.stdout and not done.stderr, done.stderr
+
+
+def test_damaged_machine_code_is_compiled_anew(tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    assert "hits 0" in run(folder, "-c", SMALL).stdout
+    files = list((folder / "ctrl_df" / "df" / "__pycache__").glob("wall_map.wrap*.nb*"))
+    assert len(files) == 2
+    for file in files:
+        file.write_bytes(file.read_bytes()[:40])
+    again, third = run(folder, "-c", SMALL), run(folder, "-c", SMALL)
+    assert again.stdout.split()[1:] == ["hits", "0"] and third.stdout.split()[1:] == ["hits", "1"]
+
+
+def test_the_command_line_works_in_a_read_only_installation(tmp_path, request, capsys):
+    model = tmp_path / "model.toml"
+    model.write_text(EXAMPLE)
+    assert cli.main(["limit-cycles", str(model)]) == 0  # whatever it needs is compiled now
+    here = capsys.readouterr().out
+    done = run(request.getfixturevalue("warm"), "-m", "ctrl_df", "limit-cycles", str(model), locked=True)
+    assert done.returncode == 0 and done.stdout == here and "Warning" not in done.stderr, done.stderr
+
+
+def test_a_caller_is_compiled_anew_when_what_it_calls_is_edited(tmp_path):
+    folder = tmp_path / "mypackage"
+    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    simulate = folder / "ctrl_df" / "simulate"
+    for name, text in MODULES.items():
+        (simulate / f"{name}.py").write_text(text)
+    code = "from ctrl_df.simulate.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
+    said = [run(folder, "-c", code).stdout.split()]
+    (simulate / "nodes.py").write_text("# no part of it")
+    said.append(run(folder, "-c", code).stdout.split())
+    (simulate / "sizes.py").write_text("FIVE = 7.0\n")
+    said.append(run(folder, "-c", code).stdout.split())
+    assert said == [["6.0", "0"], ["6.0", "1"], ["8.0", "0"]]
+
+
+def test_every_compiled_file_of_the_package_keeps_its_code_here():
+    for file in PACKAGE.rglob("*.py"):
+        text = file.read_text(encoding="utf-8")
+        if file.name != "compiled.py":
+            assert not re.search(r"from numba import .*\bnjit|numba\.(njit|cfunc)", text), file
+
+
+def test_the_package_is_imported_without_numba():
+    code = "import sys, ctrl_df; assert 'numba' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
