@@ -345,7 +345,6 @@ def test_steady_travel_is_drifting():
     [
         block(Mass(9), cdf.Coulomb(1), cdf.ConstantForce(3)),
         block(Mass(9), cdf.ConstantForce(3)),
-        block(Mass(1), cdf.LinearSpring(25)),  # undamped, forced at its resonance
         ct.nlsys(
             lambda t, x, u, p: [x[1], u[0] + x[0]], lambda t, x, u, p: x[:1], inputs=1, outputs=1, states=2
         ),

@@ -13,6 +13,7 @@ from ..simulate.engine import Engine, State, harmonic_drive
 from ..simulate.layout import EVENT_KINDS
 from ..status import Status
 from . import shooting
+from .linear_orbit import linear_orbit
 from .shooting import CLOSED, SPENT, close_orbit
 from .shot import make_shot, place, shoot
 from .sweep import floor
@@ -70,6 +71,7 @@ class OrbitSearch:
             prog.par[n[layout.PAR] + b] for n in self.mechanisms for b in range(prog.ints[n[layout.AUX]])
         ) or 1.0  # fmt: skip
         self.free_row = self._row_is_free(s)
+        self.linear = linear_orbit(self.engine, s, self.row, self.free_row)
         self.quantized = bool(np.any(prog.nodes[:, layout.KIND] == layout.QUANTIZER))
         self.gap = any(prog.par[n[layout.PAR] + layout.P_GAP] > 0 for n in self.mechanisms)
         self.contacts = self.gap or any(

@@ -33,11 +33,13 @@ ORBIT_REGIMES = (
     "work limit",
     "drifting",
     "free",
+    "resonance",
 )
 """Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
 without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
 periods; none; no dry friction and no contact; the state runs away (NaN); the bound on work was hit (NaN);
-the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched."""
+the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched;
+an undamped linear mechanism driven at its natural frequency, which swings wider and wider (NaN)."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
 
@@ -183,6 +185,11 @@ class OrbitSolver(OrbitSearch):
     def solve(self, A: float, omega: float, orders: int):
         """Return (Y_k/A for k = 0..orders, regime name, residual)."""
         self._aim(A, omega)
+        if self.linear is not None:
+            self.simple = False
+            y, name, x = self.linear.answer(A, omega, orders)
+            self.previous = None if x is None else State(0.0, x, self.engine._modes.copy())
+            return self._finished(y, name), name, np.nan if np.isnan(y[1]) else 0.0
         try:
             y, name, residual = self._answer(orders)
         except OutOfWork as stop:
