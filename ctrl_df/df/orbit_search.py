@@ -137,6 +137,7 @@ class OrbitSearch:
     def _aim(self, A, omega):
         self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([[0.0, A]], omega)
+        self._unit = A / (self.inertia * omega**self.symmetries.power)
         self.atol = floor(self.least, self.symmetries.power, self.inertia, A, omega)
 
     def _hmax(self, orders):
@@ -220,16 +221,31 @@ class OrbitSearch:
             raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
         if outcome != CLOSED:
             return None
-        gained = np.abs(shot.trial[1][self.symmetries.inertial]) if not self.mirrored else np.zeros(0)
-        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
-            raise OutOfWork(
-                Status.DIVERGED
-            )  # nothing ties the mechanism to the ground, and something pushes it
+        if not self.mirrored:
+            self._check_free_speed(shot.trial[1])
         if self.quantized:  # the harmonics of the centred motion
             self._shoot(state.copy(), RTOL, periods, spectrum)
-        self.integrals, self.ends = spectrum[self.row], shot.ends[:, self.row].copy()
-        self.kinds, self.still = int(shot.tally[2]), bool(shot.tally[5])
+        self._keep(spectrum)
         return state, miss
+
+    def measure(self, state, periods, orders, rtol):
+        """One shot of a closed orbit, for its integrals, ends and event kinds."""
+        spectrum = np.zeros((self.row + 1, orders + 1), complex)
+        end = state.copy()
+        self._shoot(end, rtol, periods, spectrum)
+        if not self.mirrored:
+            self._check_free_speed(self.symmetries.transform @ (end.x - state.x))
+        self._keep(spectrum)
+
+    def _keep(self, spectrum):
+        self.integrals, self.ends = spectrum[self.row], self.shot.ends[:, self.row].copy()
+        self.kinds, self.still = int(self.shot.tally[2]), bool(self.shot.tally[5])
+
+    def _check_free_speed(self, step):
+        """Raise where a speed that nothing ties to the ground has changed: something pushes the mechanism."""
+        gained = np.abs(step[self.symmetries.inertial])
+        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
+            raise OutOfWork(Status.DIVERGED)
 
     def _touching(self, orders):
         """Look for an orbit whose bodies touch, for a block found swinging freely within its gap.
@@ -263,11 +279,14 @@ class OrbitSearch:
         return None, keeps
 
     def _stop_if_running_away(self, y):
-        """Raise where a state grows out of all bounds, or a speed steadily: nothing holds the mass back."""
+        """Raise where a state grows out of all bounds, or a free body steadily gains speed."""
         half = len(y) // 2
         if np.max(np.abs(y[-1])) > 100 * np.max(np.abs(y[half])) > 1e4 * np.max(np.abs(y[0])):
             raise OutOfWork(Status.DIVERGED)
-        for i in np.flatnonzero(self.symmetries.power == 1):
+        s = self.symmetries
+        for i in range(len(s.power)):
+            if s.power[i] != 1 or not s.positions[i - 1]:
+                continue
             early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
             spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
             if (

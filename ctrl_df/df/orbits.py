@@ -16,6 +16,8 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 from ..simulate import layout
 from ..simulate.engine import State, harmonic_drive
+from .far_newton import close_far
+from ..status import Status
 from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
 from .sweep import sweep
 
@@ -40,6 +42,7 @@ without and with sustained contact; one period but no half-wave symmetry althoug
 periods; none; no dry friction and no contact; the state runs away (NaN); the bound on work was hit (NaN);
 the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched;
 an undamped linear mechanism driven at its natural frequency, which swings wider and wider (NaN)."""
+_WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
 
@@ -100,6 +103,23 @@ def orbit_family(
         row, column = (a_order, np.full(len(A), line)) if along_a else (np.zeros(len(omega), int), w_order)
         solver.line(A[row], omega[column], harmonics, regime, residual, row, column)
     return harmonics, regime, residual
+
+
+def _steady(means, sizes) -> bool:
+    """Whether averages over consecutive blocks scatter and do not tend anywhere.
+
+    A slope is believed from four times its standard error: for eight blocks one steady motion in 200 is then
+    followed longer than need be.
+    """
+    at = np.arange(len(means)) - 0.5 * (len(means) - 1)
+    size = np.max(np.abs(means))
+    for values, scale in ((means.real, size), (means.imag, size), (sizes, np.max(sizes))):
+        slope = at @ values / (at @ at)
+        rest = values - values.mean() - slope * at
+        error = np.sqrt(rest @ rest / (len(at) - 2) / (at @ at))
+        if abs(slope) > 4 * error and abs(slope) * len(at) > 1e-6 * scale:
+            return False
+    return True
 
 
 _kept = threading.local()
@@ -212,6 +232,8 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             state = self._follow(state, 30)
             orbit = self._periodic(state, orders=orders)
+        if orbit is None:
+            orbit = close_far(self, state, orders=orders)
         if orbit is None and self.symmetric:
             self.mirrored = False
             state = self._follow(self._nudged(state), 40)
@@ -231,9 +253,38 @@ class OrbitSolver(OrbitSearch):
         return y, self._name(y, self.ends, orbit[1]), orbit[1]
 
     def _unperiodic(self, state, orders):
-        """Look for a longer period; else average over many."""
+        """Look for a longer period; else follow the motion until it is steady, and average."""
         self.mirrored, self.simple = False, False
         state = self._follow(state, 40, RTOL)
+        found = self._longer_period(state, orders)
+        if found is not None:
+            return found
+        orbit = close_far(self, state, orders=orders)
+        if orbit is None:
+            for periods in _WAITS:
+                means, sizes = self._averages(state, orders)
+                if _steady(means[:, 1], sizes):
+                    break
+                state = self._follow(state, periods)
+                orbit = self._periodic(state, orders=orders) or close_far(self, state, orders=orders)
+                if orbit is not None:
+                    break
+            else:  # still on its way
+                grows = np.all(np.diff(sizes) > 0) and np.ptp(np.diff(sizes)) < 0.5 * np.mean(np.diff(sizes))
+                raise OutOfWork(Status.DIVERGED if grows else Status.WORK_LIMIT)
+        if orbit is not None:
+            self.previous, self.simple = orbit[0], True
+            y = self._coefficients(self.integrals, self.ends, 1, False)
+            return y, self._name(y, self.ends, orbit[1]), orbit[1]
+        self.previous = state
+        mean = means.mean(axis=0)
+        if self.gap and not self.touched:
+            return mean, "free", 0.0
+        error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
+        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
+
+    def _longer_period(self, state, orders):
+        """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
         s, trail = self.symmetries, []
         for _ in range(2 * LONGEST + 1):
             trail.append(s.transform @ state.x)
@@ -241,7 +292,6 @@ class OrbitSolver(OrbitSearch):
         y = np.array(trail)
         self._stop_if_running_away(y)
         size = np.where(self.shot.size > 0, self.shot.size, 1.0)
-        self.previous = state
         least = 3e-3  # mismatch of the shorter periods: a multiple that closes no better is not tried
         for periods in range(1, LONGEST + 1):
             gap = (y[-1] - y[-1 - periods]) / size
@@ -257,23 +307,22 @@ class OrbitSolver(OrbitSearch):
                     c = self._coefficients(self.integrals, self.ends, periods, False)
                     name = "subharmonic" if periods > 1 else self._name(c, self.ends, orbit[1])
                     return c, name, orbit[1]
-        length = self.averages // BLOCKS
-        parts, touched = [], 0
+        return None
+
+    def _averages(self, state, orders):
+        """Follow the state, in place, over `averages` periods; coefficients and size of each of the blocks."""
+        length, parts, sizes, self.touched = self.averages // BLOCKS, [], [], False
         for _ in range(BLOCKS):
-            spectrum = np.zeros((self.row + 1, orders + 1), complex)
+            mean, size = np.zeros(orders + 1, complex), 0.0
             for _ in range(length):
-                part = np.zeros_like(spectrum)
-                touched |= self._shoot(state, RTOL, 1, part) & TOUCH
-                spectrum += part / length
-                parts_ends = self.shot.ends[:, self.row].copy()
-                spectrum[self.row] += self._ramp(parts_ends, orders, 1) * self.period / 2 / length
-            parts.append(self._coefficients(spectrum[self.row], np.zeros(2), 1, False))
-        parts = np.array(parts)
-        mean = parts.mean(axis=0)
-        if self.gap and not touched:
-            return mean, "free", 0.0
-        error = np.std(parts[:, 1], ddof=1) / np.sqrt(BLOCKS)
-        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
+                part = np.zeros((self.row + 1, orders + 1), complex)
+                self.touched |= bool(self._shoot(state, RTOL, 1, part) & TOUCH)
+                ends = self.shot.ends[:, self.row]
+                mean += self._coefficients(part[self.row], ends, 1, False) / length
+                size += np.max(np.abs(state.x) / self._unit, initial=0.0) / length
+            parts.append(mean)
+            sizes.append(size)
+        return np.array(parts), np.array(sizes)
 
     # --- what was found -------------------------------------------------------------------------------
 
