@@ -1,8 +1,8 @@
-"""The periodic answer of a system whose laws are linear, in closed form: no transient, however light the damping.
+"""The periodic answer of a system whose laws are linear, in closed form, however light the damping.
 
 Where all laws of a program are affine and none ever switches, dx/dt = a x + b u + e, and the forced motion at
-omega solves (j omega - a) x = b u. Free positions and speeds are left out of the question whether it attracts;
-a constant force makes them travel.
+omega solves (j omega - a) x = b u. Free positions and speeds are left out of the question whether it
+attracts; a constant force makes them travel.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 from ..simulate import layout
 from ..simulate.engine import State, harmonic_drive
-from .far_newton import close_far
 from ..status import Status
+from .far_newton import close_far
 from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
 from .sweep import sweep
 
@@ -232,8 +232,8 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             state = self._follow(state, 30)
             orbit = self._periodic(state, orders=orders)
-        if orbit is None:
-            orbit = close_far(self, state, orders=orders)
+            if orbit is None and self._slow(self._trail(state.copy(), 5)):
+                orbit = close_far(self, state, orders=orders)
         if orbit is None and self.symmetric:
             self.mirrored = False
             state = self._follow(self._nudged(state), 40)
@@ -256,14 +256,16 @@ class OrbitSolver(OrbitSearch):
         """Look for a longer period; else follow the motion until it is steady, and average."""
         self.mirrored, self.simple = False, False
         state = self._follow(state, 40, RTOL)
-        found = self._longer_period(state, orders)
+        y = self._trail(state, 2 * LONGEST + 1)
+        self._stop_if_running_away(y)
+        found = self._longer_period(state, y, orders)
         if found is not None:
             return found
-        orbit = close_far(self, state, orders=orders)
+        orbit = close_far(self, state, orders=orders) if self._slow(y) else None
         if orbit is None:
             for periods in _WAITS:
                 means, sizes = self._averages(state, orders)
-                if _steady(means[:, 1], sizes):
+                if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
                     break
                 state = self._follow(state, periods)
                 orbit = self._periodic(state, orders=orders) or close_far(self, state, orders=orders)
@@ -283,14 +285,26 @@ class OrbitSolver(OrbitSearch):
         error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
         return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
 
-    def _longer_period(self, state, orders):
-        """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
-        s, trail = self.symmetries, []
-        for _ in range(2 * LONGEST + 1):
-            trail.append(s.transform @ state.x)
+    def _trail(self, state, shots):
+        """Coordinates before each of some shots of the state, in place."""
+        trail = []
+        for _ in range(shots):
+            trail.append(self.symmetries.transform @ state.x)
             self._shoot(state)
-        y = np.array(trail)
-        self._stop_if_running_away(y)
+        return np.array(trail)
+
+    def _slow(self, y):
+        """Whether a motion changes little, and steadily, from shot to shot: a transient, not chaos."""
+        s = self.symmetries
+        size = np.maximum(np.max(np.abs(y), axis=0), 1e-300)
+        steps = np.diff(y, axis=0)
+        steps -= np.where(s.wrap > 0, np.round(steps / np.where(s.wrap > 0, s.wrap, 1)) * s.wrap, 0)
+        steps = np.max(np.abs(steps / size)[:, s.free], axis=1, initial=0.0)[-4:]
+        return bool(np.max(steps) < 0.3 and np.max(steps) < 2 * np.min(steps))
+
+    def _longer_period(self, state, y, orders):
+        """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
+        s = self.symmetries
         size = np.where(self.shot.size > 0, self.shot.size, 1.0)
         least = 3e-3  # mismatch of the shorter periods: a multiple that closes no better is not tried
         for periods in range(1, LONGEST + 1):
@@ -310,7 +324,7 @@ class OrbitSolver(OrbitSearch):
         return None
 
     def _averages(self, state, orders):
-        """Follow the state, in place, over `averages` periods; coefficients and size of each of the blocks."""
+        """Follow the state, in place, over `averages` periods; coefficients and size of every block."""
         length, parts, sizes, self.touched = self.averages // BLOCKS, [], [], False
         for _ in range(BLOCKS):
             mean, size = np.zeros(orders + 1, complex), 0.0
@@ -319,7 +333,8 @@ class OrbitSolver(OrbitSearch):
                 self.touched |= bool(self._shoot(state, RTOL, 1, part) & TOUCH)
                 ends = self.shot.ends[:, self.row]
                 mean += self._coefficients(part[self.row], ends, 1, False) / length
-                size += np.max(np.abs(state.x) / self._unit, initial=0.0) / length
+                y = np.abs(self.symmetries.transform @ state.x) / self._unit
+                size += np.max(y[self.symmetries.free], initial=0.0) / length
             parts.append(mean)
             sizes.append(size)
         return np.array(parts), np.array(sizes)
