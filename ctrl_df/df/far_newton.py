@@ -22,7 +22,7 @@ _STEP = 2e-5  # of differences, relative
 _ITERATIONS = 40
 
 
-def close_far(search, state: State, periods: int = 1, orders: int = 9):
+def close_far(search, state: State, periods: int = 1, orders: int = 9, patient: bool = True):
     """Close an orbit from a state far off; return (state, error) of one that attracts, or None.
 
     Parameters
@@ -34,6 +34,9 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9):
         Of the force in one of the orbit.
     orders : int
         Highest harmonic integrated.
+    patient : bool
+        Whether to go on where steps must be cut short, as is worth while on a slow transient; irregular
+        motion is given up at once.
     """
     s = search.symmetries
     free = s.free
@@ -52,6 +55,8 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9):
             if step is None:
                 return None
             now = _length(step, size[free])
+            if not patient and now > 30:
+                return None
             if best is None or now < error:
                 best, error = y, now
             if now < 1e-3 * GOOD or (now < 1e-5 and now > 0.3 * last):  # rounding rules
@@ -70,7 +75,7 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9):
                 if ahead is not None and _length(ahead, size[free]) <= (1 - 0.25 * share) * now:
                     break
                 share *= 0.5 if share > 0.1 else 0.25
-                if share < 1e-3:
+                if share < (1e-3 if patient else 0.3):
                     trial = None
                     break
             if trial is None:
@@ -126,16 +131,24 @@ class _Map:
             if self.search.budget <= 0:
                 raise
             raise RanOff from stop
+        except RuntimeError as error:  # a law asked where no motion leads may fail
+            raise RanOff from error
         end = self.coordinates(state.x)
         return begin, end
 
     def mismatch(self, y):
         """Return end less start of the free coordinates; takes note of sizes."""
         begin, end = self.shot(y)
-        inside = self.search.shot.space[6]
-        own = np.diag(self.s.transform) == 1.0
-        self.size = np.maximum(np.abs(begin), np.abs(end))
-        self.size = np.where(own, np.maximum(self.size, inside), self.size)
+        inside, omega = self.search.shot.space[6], self.search.omega
+        size = np.maximum(np.abs(begin), np.abs(end))
+        mixed = np.count_nonzero(self.s.transform, axis=1) > 1
+        # a coordinate may be near zero at both ends and swing in between
+        size = np.where(
+            mixed & (self.s.power != 1), size, np.maximum(size, np.abs(self.s.transform) @ inside)
+        )
+        stretch = np.flatnonzero(mixed & (self.s.power == 2))
+        size[stretch] = np.maximum(size[stretch], size[stretch + 1] / omega)
+        self.size = size
         gap = self.s.upper - self.s.lower
         self.size = np.where(np.isfinite(gap), gap, self.size)
         self.size = np.where(self.size > 0, self.size, 1.0)

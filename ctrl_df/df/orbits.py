@@ -232,8 +232,9 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             state = self._follow(state, 30)
             orbit = self._periodic(state, orders=orders)
-            if orbit is None and self._slow(self._trail(state.copy(), 5)):
-                orbit = close_far(self, state, orders=orders)
+            if orbit is None:
+                slow = self._slow(self._trail(state.copy(), 5))
+                orbit = close_far(self, state, orders=orders, patient=slow)
         if orbit is None and self.symmetric:
             self.mirrored = False
             state = self._follow(self._nudged(state), 40)
@@ -261,7 +262,7 @@ class OrbitSolver(OrbitSearch):
         found = self._longer_period(state, y, orders)
         if found is not None:
             return found
-        orbit = close_far(self, state, orders=orders) if self._slow(y) else None
+        orbit = close_far(self, state, orders=orders, patient=self._slow(y))
         if orbit is None:
             for periods in _WAITS:
                 means, sizes = self._averages(state, orders)
