@@ -181,3 +181,31 @@ def test_friction_that_cannot_hold_an_undamped_resonance_is_said_to_diverge():
     N, regime, _ = point(b, 1.0, 10.0)
     assert regime == "diverged" and np.isnan(N)
     assert np.isfinite(point(b, 1.0, 9.7)[0])
+
+
+# --- what describing_function says -------------------------------------------------------------------------
+
+
+def test_describing_function_warns_where_n_is_not_that_of_a_settled_motion():
+    undamped = block(cdf.Mass(1), cdf.LinearSpring(100.0))
+    with pytest.warns(
+        cdf.DescribingFunctionWarning, match=r"resonance at 1 of 2 points, first A=1, omega=10 "
+    ):
+        N = cdf.describing_function(undamped, 1.0, [9.0, 10.0])
+    assert np.isfinite(N[0]) and np.isnan(N[1])
+    with pytest.warns(cdf.DescribingFunctionWarning, match="stuck at 2 of 3 points, first A=1, omega=5"):
+        cdf.describing_function(cdf.friction_mass(9, 5), [1.0, 2.0, 9.0], 5.0)
+    travels = block(cdf.friction_mass(9, 5, 0.5), cdf.ConstantForce(1.0))
+    with pytest.warns(cdf.DescribingFunctionWarning, match=r"drifting.*family.*regime"):
+        cdf.describing_function(travels, 20.0, 5.0)
+    with pytest.warns(cdf.DescribingFunctionWarning, match="unstable"):
+        cdf.describing_function(ct.tf([1], [1, -1]), 1.0, 2.0)
+    with pytest.warns(cdf.DescribingFunctionWarning, match="aperiodic"):
+        cdf.describing_function(cdf.backlash_masses(1, 1, 1.0, 0.8), 1.0, 1.0)
+    assert issubclass(cdf.DescribingFunctionWarning, RuntimeWarning)
+
+
+def test_a_settled_motion_is_described_without_a_warning():  # warnings are errors here
+    cdf.describing_function(cdf.friction_mass(9, 5, 0.5), [6.0, 30.0], 5.0)
+    cdf.describing_function(cdf.saturation(1), [0.0, 2.0])
+    cdf.describing_function_family(block(cdf.Mass(1), cdf.LinearSpring(100.0)), [1.0], [10.0])
