@@ -36,12 +36,14 @@ ORBIT_REGIMES = (
     "drifting",
     "free",
     "resonance",
+    *(f"subharmonic {k}" for k in range(2, LONGEST + 1)),
 )
 """Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
 without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
-periods; none; no dry friction and no contact; the state runs away (NaN); the bound on work was hit (NaN);
-the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched;
-an undamped linear mechanism driven at its natural frequency, which swings wider and wider (NaN)."""
+periods, with their number; none; no dry friction and no contact; the state runs away (NaN); the bound on
+work was hit (NaN); the mass travels steadily besides swinging (the ramp is no part of the harmonics);
+a load never touched; an undamped linear mechanism driven at its natural frequency, which swings wider and
+wider (NaN)."""
 _WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
@@ -92,7 +94,7 @@ def orbit_family(
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     A, omega = np.atleast_1d(np.asarray(A, float)), np.atleast_1d(np.asarray(omega, float))
     harmonics = np.full((len(A), len(omega), orders + 1), np.nan + 0j)
-    regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int8)
+    regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int16)
     residual = np.full((len(A), len(omega)), np.nan)
     solver = solver_for(block, output, transient=transient, averages=averages, max_steps=max_steps)
     a_order = np.argsort(A)[::-1]  # downwards: large motions are the simple ones
@@ -320,7 +322,7 @@ class OrbitSolver(OrbitSearch):
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1
                     c = self._coefficients(self.integrals, self.ends, periods, False)
-                    name = "subharmonic" if periods > 1 else self._name(c, self.ends, orbit[1])
+                    name = f"subharmonic {periods}" if periods > 1 else self._name(c, self.ends, orbit[1])
                     return c, name, orbit[1]
         return None
 
