@@ -102,10 +102,10 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
         except np.linalg.LinAlgError:
             runaway = True
     rates = turned @ center + steady
-    speed, tied = np.zeros(n), np.max(np.abs(turned) @ np.abs(center) + np.abs(steady), initial=0.0)
+    speed, tied = np.zeros(n), np.abs(turned) @ np.abs(center) + np.abs(steady)
     for direction in s.shifts:
         speed[direction] = rates[np.flatnonzero(direction)[0]]
-    runaway = runaway or bool(np.any(np.abs(rates[s.inertial]) > 1e-12 * tied))
+    runaway = runaway or bool(np.any(np.abs(rates) > 1e-12 * tied, where=s.inertial))
     center = s.inverse @ center
     poles = np.linalg.eigvals(inner) if len(free) else np.zeros(0, complex)
     mean = 0.0 if free_row else float(y0[row] + c @ center)

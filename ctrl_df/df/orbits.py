@@ -147,6 +147,7 @@ class OrbitSolver(OrbitSearch):
     def line(self, A, omega, harmonics, regime, residual, row, column):
         """Solve consecutive points, compiled as long as they close, one by one where they do not."""
         orders, n = harmonics.shape[-1] - 1, len(A)
+        self._acquaint(A[n // 2], omega[n // 2])
         out = np.zeros((n, self.row + 1, orders + 1), complex)
         ends, miss = np.zeros((n, 2, self.row + 1)), np.zeros(n)
         kinds, still = np.zeros(n, np.int64), np.zeros(n, np.int64)
@@ -174,7 +175,7 @@ class OrbitSolver(OrbitSearch):
             past[3, 0] = 0.02
             mode = self.previous.mode.copy()
             done, _, _ = sweep(
-                self.shot, samples, scratch, A[p:], omega[p:], self.least, power, self.inertia, past, mode, 1,
+                self.shot, samples, scratch, A[p:], omega[p:], power, past, mode, 1,
                 self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[p:], ends[p:],
                 miss[p:], kinds[p:], still[p:],
             )  # fmt: skip
