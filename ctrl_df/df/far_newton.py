@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..simulate.engine import State
-from .orbit_search import OutOfWork
+from .orbit_search import RTOL, OutOfWork
 
 FINE = 2e-13  # tolerance of shots
 GOOD = 3e-10  # last step, relative, from which an orbit counts as closed
@@ -44,6 +44,7 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9, patient: 
         return None
     map_ = _Map(search, state.mode, periods)
     y = map_.coordinates(state.x)
+    map_.rtol = FINE if patient else RTOL  # shows as well whether it is worth while
     try:
         f = map_.mismatch(y)
         size = map_.size.copy()
@@ -81,7 +82,10 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9, patient: 
             if trial is None:
                 break
             y, f = trial, f_trial
-        if best is None or jacobian is None:
+            if map_.rtol > FINE:
+                map_.rtol = FINE
+                f = map_.mismatch(y)
+        if best is None or jacobian is None or map_.rtol > FINE:
             return None
         y = best
         miss = _length(map_.mismatch(y), size[free])
@@ -114,6 +118,7 @@ class _Map:
         self.search, self.mode, self.periods = search, mode.copy(), periods
         self.s = search.symmetries
         self.size = np.zeros(len(self.s.transform))
+        self.rtol = FINE
 
     def coordinates(self, x):
         return self.s.transform @ x
@@ -126,7 +131,7 @@ class _Map:
         state = self.search._state(y, self.mode)
         begin = self.coordinates(state.x)
         try:
-            self.search._shoot(state, FINE, self.periods)
+            self.search._shoot(state, self.rtol, self.periods)
         except OutOfWork as stop:
             if self.search.budget <= 0:
                 raise

@@ -233,10 +233,10 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             orbit = self._periodic(self._follow(state, self.transient), orders=orders)
         if orbit is None:
-            state = self._follow(state, 30)
+            state = self._follow(state, 27)
+            slow = self._slow(self._trail(state, 5))
             orbit = self._periodic(state, orders=orders)
             if orbit is None:
-                slow = self._slow(self._trail(state.copy(), 5))
                 orbit = close_far(self, state, orders=orders, patient=slow)
         if orbit is None and self.symmetric:
             self.mirrored = False
