@@ -8,6 +8,7 @@ attracts; a constant force makes them travel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ class LinearOrbit:
     mean: float
     travel: float
     runaway: bool
-    poles: np.ndarray
+    poles: Any
 
     def answer(self, A: float, omega: float, orders: int):
         """Return (Y_k for k = 0..orders, regime, state at t = 0); NaN where no periodic motion attracts."""
@@ -95,7 +96,7 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
     # coordinates that must repeat stand by themselves; what they and constant forces do to the free ones
     free = s.free
     turned, steady = s.transform @ a @ s.inverse, s.transform @ base
-    inner, center, runaway = turned[np.ix_(free, free)], np.zeros(n), False
+    inner, center, runaway = turned[free][:, free], np.zeros(n), False
     if np.any(steady[free] != 0):
         try:
             center[free] = -np.linalg.solve(inner, steady[free])

@@ -97,7 +97,7 @@ class OrbitSearch:
         run = self.engine.run(
             self.engine.start(), 6 * np.pi / omega, harmonic_drive([[0.0, A]], omega), max_steps=20_000
         )
-        seen = np.maximum(np.abs(run.state.x), self.engine._space[6])
+        seen = np.maximum(np.abs(run.state.x), self.shot.space[6])
         pointers.raised.clear()
         if np.all(np.isfinite(seen)):
             states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
