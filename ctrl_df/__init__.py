@@ -43,6 +43,7 @@ from .status import Status
 _LAZY = {
     "describing_function": "df.describing",
     "describing_function_family": "df.describing",
+    "DescribingFunctionWarning": "df.warning",
     "Family": "df.family",
     "load_family": "df.family",
     "closed_loop": "simulate.loop",

@@ -247,7 +247,7 @@ def test_smooth_compositions_repeat_and_agree(seed):
     for rates, steps, b in cases:
         solver = OrbitSolver(b)
         y, regime, residual = solver.solve(A, omega, 9)
-        if regime in ("aperiodic", "subharmonic"):  # rattle in the elastic gap
+        if regime.startswith(("aperiodic", "subharmonic")):  # rattle in the elastic gap
             assert rates is with_gap
             continue
         reference, change = smooth_period(rates, solver.previous.x, A, omega, steps)
@@ -345,7 +345,6 @@ def test_steady_travel_is_drifting():
     [
         block(Mass(9), cdf.Coulomb(1), cdf.ConstantForce(3)),
         block(Mass(9), cdf.ConstantForce(3)),
-        block(Mass(1), cdf.LinearSpring(25)),  # undamped, forced at its resonance
         ct.nlsys(
             lambda t, x, u, p: [x[1], u[0] + x[0]], lambda t, x, u, p: x[:1], inputs=1, outputs=1, states=2
         ),
@@ -383,7 +382,7 @@ def test_two_well_oscillator_meets_every_name():
     y, regime, residual = one(duffing(), 0.2, 1.2)
     assert regime == "asymmetric" and residual < 1e-8
     y, regime, residual = one(duffing(), 0.28, 1.2, averages=16)
-    assert regime == "subharmonic" and residual < 1e-8
+    assert regime == "subharmonic 2" and residual < 1e-8
     y, regime, residual = one(duffing(), 0.5, 1.2, averages=16)
     assert regime == "aperiodic" and 1e-4 < residual < 10 and np.isfinite(y).all()
 

@@ -33,8 +33,14 @@ from .wall_orbits import measure as _measure
 from .wall_orbits import polish as _polish  # noqa: F401 - tested through this module
 from .wall_orbits import settle as _settle
 
-BACKLASH_REGIMES = ("impact", "contact", "asymmetric", "subharmonic", "aperiodic", "free")
+_MOST_PERIODS = 2000  # a subharmonic motion longer than that is followed by no search here
+BACKLASH_REGIMES = (
+    "impact", "contact", "asymmetric", "subharmonic", "aperiodic", "free",
+    *(f"subharmonic {k}" for k in range(2, _MOST_PERIODS)),
+)  # fmt: skip
 IMPACT, CONTACT, ASYMMETRIC, SUBHARMONIC, APERIODIC, FREE = range(6)
+
+VAGUE = 0.5  # spread from which an average says little: other starts may lead to a motion with a period
 
 # Starts (phi, w in units of 1 + A) tried in turn: from sustained contact, then from impacts of some speed.
 _STARTS = np.array([[_RELEASE, 0.0], [-1.0, 0.7], [0.9, 0.4], [2.2, 1.3], [-2.6, 0.2]])
@@ -47,8 +53,8 @@ def backlash_family(
 
     Where several motions coexist the answer is, in this order: the symmetric motion with two impacts a
     period if it exists and is stable; else the motion that a release from sustained contact leads to; else
-    (no contact remains) those that four impacts of different phase and speed lead to. `backlash_attractors`
-    lists all.
+    (no contact remains, or the average of an irregular motion says little) those that four impacts of
+    different phase and speed lead to. `backlash_attractors` lists all.
 
     Parameters
     ----------
@@ -77,10 +83,10 @@ def backlash_family(
         no part of it. It is zero for symmetric motions. A subharmonic motion gives its average over
         its whole period, an aperiodic one over `periods` periods. Where contact is lost for good the load
         stands still: all zero.
-    regime : int8 array (na, nw)
+    regime : int16 array (na, nw)
         Index into `BACKLASH_REGIMES`: ``impact`` (half-wave symmetric, no sustained contact), ``contact``
-        (half-wave symmetric, chatter complete), ``asymmetric`` (one period, not symmetric), ``subharmonic``
-        (two or more periods), ``aperiodic`` (no period found within `transient`), ``free`` (no impacting
+        (half-wave symmetric, chatter complete), ``asymmetric`` (one period, not symmetric), ``subharmonic k``
+        (repeats after k periods), ``aperiodic`` (no period found within `transient`), ``free`` (no impacting
         motion found).
     residual : float array (na, nw)
         Closing error of the orbit (phase plus relative speed). Where ``aperiodic``: by how much N of the two
@@ -101,7 +107,7 @@ def backlash_family(
     amplitudes, frequencies = positive_axis("A", A, "N"), positive_axis("omega", omega, "rad/s")
     orders = checked_orders(orders)
     harmonics = np.empty((amplitudes.size, frequencies.size, orders + 1), dtype=complex)
-    regime = np.empty(harmonics.shape[:2], dtype=np.int8)
+    regime = np.empty(harmonics.shape[:2], dtype=np.int16)
     residual = np.empty(harmonics.shape[:2])
     for i, a in enumerate(amplitudes):
         scaled = a / (motor_mass * gap * frequencies**2)
@@ -243,6 +249,7 @@ def _same(one, other, tol):
 @njit(cache=True)
 def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
     """Fill X_k/a in units of 1/((M1 + M2) omega^2) for a row of A."""
+    mean = np.zeros(harmonics.shape[1], dtype=np.complex128)
     for j in range(scaled.size):
         A = scaled[j]
         out = harmonics[j]
@@ -252,23 +259,32 @@ def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
             _two_impact_harmonics(A, eps, tau, speed, out)
             regime[j], residual[j] = IMPACT, closing
             continue
-        regime[j], residual[j] = FREE, 0.0
+        regime[j], residual[j], least = FREE, 0.0, np.inf
         for n in range(starts.shape[0]):
             w = starts[n, 1] * (1.0 + A)
             status, lap, count, phi, w, contact, _, closing = _settle(A, eps, starts[n, 0], w, transient)
             if status == 1:
+                out[:] = 0.0
                 _measure(A, eps, phi, w, count, out)
                 regime[j], residual[j] = _name(lap, contact), closing
                 break
             if status == 0:
-                spread = _average(A, eps, phi, w, periods, out)
-                if spread >= 0.0:
-                    regime[j], residual[j] = APERIODIC, spread
+                mean[:] = 0.0
+                spread = _average(A, eps, phi, w, periods, mean)
+                if spread >= 0.0 and (spread < least or regime[j] == FREE):
+                    out[:] = mean
+                    regime[j], residual[j], least = APERIODIC, spread, spread
+                if 0.0 <= spread < VAGUE:
                     break
 
 
 @njit(cache=True)
 def _name(lap, contact):
+    """Index into `BACKLASH_REGIMES` of a motion that closes after `lap` half periods."""
     if lap == 1:
         return CONTACT if contact else IMPACT
-    return ASYMMETRIC if lap == 2 else SUBHARMONIC
+    if lap == 2:
+        return ASYMMETRIC
+    # an odd number of half periods mirrors the motion: it repeats after twice as many
+    periods = lap if lap % 2 == 1 else lap // 2
+    return min(FREE - 1 + periods, FREE + _MOST_PERIODS - 2)

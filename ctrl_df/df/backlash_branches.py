@@ -208,7 +208,7 @@ class _Followed:
         self.regime = BACKLASH_REGIMES[_name(self.lap, self.contact)]
         period = "a period" if self.lap <= 2 else f"in {self.lap / (1 if self.lap % 2 else 2):g} periods"
         impacts = self.count * (2 if self.lap % 2 else 1)
-        how = f"{self.regime} motion of {impacts} impacts {period}"
+        how = f"{self.regime.split()[0]} motion of {impacts} impacts {period}"
         self.name = "motion with complete chatter" if self.contact else how
 
     def holds(self, motion) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from .dispatch import method_for
 from .family import Family
 from .points import points
+from .warning import warn_of
 from .work import Work
 
 
@@ -45,6 +46,12 @@ def describing_function(
     ndarray of complex
         N, with the shape of A and omega broadcast; NaN where there is no periodic answer.
 
+    Warns
+    -----
+    DescribingFunctionWarning
+        N is NaN somewhere, or that of a motion without a period, that travels, or that repels; the regime,
+        the number of points and the first of them are said.
+
     Raises
     ------
     ValueError
@@ -52,6 +59,20 @@ def describing_function(
     TypeError
         F is no block and no callable, or an unknown keyword.
     """
+    N, regime, A, omega = _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)
+    warn_of(N, regime, A, omega)
+    return N
+
+
+def quiet_describing_function(
+    F, A, omega=None, num_points=100, zero_check=True, try_method=True, output=None, **options
+):
+    """Return N as `describing_function` does, for callers that judge NaN and regimes by themselves."""
+    return _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)[0]
+
+
+def _evaluated(F, A, omega, num_points, zero_check, try_method, output, options):
+    """Return N, regime, A and omega, all checked."""
     if isinstance(
         num_points, bool | np.bool_
     ):  # python-control's order: F, A, num_points, zero_check, try_method
@@ -65,9 +86,10 @@ def describing_function(
     _check_options(method, options)
     _check_omega(method, omega)
     if A.size == 0 or np.prod(shape) == 0:
-        return np.zeros(shape, dtype=complex)
+        return np.zeros(shape, dtype=complex), np.full(shape, ""), A, omega
     pairs = np.broadcast_to(A, shape), None if omega is None else np.broadcast_to(omega, shape)
-    return points(method, *pairs, zero_check)[0][()]
+    N, regime, _ = points(method, *pairs, zero_check)
+    return N[()], regime, A, omega
 
 
 def describing_function_family(

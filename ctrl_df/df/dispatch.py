@@ -328,7 +328,15 @@ def _is_static(F, largest) -> bool:
 
 
 def _linear(system, A, omega, orders):
-    s = 1j * omega if system.isctime() else np.exp(1j * omega * float(system.dt))
+    """Frequency response; NaN at an undamped pole, named where the forced motion repels."""
+    continuous = system.isctime()
+    s = 1j * omega if continuous else np.exp(1j * omega * float(system.dt))
     y = np.zeros((A.size, omega.size, orders + 1), dtype=complex)
-    y[..., 1] = np.asarray(system(s)).reshape(-1)
-    return y, np.full(y.shape[:2], "linear"), np.zeros(y.shape[:2])
+    response = np.asarray(system(s, warn_infinite=False)).reshape(-1)
+    at_pole = ~np.isfinite(response)
+    poles = system.poles()
+    repels = np.any(poles.real > 0) if continuous else np.any(np.abs(poles) > 1)
+    regime = np.full(y.shape[:2], "unstable" if repels else "linear", dtype="U9")
+    y[..., 1], regime[:, at_pole] = response, "resonance"
+    y[:, at_pole] = np.nan
+    return y, regime, np.where(np.isnan(y[..., 1]), np.nan, 0.0)

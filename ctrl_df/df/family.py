@@ -100,10 +100,10 @@ class Family:
         if row.size:
             response = self.N[row[0]]
         elif self.block is not None:
-            from .describing import describing_function
+            from .describing import quiet_describing_function
 
             name = self.output if self.output in getattr(self.block, "output_labels", ()) else None
-            response = describing_function(self.block, amplitude, self.omega, output=name)
+            response = quiet_describing_function(self.block, amplitude, self.omega, output=name)
         else:
             order = np.argsort(self.amplitudes)
             grid, table = np.log(self.amplitudes[order]), self.N[order]

@@ -13,12 +13,13 @@ from ..simulate.engine import Engine, State, harmonic_drive
 from ..simulate.layout import EVENT_KINDS
 from ..status import Status
 from . import shooting
+from .linear_orbit import linear_orbit
 from .shooting import CLOSED, SPENT, close_orbit
 from .shot import make_shot, place, shoot
-from .sweep import floor
-from .symmetries import Probe, find_symmetries
+from .symmetries import Probe, Sizes, find_symmetries
 
 RTOL = 5e-10
+_FAMILIAR = 1e3  # factor between sizes of motion for which laws need not be asked anew
 _COARSE = 1e-7  # tolerance while a transient is followed
 LONGEST = 12  # periods of a subharmonic motion that is recognised
 BLOCKS = 8  # an average's spread is estimated from that many parts
@@ -61,25 +62,53 @@ class OrbitSearch:
                 "ticks have no common period with the forcing. Take its continuous equivalent here."
             )
         pointers.raised.clear()
-        self.symmetries = s = find_symmetries(self.engine, block)
-        self._check(s)
-        self.symmetric = s.odd
-        self.shot = make_shot(self.engine, s, self.row + 1)
         self.mechanisms = [n for n in prog.nodes if n[layout.KIND] == layout.MECHANISM]
         self.inertia = sum(
             prog.par[n[layout.PAR] + b] for n in self.mechanisms for b in range(prog.ints[n[layout.AUX]])
         ) or 1.0  # fmt: skip
-        self.free_row = self._row_is_free(s)
         self.quantized = bool(np.any(prog.nodes[:, layout.KIND] == layout.QUANTIZER))
         self.gap = any(prog.par[n[layout.PAR] + layout.P_GAP] > 0 for n in self.mechanisms)
         self.contacts = self.gap or any(
             prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms
         )
-        # contacts are closed within it: not below the rounding of positions. A mass may barely slip.
-        self.least = 1e-12 if self.contacts else 1e-18
+        self.atol = 0.0
         self.previous: State | None = None
         self._given: State | None = None
+        self._ask(Sizes.ones(self.engine.nstates))
+
+    def _ask(self, sizes: Sizes):
+        """Find the symmetries of the laws for motions of such sizes, and what follows from them."""
+        self.sizes = sizes
+        self.symmetries = s = find_symmetries(self.engine, self.block, sizes)
+        self._check(s)
+        self.symmetric = s.odd
+        self.shot = make_shot(self.engine, s, self.row + 1)
+        self.free_row = self._row_is_free(s)
+        self.linear = linear_orbit(self.engine, s, self.row, self.free_row)
         self.forget()
+
+    def _acquaint(self, A, omega):
+        """Ask the laws again where a motion is of another size than the one they were asked about."""
+        states = self._motion(A, omega)
+        sizes = Sizes(states, float(A), float(omega))
+        if sizes.near(self.sizes, _FAMILIAR):
+            return
+        # states that belong to no mechanism are as large as they get in a few periods
+        run = self.engine.run(
+            self.engine.start(), 6 * np.pi / omega, harmonic_drive([[0.0, A]], omega), max_steps=20_000
+        )
+        seen = np.maximum(np.abs(run.state.x), self.shot.space[6])
+        pointers.raised.clear()
+        if np.all(np.isfinite(seen)):
+            states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
+        sizes = Sizes(states, float(A), float(omega))
+        if not sizes.near(self.sizes, _FAMILIAR):
+            self._ask(sizes)
+
+    def _motion(self, A, omega):
+        """Return the size of each state in the motion of a free inertia under the force."""
+        power = self.symmetries.power
+        return A / (np.where(power > 0, self.inertia, 1.0) * omega**power)
 
     def _without_transparent(self, block):
         """Delays turn the phase, offset and drift move the mean: all exactly, outside the simulation."""
@@ -122,7 +151,8 @@ class OrbitSearch:
         """Whether the output described shifts with a free position."""
         probe, x = Probe(self.engine), np.zeros(self.engine.nstates)
         at_zero = probe.at(x, 0.0)[2][self.row]
-        return any(probe.at(x + 3.7 * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
+        size = self.sizes.states
+        return any(probe.at(x + 3.7 * size * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
 
     def forget(self):
         """Start the next point from rest."""
@@ -134,9 +164,10 @@ class OrbitSearch:
     # --- the search -----------------------------------------------------------------------------------------
 
     def _aim(self, A, omega):
+        self._acquaint(A, omega)
         self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([[0.0, A]], omega)
-        self.atol = floor(self.least, self.symmetries.power, self.inertia, A, omega)
+        self._unit = self._motion(A, omega)
 
     def _hmax(self, orders):
         """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic.
@@ -162,7 +193,7 @@ class OrbitSearch:
             1e-3 * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
         )
         self.shot.size[:n] = 0.0
-        self.shot.scale[:] = 1e-13
+        self.shot.scale[:] = 0.0
         self.shot.jacobian[:] = np.nan
 
     def _state(self, y, mode=None):
@@ -219,16 +250,31 @@ class OrbitSearch:
             raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
         if outcome != CLOSED:
             return None
-        gained = np.abs(shot.trial[1][self.symmetries.inertial]) if not self.mirrored else np.zeros(0)
-        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
-            raise OutOfWork(
-                Status.DIVERGED
-            )  # nothing ties the mechanism to the ground, and something pushes it
+        if not self.mirrored:
+            self._check_free_speed(shot.trial[1])
         if self.quantized:  # the harmonics of the centred motion
             self._shoot(state.copy(), RTOL, periods, spectrum)
-        self.integrals, self.ends = spectrum[self.row], shot.ends[:, self.row].copy()
-        self.kinds, self.still = int(shot.tally[2]), bool(shot.tally[5])
+        self._keep(spectrum)
         return state, miss
+
+    def measure(self, state, periods, orders, rtol):
+        """One shot of a closed orbit, for its integrals, ends and event kinds."""
+        spectrum = np.zeros((self.row + 1, orders + 1), complex)
+        end = state.copy()
+        self._shoot(end, rtol, periods, spectrum)
+        if not self.mirrored:
+            self._check_free_speed(self.symmetries.transform @ (end.x - state.x))
+        self._keep(spectrum)
+
+    def _keep(self, spectrum):
+        self.integrals, self.ends = spectrum[self.row], self.shot.ends[:, self.row].copy()
+        self.kinds, self.still = int(self.shot.tally[2]), bool(self.shot.tally[5])
+
+    def _check_free_speed(self, step):
+        """Raise where a speed that nothing ties to the ground has changed: something pushes the mechanism."""
+        gained = np.abs(step[self.symmetries.inertial])
+        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
+            raise OutOfWork(Status.DIVERGED)
 
     def _touching(self, orders):
         """Look for an orbit whose bodies touch, for a block found swinging freely within its gap.
@@ -262,18 +308,17 @@ class OrbitSearch:
         return None, keeps
 
     def _stop_if_running_away(self, y):
-        """Raise where a state grows out of all bounds, or a speed steadily: nothing holds the mass back."""
-        half = len(y) // 2
+        """Raise where a state grows out of all bounds, or a free body steadily gains speed."""
+        half, y = len(y) // 2, y / self._unit
         if np.max(np.abs(y[-1])) > 100 * np.max(np.abs(y[half])) > 1e4 * np.max(np.abs(y[0])):
             raise OutOfWork(Status.DIVERGED)
-        for i in np.flatnonzero(self.symmetries.power == 1):
+        s = self.symmetries
+        for i in range(len(s.power)):
+            if s.power[i] != 1 or not s.positions[i - 1]:
+                continue
             early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
             spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
-            if (
-                abs(early) > 1e-3 * self.A / (self.inertia * self.omega)
-                and abs(late / early - 1) < 1e-3
-                and spread < 0.5 * abs(early / half)
-            ):
+            if abs(early) > 1e-3 and abs(late / early - 1) < 1e-3 and spread < 0.5 * abs(early / half):
                 raise OutOfWork(Status.DIVERGED)
 
     # --- how a search can fail ------------------------------------------------------------------------

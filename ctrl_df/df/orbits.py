@@ -16,6 +16,8 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 from ..simulate import layout
 from ..simulate.engine import State, harmonic_drive
+from ..status import Status
+from .far_newton import close_far
 from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
 from .sweep import sweep
 
@@ -33,11 +35,16 @@ ORBIT_REGIMES = (
     "work limit",
     "drifting",
     "free",
+    "resonance",
+    *(f"subharmonic {k}" for k in range(2, LONGEST + 1)),
 )
 """Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
 without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
-periods; none; no dry friction and no contact; the state runs away (NaN); the bound on work was hit (NaN);
-the mass travels steadily besides swinging (the ramp is no part of the harmonics); a load never touched."""
+periods, with their number; none; no dry friction and no contact; the state runs away (NaN); the bound on
+work was hit (NaN); the mass travels steadily besides swinging (the ramp is no part of the harmonics);
+a load never touched; an undamped linear mechanism driven at its natural frequency, which swings wider and
+wider (NaN)."""
+_WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 _AT_ONCE = 64  # points of a line between two chances to interrupt it
 
@@ -88,7 +95,7 @@ def orbit_family(
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     A, omega = np.atleast_1d(np.asarray(A, float)), np.atleast_1d(np.asarray(omega, float))
     harmonics = np.full((len(A), len(omega), orders + 1), np.nan + 0j)
-    regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int8)
+    regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int16)
     residual = np.full((len(A), len(omega)), np.nan)
     solver = solver_for(block, output, transient=transient, averages=averages, max_steps=max_steps)
     a_order = np.argsort(A)[::-1]  # downwards: large motions are the simple ones
@@ -99,6 +106,23 @@ def orbit_family(
         row, column = (a_order, np.full(len(A), line)) if along_a else (np.zeros(len(omega), int), w_order)
         solver.line(A[row], omega[column], harmonics, regime, residual, row, column)
     return harmonics, regime, residual
+
+
+def _steady(means, sizes) -> bool:
+    """Whether averages over consecutive blocks scatter and do not tend anywhere.
+
+    A slope is believed from four times its standard error: for eight blocks one steady motion in 200 is then
+    followed longer than need be.
+    """
+    at = np.arange(len(means)) - 0.5 * (len(means) - 1)
+    size = np.max(np.abs(means))
+    for values, scale in ((means.real, size), (means.imag, size), (sizes, np.max(sizes))):
+        slope = at @ values / (at @ at)
+        rest = values - values.mean() - slope * at
+        error = np.sqrt(rest @ rest / (len(at) - 2) / (at @ at))
+        if abs(slope) > 4 * error and abs(slope) * len(at) > 1e-6 * scale:
+            return False
+    return True
 
 
 _kept = threading.local()
@@ -124,6 +148,7 @@ class OrbitSolver(OrbitSearch):
     def line(self, A, omega, harmonics, regime, residual, row, column):
         """Solve consecutive points, compiled as long as they close, one by one where they do not."""
         orders, n = harmonics.shape[-1] - 1, len(A)
+        self._acquaint(A[n // 2], omega[n // 2])
         out = np.zeros((n, self.row + 1, orders + 1), complex)
         ends, miss = np.zeros((n, 2, self.row + 1)), np.zeros(n)
         kinds, still = np.zeros(n, np.int64), np.zeros(n, np.int64)
@@ -154,8 +179,7 @@ class OrbitSolver(OrbitSearch):
             while goes_on and p + done < n:  # compiled code hears no Ctrl-C: some points at a time
                 one, end = p + done, min(p + done + _AT_ONCE, n)
                 more, _, known = sweep(
-                    self.shot, samples, scratch, A[one:end], omega[one:end], self.least, power, self.inertia,
-                    past, mode, known, self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end],
+                    self.shot, samples, scratch, A[one:end], omega[one:end], power, past, mode, known, self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end],
                     ends[one:end], miss[one:end], kinds[one:end], still[one:end],
                 )  # fmt: skip
                 self._raise_if_raised()
@@ -188,6 +212,11 @@ class OrbitSolver(OrbitSearch):
     def solve(self, A: float, omega: float, orders: int):
         """Return (Y_k/A for k = 0..orders, regime name, residual)."""
         self._aim(A, omega)
+        if self.linear is not None:
+            self.simple = False
+            y, name, x = self.linear.answer(A, omega, orders)
+            self.previous = None if x is None else State(0.0, x, self.engine._modes.copy())
+            return self._finished(y, name), name, np.nan if np.isnan(y[1]) else 0.0
         try:
             y, name, residual = self._answer(orders)
         except OutOfWork as stop:
@@ -208,8 +237,11 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             orbit = self._periodic(self._follow(state, self.transient), orders=orders)
         if orbit is None:
-            state = self._follow(state, 30)
+            state = self._follow(state, 27)
+            slow = self._slow(self._trail(state, 5))
             orbit = self._periodic(state, orders=orders)
+            if orbit is None:
+                orbit = close_far(self, state, orders=orders, patient=slow)
         if orbit is None and self.symmetric:
             self.mirrored = False
             state = self._follow(self._nudged(state), 40)
@@ -229,17 +261,59 @@ class OrbitSolver(OrbitSearch):
         return y, self._name(y, self.ends, orbit[1]), orbit[1]
 
     def _unperiodic(self, state, orders):
-        """Look for a longer period; else average over many."""
+        """Look for a longer period; else follow the motion until it is steady, and average."""
         self.mirrored, self.simple = False, False
         state = self._follow(state, 40, RTOL)
-        s, trail = self.symmetries, []
-        for _ in range(2 * LONGEST + 1):
-            trail.append(s.transform @ state.x)
-            self._shoot(state)
-        y = np.array(trail)
+        y = self._trail(state, 2 * LONGEST + 1)
         self._stop_if_running_away(y)
-        size = np.where(self.shot.size > 0, self.shot.size, 1.0)
+        found = self._longer_period(state, y, orders)
+        if found is not None:
+            return found
+        orbit = close_far(self, state, orders=orders, patient=self._slow(y))
+        if orbit is None:
+            for periods in _WAITS:
+                means, sizes = self._averages(state, orders)
+                if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
+                    break
+                state = self._follow(state, periods)
+                orbit = self._periodic(state, orders=orders) or close_far(self, state, orders=orders)
+                if orbit is not None:
+                    break
+            else:  # still on its way
+                grows = np.all(np.diff(sizes) > 0) and np.ptp(np.diff(sizes)) < 0.5 * np.mean(np.diff(sizes))
+                raise OutOfWork(Status.DIVERGED if grows else Status.WORK_LIMIT)
+        if orbit is not None:
+            self.previous, self.simple = orbit[0], True
+            y = self._coefficients(self.integrals, self.ends, 1, False)
+            return y, self._name(y, self.ends, orbit[1]), orbit[1]
         self.previous = state
+        mean = means.mean(axis=0)
+        if self.gap and not self.touched:
+            return mean, "free", 0.0
+        error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
+        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
+
+    def _trail(self, state, shots):
+        """Coordinates before each of some shots of the state, in place."""
+        trail = []
+        for _ in range(shots):
+            trail.append(self.symmetries.transform @ state.x)
+            self._shoot(state)
+        return np.array(trail)
+
+    def _slow(self, y):
+        """Whether a motion changes little, and steadily, from shot to shot: a transient, not chaos."""
+        s = self.symmetries
+        size = np.maximum(np.max(np.abs(y), axis=0), 1e-300)
+        steps = np.diff(y, axis=0)
+        steps -= np.where(s.wrap > 0, np.round(steps / np.where(s.wrap > 0, s.wrap, 1)) * s.wrap, 0)
+        steps = np.max(np.abs(steps / size)[:, s.free], axis=1, initial=0.0)[-4:]
+        return bool(np.max(steps) < 0.3 and np.max(steps) < 2 * np.min(steps))
+
+    def _longer_period(self, state, y, orders):
+        """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
+        s = self.symmetries
+        size = np.where(self.shot.size > 0, self.shot.size, 1.0)
         least = 3e-3  # mismatch of the shorter periods: a multiple that closes no better is not tried
         for periods in range(1, LONGEST + 1):
             gap = (y[-1] - y[-1 - periods]) / size
@@ -253,25 +327,25 @@ class OrbitSolver(OrbitSearch):
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1
                     c = self._coefficients(self.integrals, self.ends, periods, False)
-                    name = "subharmonic" if periods > 1 else self._name(c, self.ends, orbit[1])
+                    name = f"subharmonic {periods}" if periods > 1 else self._name(c, self.ends, orbit[1])
                     return c, name, orbit[1]
-        length = self.averages // BLOCKS
-        parts, touched = [], 0
+        return None
+
+    def _averages(self, state, orders):
+        """Follow the state, in place, over `averages` periods; coefficients and size of every block."""
+        length, parts, sizes, self.touched = self.averages // BLOCKS, [], [], False
         for _ in range(BLOCKS):
-            spectrum = np.zeros((self.row + 1, orders + 1), complex)
+            mean, size = np.zeros(orders + 1, complex), 0.0
             for _ in range(length):
-                part = np.zeros_like(spectrum)
-                touched |= self._shoot(state, RTOL, 1, part) & TOUCH
-                spectrum += part / length
-                parts_ends = self.shot.ends[:, self.row].copy()
-                spectrum[self.row] += self._ramp(parts_ends, orders, 1) * self.period / 2 / length
-            parts.append(self._coefficients(spectrum[self.row], np.zeros(2), 1, False))
-        parts = np.array(parts)
-        mean = parts.mean(axis=0)
-        if self.gap and not touched:
-            return mean, "free", 0.0
-        error = np.std(parts[:, 1], ddof=1) / np.sqrt(BLOCKS)
-        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
+                part = np.zeros((self.row + 1, orders + 1), complex)
+                self.touched |= bool(self._shoot(state, RTOL, 1, part) & TOUCH)
+                ends = self.shot.ends[:, self.row]
+                mean += self._coefficients(part[self.row], ends, 1, False) / length
+                y = np.abs(self.symmetries.transform @ state.x) / self._unit
+                size += np.max(y[self.symmetries.free], initial=0.0) / length
+            parts.append(mean)
+            sizes.append(size)
+        return np.array(parts), np.array(sizes)
 
     # --- what was found -------------------------------------------------------------------------------
 

@@ -75,8 +75,8 @@ def _slope_at_zero(method, largest, zero_check):
                 f"function must evaluate to zero at zero; got f(0) = {at_zero}. "
                 "Subtract the bias, or pass zero_check=False."
             )
-    small = (largest or 1.0) * np.array([1e-9, 1e-8])
+    small = (largest or 1.0) * np.array([1e-9, 1e-8, 1.0])
     N = method.harmonics(small, None, 1)[0][:, 0, 1]
     if abs(N[0]) > 5 * abs(N[1]):
         return complex(np.inf)
-    return N[0] if abs(N[0]) > 1e-13 else 0j
+    return N[0] if abs(N[0]) > 1e-13 * abs(N[2]) else 0j

@@ -15,7 +15,7 @@ from .shot import coordinates, place
 
 @njit(cache=True, error_model="numpy")
 def sweep(
-    shot, samples, coefficients, amplitudes, omegas, least, power, inertia, past, past_mode, known, mirrored,
+    shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
     rtol, hmax, budget, out, ends, miss, kinds, still,
 ):  # fmt: skip
     """Close the orbits of consecutive points, each started from those before; stop where one does not close.
@@ -48,8 +48,8 @@ def sweep(
         shot.clock[2] = past[3, 0] * period
         shot.tally[0] = 0
         outcome, miss[p] = close_orbit(
-            shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol,
-            floor(least, power, inertia, A, omega), hmax * period, out[p], budget, 12, eager,
+            shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol, 0.0,
+            hmax * period, out[p], budget, 12, eager,
         )  # fmt: skip
         past[3, 0] = min(shot.clock[2] / period, 0.1)
         if outcome != CLOSED:
@@ -74,15 +74,6 @@ def sweep(
 def unit(power, A, omega):
     """Return what a state is measured in on a sweep: the motion of a free inertia under the force."""
     return A / omega**power
-
-
-@njit(cache=True, error_model="numpy")
-def floor(least, power, inertia, A, omega):
-    """Absolute tolerance, `least` of the motion of a free inertia."""
-    highest = 0
-    for j in range(power.shape[0]):
-        highest = max(highest, power[j])
-    return least * unit(highest, A, omega) / inertia
 
 
 @njit(cache=True, error_model="numpy")

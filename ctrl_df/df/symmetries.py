@@ -70,11 +70,41 @@ class Symmetries:
     shifts: list
 
 
+@dataclass(frozen=True)
+class Sizes:
+    """What motion the laws are asked about: laws that matter there must show.
+
+    Attributes
+    ----------
+    states : (n,) array
+        Size of each state.
+    force : float
+        Size of the input.
+    rate : float
+        Typical frequency [rad/s].
+    """
+
+    states: np.ndarray
+    force: float = 1.0
+    rate: float = 1.0
+
+    @classmethod
+    def ones(cls, n: int) -> Sizes:
+        """Return sizes of one in every unit."""
+        return cls(np.ones(n))
+
+    def near(self, other: Sizes, factor: float) -> bool:
+        """Whether all sizes agree within a factor."""
+        ratios = [*(self.states / other.states), self.force / other.force, self.rate / other.rate]
+        return bool(np.max(np.abs(np.log(ratios))) <= np.log(factor))
+
+
 class Probe:
     """Rates and margins of an engine at given states and input."""
 
-    def __init__(self, engine: Engine):
+    def __init__(self, engine: Engine, sizes: Sizes | None = None):
         self.engine, self.prog = engine, engine.program
+        self.sizes = Sizes.ones(engine.nstates) if sizes is None else sizes
         self.ng = int(self.prog.ints[L.H_NG])
         self.rng = np.random.default_rng(20)
 
@@ -99,8 +129,8 @@ class Probe:
         """Random states over several decades, bodies within their gaps, some of them at rest."""
         n = self.engine.nstates
         for i in range(_PROBES):
-            x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(-4, 1, size=n)
-            u = self.rng.normal() * 10.0 ** self.rng.uniform(-1, 2)
+            x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(-4, 1, size=n) * self.sizes.states
+            u = self.rng.normal() * 10.0 ** self.rng.uniform(-1, 2) * self.sizes.force
             for node in _mechanisms(self.prog):
                 at, bodies = node[L.X], self.prog.ints[node[L.AUX] + L.A_BODIES]
                 if i % 3 == 0:
@@ -119,9 +149,9 @@ def _mechanisms(prog):
     return [node for node in prog.nodes if node[L.KIND] == L.MECHANISM]
 
 
-def find_symmetries(engine: Engine, block=None) -> Symmetries:
+def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> Symmetries:
     """Ask the laws of a compiled system for its symmetries; `block` tells wavelengths of ripples."""
-    n, prog, probe = engine.nstates, engine.program, Probe(engine)
+    n, prog, probe = engine.nstates, engine.program, Probe(engine, sizes)
     transform, power = np.eye(n), np.zeros(n, int)
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
     low, high, gaps = lower.copy(), upper.copy(), np.zeros(n)
@@ -147,13 +177,15 @@ def find_symmetries(engine: Engine, block=None) -> Symmetries:
             low[places[-1]], high[places[-1]] = prog.par[par + L.P_LOW], prog.par[par + L.P_HIGH]
         direction = np.zeros(n, bool)
         direction[places] = True
-        if not stopped and _unmoved(probe, samples, direction, probe.rng.normal() * 1.7):
+        if not stopped and _unmoved(
+            probe, samples, direction, probe.rng.normal() * 1.7 * probe.sizes.states[at]
+        ):
             free[at] = False
             positions[places] = True
             shifts.append(direction)
             speeds = np.zeros(n, bool)
             speeds[places + 1] = True
-            if _unmoved(probe, samples, speeds, 0.37, direction):
+            if _unmoved(probe, samples, speeds, 0.37 * probe.sizes.states[at + 1], direction):
                 free[at + 1] = False
                 inertial[at + 1] = True
         elif not stopped:
@@ -165,7 +197,7 @@ def find_symmetries(engine: Engine, block=None) -> Symmetries:
         mine[node[L.X] : node[L.X] + 2 * prog.ints[node[L.AUX] + L.A_BODIES]] = True
     for i in np.flatnonzero(~mine):
         direction = np.arange(n) == i
-        if _unmoved(probe, samples, direction, 0.83):
+        if _unmoved(probe, samples, direction, 0.83 * probe.sizes.states[i]):
             free[i] = False
             positions[i] = True
             shifts.append(direction)
@@ -199,7 +231,7 @@ def _is_odd(probe, samples, offset):
         center = probe.at(offset / 2, 0.0)[2] if np.any(offset) else 0.0
         if not (_close(other, -dx) and _close(other_g, g)):
             return False
-        if not np.any(offset) and not _close(other_y + y, 2 * center + 0 * y):
+        if not np.any(offset) and not _close(other_y - 2 * center, -y):
             return False
         compared += 1
     return compared > 0
@@ -215,17 +247,17 @@ def _on_motor(gaps):
 
 def _autonomous(probe, samples):
     for x, u, (dx, _, _) in samples[: _PROBES // 2]:
-        if not _close(probe.at(x, u, t=probe.rng.uniform(1, 100))[0], dx):
+        if not _close(probe.at(x, u, t=probe.rng.uniform(1, 100) / probe.sizes.rate)[0], dx):
             return False
     return True
 
 
 def _close(a, b, tol=_TOL):
+    """Whether two vectors agree, entry by entry: their units differ."""
     finite = np.isfinite(b)
     if not np.array_equal(finite, np.isfinite(a)):
         return False
-    scale = np.max(np.abs(b[finite]), initial=0.0)
-    return bool(np.all(np.abs(a[finite] - b[finite]) <= tol * (scale + 1e-12)))
+    return bool(np.all(np.abs(a[finite] - b[finite]) <= tol * np.abs(b[finite])))
 
 
 def _wavelengths(block):

@@ -14,7 +14,9 @@ from .wall_map import EXACT, ROUGH, flight, lag, place, stays, wrap
 
 NEAR = 1e-5  # distance of a recurrence from which Newton's method is tried
 BLOCKS = 8  # an average's spread is estimated from that many parts
+RARE = 8  # impacts in each of those parts, at least
 IMPACTS = 200  # bound on impacts per period of the budget, chatter included
+SETTLED = 200  # impacts given to settle where they are rare, besides 20 times the memory 1/(1 - eps) of them
 RELEASE = -0.5 * math.pi  # phi at which a pressing acceleration changes sign
 
 
@@ -47,7 +49,9 @@ def settle(A, eps, phi, w, transient):
     """
     ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
     c, s = math.cos(phi), math.sin(phi)
-    for _ in range(IMPACTS * transient):
+    # a weak force needs many periods from wall to wall: what counts then is impacts
+    enough = SETTLED + 20.0 / max(1.0 - eps, 0.01)
+    for n in range(IMPACTS * transient):
         kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, ROUGH)
         if kind == 2:
             return 2, 0, 0, phi, w, False, 0.0, 0.0
@@ -64,7 +68,7 @@ def settle(A, eps, phi, w, transient):
         if since == power:
             ref_phi, ref_w, since, elapsed = phi, w, 0, 0.0
             power = min(2 * power, 4096)
-        if clock > 2.0 * math.pi * transient:
+        if clock > 2.0 * math.pi * transient and n > enough:
             break
     return 0, 0, 0, phi, w, False, 0.0, 0.0
 
@@ -171,8 +175,13 @@ def average(A, eps, phi, w, periods, out):
     """
     n = out.size
     blocks = min(BLOCKS, periods)
-    length = 2.0 * math.pi * (periods // blocks)
     c, s, side = math.cos(phi), math.sin(phi), -1.0
+    apart = interval(A, eps, phi, c, s, w)
+    if not apart < np.inf:
+        return -1.0
+    length = 2.0 * math.pi * (periods // blocks)
+    if apart > 2.0 * math.pi:  # impacts are rare
+        length = max(length, 2.0 * math.pi * math.ceil(RARE * apart / (2.0 * math.pi)))
     tau = phi  # at the lower wall; time counts from here in the forcing phase
     cut = 2.0 * math.pi * math.ceil(tau / (2.0 * math.pi))
     wall = np.zeros(n, dtype=np.complex128)
@@ -221,6 +230,18 @@ def average(A, eps, phi, w, periods, out):
     mean = 0.5 * abs(out[1]) * length * A
     error = max(squares / blocks - mean * mean, 0.0) / (blocks - 1)
     return 2.0 * math.sqrt(error) / max(mean, 1e-300)
+
+
+@njit(cache=True)
+def interval(A, eps, phi, c, s, w):
+    """Mean time between the next impacts; inf where one of them never comes."""
+    clock = 0.0
+    for _ in range(RARE):
+        kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, ROUGH)
+        if kind == 2:
+            return np.inf
+        clock += time + rest
+    return clock / RARE
 
 
 @njit(cache=True)

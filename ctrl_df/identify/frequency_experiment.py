@@ -33,7 +33,7 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     -------
     Experiment
     """
-    from ..df.describing import describing_function
+    from ..df.describing import quiet_describing_function as describing_function
     from ..df.dispatch import method_for
     from .experiment import Experiment
 

@@ -129,7 +129,7 @@ def simulate_table(model, points: Points, work=None) -> np.ndarray:
 
 
 def _described(model, A, omega, work) -> np.ndarray:
-    from ..df.describing import describing_function
+    from ..df.describing import quiet_describing_function as describing_function
     from ..df.dispatch import method_for
 
     options: dict[str, Any] = dict(work) if method_for(model).name == "orbit" else {}

@@ -172,7 +172,7 @@ class Assessor:
         c1, c2 = DYNAMIC_ERROR if self.method.name in ("friction", "backlash", "orbit") else MEMORYLESS_ERROR
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
-        if self.answer is None or not named or regime in ("aperiodic", "subharmonic"):
+        if self.answer is None or not named or regime.startswith(("aperiodic", "subharmonic")):
             return spread, None, []
         respond, count = self.answer
         path = follow_path(respond, count, self.linear, a, w)

@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..df.describing import describing_function
+from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled

@@ -157,7 +157,7 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
         Further reasons; level 0 (informs), 1 (doubtful) or 2 (unreliable).
     """
     reasons: list[tuple[int, str]] = []
-    if regime in _IRREGULAR:
+    if regime.startswith(_IRREGULAR):
         reasons.append((2, f"the block's motion there is {regime}, so a single N does not describe it"))
     elif regime == "asymmetric":
         reasons.append((1, "the block's output is asymmetric there: a mean and even harmonics are left out"))

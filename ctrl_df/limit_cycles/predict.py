@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
-from ..df.describing import _amplitudes, describing_function, describing_function_family
+from ..df.describing import _amplitudes, describing_function_family, quiet_describing_function
 from ..df.dispatch import method_for
 from ..df.family import Family, minus_inverse
 from ..df.work import progress_bar
@@ -167,7 +167,7 @@ def describing_function_response(
     if method.needs_omega:
         N_vals = family.minus_inverse
     else:
-        with_zero = describing_function(F, amplitudes, zero_check=False, **given)
+        with_zero = quiet_describing_function(F, amplitudes, zero_check=False, **given)
         N_vals = minus_inverse(with_zero)
 
     log_a, log_w, values = scan_grid(method, linear, family)
