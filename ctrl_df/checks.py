@@ -1,0 +1,174 @@
+"""What arguments must be: each check returns the value in the type asked for, or says rule, value, remedy.
+
+TypeError where the kind is wrong (text, a truth value, a complex number in the place of a number), ValueError
+where the value is. ``owner`` begins the sentence: the function or block that asks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+CHECK_VALUE = "Check the value and its unit (SI)."
+_SHOWN = 60  # characters of a value that an error repeats
+
+
+def shown(value) -> str:
+    """Return a value as text, short enough for a sentence."""
+    if isinstance(value, np.ndarray) and value.size > 8:
+        return f"an array of shape {value.shape}"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 4]} ..."
+
+
+def is_number(value) -> bool:
+    """Whether a value is one real number: no text, no truth value, nothing complex, no array of several."""
+    if isinstance(value, bool | np.bool_ | str | bytes | complex | np.complexfloating):
+        return False
+    if isinstance(value, np.ndarray):
+        return value.ndim == 0 and value.dtype.kind in "iuf"
+    return isinstance(value, int | float | np.number) or (hasattr(value, "__float__") and np.ndim(value) == 0)
+
+
+def number(
+    owner: str,
+    name: str,
+    value,
+    unit: str = "",
+    *,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+    strict: bool = False,
+    meaning: str = "",
+    remedy: str = CHECK_VALUE,
+    infinite: bool = False,
+) -> float:
+    """Return one real number within its bounds; `lower` itself is excluded if `strict`."""
+    if not is_number(value):
+        kind = f"one real number [{unit}]" if unit else "one real number"
+        tail = "Convert text with float()." if isinstance(value, str | bytes) else remedy
+        raise TypeError(f"{owner} needs {name} as {kind}; got {shown(value)}. {tail}")
+    try:
+        given = float(value)
+    except OverflowError:  # an integer beyond the range of floats
+        given = math.inf if value > 0 else -math.inf
+    enough = given > lower if strict else given >= lower
+    finite = infinite or not math.isinf(given)
+    if not (enough and given <= upper and finite):  # NaN fails every comparison
+        described = f" ({meaning}, unit {unit or 1})" if meaning else (f" [{unit}]" if unit else "")
+        rule = _rule(name, lower, upper, strict, infinite)
+        raise ValueError(f"{owner} needs {rule}{described}; got {name}={shown(value)}. {remedy}")
+    return given
+
+
+def positive(owner: str, name: str, value, unit: str = "", **keywords: Any) -> float:
+    """Return a number > 0."""
+    return number(owner, name, value, unit, lower=0.0, strict=True, **keywords)
+
+
+def count(owner: str, name: str, value, least: int = 1, *, meaning: str = "", remedy: str = "") -> int:
+    """Return an integer >= `least`; floats that are whole are taken, truth values are not."""
+    rule = f"{name} as an integer >= {least}" + (f" ({meaning})" if meaning else "")
+    tail = f" {remedy}" if remedy else ""
+    if not is_number(value):
+        raise TypeError(f"{owner} needs {rule}; got {shown(value)}.{tail}")
+    given = float(value)
+    if not (math.isfinite(given) and given == int(given) and given >= least):
+        raise ValueError(f"{owner} needs {rule}; got {name}={shown(value)}.{tail}")
+    return int(value)
+
+
+def flag(owner: str, name: str, value) -> bool:
+    """Return a truth value."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{owner} needs {name} as True or False; got {shown(value)}.")
+    return bool(value)
+
+
+def choice(owner: str, name: str, value, allowed) -> Any:
+    """Return one of the values allowed."""
+    if not isinstance(value, str) or value not in allowed:
+        words = " or ".join(repr(a) for a in allowed)
+        raise (ValueError if isinstance(value, str) else TypeError)(
+            f"{owner} needs {name}={words}; got {name}={shown(value)}."
+        )
+    return value
+
+
+def real_array(owner: str, name: str, values, unit: str = "", *, remedy: str = "") -> np.ndarray:
+    """Return real, finite numbers as an array of floats, of whatever shape."""
+    tail = f" {remedy}" if remedy else ""
+    rule = f"{name} as real numbers" + (f" [{unit}]" if unit else "")
+    if values is None or isinstance(values, str | bytes | Mapping | set):
+        raise TypeError(f"{owner} needs {rule}; got {shown(values)}.{tail}")
+    if np.any(np.ma.getmaskarray(values)) if isinstance(values, np.ma.MaskedArray) else False:
+        raise ValueError(f"{owner} needs {rule}; got masked entries. Cut them off or fill them first.")
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{owner} needs {rule}; got rows of unequal length.{tail}") from None
+    if given.dtype.kind == "O":  # numbers of several kinds, or none at all
+        if not all(is_number(v) for v in given.ravel()):
+            raise TypeError(f"{owner} needs {rule}; got {shown(values)}.{tail}")
+    elif given.dtype.kind not in "iuf":
+        kind = {"c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}.get(
+            given.dtype.kind, f"dtype {given.dtype}"
+        )
+        raise TypeError(f"{owner} needs {rule}; got {kind}: {shown(values)}.{tail}")
+    array = given.astype(float)
+    bad = ~np.isfinite(array)
+    if bad.any():
+        what = "NaN" if np.isnan(array[bad][0]) else "infinity"
+        where = f" at index {int(np.argmax(bad.ravel()))}" if array.ndim else ""
+        raise ValueError(f"{owner} needs {name} finite; got {what}{where}.{tail or ' Remove it.'}")
+    return array
+
+
+def mapping(owner: str, name: str, value) -> Mapping:
+    """Return a mapping of names to values."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{owner} needs {name} as a mapping, such as {{'mass': 9.0}}; got {shown(value)}.")
+    return value
+
+
+def known_name(owner: str, name: str, value, known) -> str:
+    """Return a name that is among those known."""
+    if not isinstance(value, str) or value not in known:
+        raise (ValueError if isinstance(value, str) else TypeError)(
+            f"{owner} needs {name} out of {', '.join(known) or 'none'}; got {shown(value)}."
+        )
+    return value
+
+
+def names(owner: str, name: str, value) -> tuple[str, ...]:
+    """Return one name or several as a tuple of names."""
+    if isinstance(value, str):
+        return (value,)
+    try:
+        given = tuple(value)
+    except TypeError:
+        given = (value,)
+    wrong = [v for v in given if not isinstance(v, str)]
+    if wrong:
+        raise TypeError(f"{owner} needs {name} as one name or a sequence of names; got {shown(wrong[0])}.")
+    return given
+
+
+def unknown_keywords(keywords) -> None:
+    """Refuse keywords that a function does not know."""
+    if keywords:
+        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+
+
+def _rule(name, lower, upper, strict, infinite):
+    if math.isfinite(lower) and math.isfinite(upper):
+        return f"{lower:g} {'<' if strict else '<='} {name} <= {upper:g}"
+    end = "" if infinite else " and finite"
+    if math.isfinite(lower):
+        return f"{name} {'>' if strict else '>='} {lower:g}{end}"
+    if math.isfinite(upper):
+        return f"{name} <= {upper:g}{end}"
+    return f"{name}" + (" as a number" if infinite else " finite")

@@ -1,0 +1,158 @@
+"""Bad input over the whole public surface: one error at once, of the right type, with rule, value, remedy.
+
+Every case is a call, the type of its error, and words that the message must hold. `refused` asks besides that
+it takes less than two seconds, is one readable sentence or two, and comes from no inner part by accident.
+"""
+
+import time
+import warnings
+from dataclasses import dataclass
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+
+NAN, INF = float("nan"), float("inf")
+MASKED = np.ma.masked_equal([0.0, 1.0, 2.0], 1.0)
+
+
+def refused(call, error, *words):
+    """Return the message of the error that a call must raise at once."""
+    began = time.perf_counter()
+    with warnings.catch_warnings(), pytest.raises(error) as caught:
+        warnings.simplefilter("ignore")
+        call()
+    text = str(caught.value)
+    assert type(caught.value) in (ValueError, TypeError, FileNotFoundError, RuntimeError) or isinstance(
+        caught.value, OSError
+    )
+    assert time.perf_counter() - began < 2.0, "an error that comes late"
+    for word in words:
+        assert word in text, f"{word!r} is not in {text!r}"
+    assert 20 < len(text) < 1000 and "\n" not in text and text.rstrip()[-1] in ".)", text
+    return text
+
+
+def table(cases):
+    """Parametrize over (name, call, error, words ...)."""
+    return pytest.mark.parametrize("case", cases, ids=[c[0] for c in cases])
+
+
+MASS = cdf.Mass(9)
+DRIVE = cdf.friction_mass(9, 5, 0.5)
+PID = cdf.pid(2000, 44250, 130)
+
+# --- blocks ------------------------------------------------------------------------------------------------
+
+
+@table(
+    [
+        ("saturation(-1)", lambda: cdf.saturation(-1), ValueError, "ub > 0", "-1", "saturation(ub, lb)"),
+        ("saturation(0)", lambda: cdf.saturation(0), ValueError, "ub > 0"),
+        ("saturation(lb=ub)", lambda: cdf.saturation(1, 1), ValueError, "lb < ub"),
+        ("saturation(True)", lambda: cdf.saturation(True), TypeError, "one real number", "True"),
+        ("mass=True", lambda: cdf.Mass(True), TypeError, "one real number [kg]", "True"),
+        ("mass='9'", lambda: cdf.Mass("9"), TypeError, "one real number", "'9'", "float()"),
+        ("mass=b'9'", lambda: cdf.Mass(b"9"), TypeError, "one real number", "float()"),
+        ("mass=[9]", lambda: cdf.Mass([9]), TypeError, "one real number", "[9]"),
+        ("mass=array", lambda: cdf.Mass(np.array([9.0])), TypeError, "one real number"),
+        ("mass complex", lambda: cdf.Mass(9 + 0j), TypeError, "one real number", "9+0j"),
+        ("mass np.complex", lambda: cdf.Mass(np.complex128(9)), TypeError, "one real number"),
+        ("mass np.bool", lambda: cdf.Mass(np.True_), TypeError, "one real number"),
+        ("mass=None", lambda: cdf.Mass(None), TypeError, "one real number", "None"),
+        ("mass nan", lambda: cdf.Mass(NAN), ValueError, "mass > 0 and finite", "nan"),
+        ("mass=10**400", lambda: cdf.Mass(10**400), ValueError, "finite"),
+        ("effects=5", lambda: cdf.Mass(9, effects=5), TypeError, "Coulomb(5)", "got 5"),
+        ("effects='coulomb'", lambda: cdf.Mass(9, effects="coulomb"), TypeError, "'coulomb'"),
+        ("effect class", lambda: cdf.Mass(9, [cdf.Coulomb]), TypeError, "Call the class"),
+        ("with_effect(None)", lambda: MASS.with_effect(None), TypeError, "None"),
+        ("without_effect(5)", lambda: DRIVE.without_effect(5), ValueError, "coulomb", "5"),
+        ("measured", lambda: cdf.Mass(9, measured="motr"), ValueError, "'load' or 'motor'", "motr"),
+        ("with_parameters(None)", lambda: MASS.with_parameters(None), TypeError, "mapping", "None"),
+        ("with_parameters(list)", lambda: MASS.with_parameters(["mass"]), TypeError, "mapping"),
+        ("parameter text", lambda: MASS.with_parameters({"mass": "9"}), TypeError, "'9'"),
+        ("parameter number", lambda: MASS.with_parameters({5: 9}), TypeError, "mass", "5"),
+        ("parameter unknown", lambda: DRIVE.with_parameters({"coulom": 1}), ValueError, "coulomb.level"),
+        ("element parameters", lambda: cdf.relay(1).with_parameters(None), TypeError, "mapping"),
+        ("element unknown", lambda: cdf.relay(1).with_parameters({"lvl": 1}), ValueError, "level"),
+        ("params= of a call", lambda: MASS.dynamics(0, [0, 0], [1], {"mass": "9"}), TypeError, "'9'"),
+        ("params= negative", lambda: MASS.dynamics(0, [0, 0], [1], {"mass": -9}), ValueError, "mass > 0"),
+        ("coulomb text", lambda: cdf.Coulomb("5"), TypeError, "level", "'5'"),
+        ("stop lower text", lambda: cdf.HardStop(1, lower="a"), TypeError, "lower", "'a'"),
+        ("stop lower nan", lambda: cdf.HardStop(1, lower=NAN), ValueError, "lower", "nan"),
+        ("stop lower True", lambda: cdf.HardStop(1, lower=True), TypeError, "lower", "True"),
+        ("stop upside down", lambda: cdf.HardStop(1, lower=2), ValueError, "lower < limit"),
+        ("pid('2')", lambda: cdf.pid("2"), TypeError, "kp", "'2'"),
+        ("pid(None)", lambda: cdf.pid(1, None), TypeError, "ki", "None"),
+        ("pid complex", lambda: cdf.pid(1, 0, 1j), TypeError, "kd"),
+        ("pid nan", lambda: cdf.pid(NAN), ValueError, "kp finite", "nan"),
+        ("pid tf < 0", lambda: cdf.pid(1, tf=-1), ValueError, "tf >= 0", "ideal PID"),
+        ("line text", lambda: cdf.piecewise_linear([0, 1], ["a", 2]), TypeError, "y", "text"),
+        ("line ragged", lambda: cdf.piecewise_linear([0, [1]], [1, 2]), ValueError, "unequal length"),
+        ("line nan", lambda: cdf.piecewise_linear([0, NAN], [1, 2]), ValueError, "NaN at index 1"),
+        ("line None", lambda: cdf.piecewise_linear(None, [1, 2]), TypeError, "x", "None"),
+        ("line masked", lambda: cdf.piecewise_linear([0, 1], MASKED[:2]), ValueError, "mask"),
+        ("line falling", lambda: cdf.piecewise_linear([1, 0], [1, 2]), ValueError, "ascending", "Sort"),
+        ("play(0)", lambda: cdf.play(0), ValueError, "gap > 0", "tight joint"),
+        ("relay(inf)", lambda: cdf.relay(INF), ValueError, "finite", "inf"),
+        ("rate text", lambda: cdf.rate_limiter("1"), TypeError, "rate", "'1'"),
+        ("cubic None", lambda: cdf.cubic(None), TypeError, "coefficient"),
+        ("element called with text", lambda: cdf.saturation(1)("2"), TypeError, "real numbers", "'2'"),
+        ("element called with j", lambda: cdf.saturation(1)(1j), TypeError, "real numbers"),
+        ("effect_class(list)", lambda: cdf.effect_class(["mass"]), TypeError, "effect id", "coulomb"),
+        ("effect_class('x')", lambda: cdf.effect_class("x"), ValueError, "'x'", "register_effect"),
+        ("register_effect(5)", lambda: cdf.register_effect(5), TypeError, "ctrl_df.Effect", "5"),
+        ("two gaps", lambda: cdf.Mass(9, [cdf.Backlash(1)] * 2), ValueError, "one Backlash"),
+        ("python-control's names", lambda: cdf.relay_hysteresis_nonlinearity("a", 1), TypeError, "'a'"),
+    ]
+)  # fmt: skip
+def test_blocks(case):
+    refused(*case[1:])
+
+
+def test_every_effect_refuses_text_truth_and_nan():
+    for effect in cdf.effect_library().values():
+        fields = effect.__dataclass_fields__
+        first = next(name for name in fields if "parameter" in fields[name].metadata)
+        for value, error in (("1", TypeError), (True, TypeError), (NAN, ValueError), (None, TypeError)):
+            refused(lambda e=effect, v=value: e(v), error, effect.__name__, first)
+
+
+def test_a_class_that_is_no_effect_is_not_registered():
+    @dataclass(frozen=True)
+    class Rope:
+        level: float
+
+    refused(lambda: cdf.register_effect(Rope), TypeError, "derived from ctrl_df.Effect")
+
+
+def test_numbers_of_every_kind_are_taken():
+    for value in (9, 9.0, np.float32(9), np.int64(9), np.array(9.0), MASS.parameters["mass"]):
+        assert cdf.Mass(value).mass == 9.0
+    assert cdf.Mass(9, effects=cdf.Coulomb(5)).effects == (cdf.Coulomb(5),)
+    assert cdf.saturation_nonlinearity(-1).ub == 1.0  # python-control's own meaning
+
+
+# --- linearizations that mean nothing ----------------------------------------------------------------------
+
+
+def test_linearizing_friction_at_rest_warns_with_reason_and_remedy():
+    with pytest.warns(UserWarning, match="dry friction .coulomb, 5 N. jumps.*-5556.*Linearize at a speed"):
+        ct.linearize(DRIVE, [0, 0], [0])
+    with pytest.warns(UserWarning, match="a jump or a corner at u = 0"):
+        ct.linearize(cdf.relay(1), [], [0])
+    with pytest.warns(UserWarning, match="depends on its past"):
+        ct.linearize(cdf.play(1), [0], [0])
+    with pytest.warns(UserWarning, match="contact closed"):
+        ct.linearize(cdf.backlash_masses(1, 8, 0.1), np.zeros(4), [0])
+
+
+def test_linearizing_where_there_is_a_slope_does_not_warn():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ct.linearize(DRIVE, [0, 0.1], [0]).poles().real.min() == pytest.approx(-0.5 / 9, rel=1e-3)
+        assert ct.linearize(cdf.saturation(1), [], [0]).D[0, 0] == pytest.approx(1)
+        ct.linearize(cdf.friction_mass(9, 0, 0.5), [0, 0], [0])
+        ct.linearize(cdf.backlash_masses(1, 8, 0.1), [0, 0, 0.05, 0], [0])
