@@ -20,6 +20,7 @@ from ..blocks.effects import (
     Viscous,
 )
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
+from ..checks import is_number, shown
 from . import layout as L
 from .pointers import address, callback
 
@@ -122,8 +123,14 @@ def user_node(system, x0):
         wanted = nx if what == 1 else ny
         if len(values) != wanted:
             raise ValueError(f"{system.name} must return {wanted} values; got {len(values)}.")
+        good = True
         for i, v in enumerate(values):
+            if not is_number(v):
+                raise TypeError(f"{system.name} must return real numbers; got {shown(v)} at t = {t:g}.")
             target[i] = float(v)
+            good = good and v == v
+        if not good and np.isfinite(xs).all() and np.isfinite(us).all():
+            raise ValueError(f"{system.name} returned NaN at t = {t:g}, x = {xs}, u = {us}.")
 
     pointer, keep = callback(call, "system")
     feed = 1 if nx == 0 else int(_has_feedthrough(output, nx, nu, params))

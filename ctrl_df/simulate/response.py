@@ -9,7 +9,6 @@ import control as ct
 import numpy as np
 
 from ..status import Status
-from . import pointers
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
 
 
@@ -107,8 +106,6 @@ def event_response(
         max_steps=max_steps, log=4096 if keep_events else 1,
     )  # fmt: skip
     del keep
-    if run.status is Status.USER_ERROR:
-        raise RuntimeError(f"{Status.USER_ERROR} ({pointers.raised[0]!r})") from pointers.raised[0]
     n = run.recorded
     if not np.all(np.isfinite(run.outputs[:n])):
         n = int(np.argmin(np.isfinite(run.outputs[:n]).all(axis=1)))
