@@ -31,7 +31,8 @@ def refused(call, error, *words):
     assert time.perf_counter() - began < 2.0, "an error that comes late"
     for word in words:
         assert word in text, f"{word!r} is not in {text!r}"
-    assert 20 < len(text) < 1000 and "\n" not in text and text.rstrip()[-1] in ".)", text
+    assert 20 < len(text) < 1000 and "\n" not in text, text
+    assert text[-1] in ".)" or text.startswith("unrecognized keyword"), text
     return text
 
 
@@ -156,3 +157,80 @@ def test_linearizing_where_there_is_a_slope_does_not_warn():
         assert ct.linearize(cdf.saturation(1), [], [0]).D[0, 0] == pytest.approx(1)
         ct.linearize(cdf.friction_mass(9, 0, 0.5), [0, 0], [0])
         ct.linearize(cdf.backlash_masses(1, 8, 0.1), [0, 0, 0.05, 0], [0])
+
+
+# --- simulation --------------------------------------------------------------------------------------------
+
+LOOP = cdf.closed_loop(PID, DRIVE)
+T = np.linspace(0, 1, 11)
+
+
+def run(**keywords):
+    return lambda: cdf.event_response(LOOP, **{"timepts": T, "inputs": 0, **keywords})
+
+
+@table(
+    [
+        ("rtol=0", run(rtol=0), ValueError, "rtol", "got rtol=0", "1e-09"),
+        ("rtol=-1", run(rtol=-1), ValueError, "rtol", "-1"),
+        ("rtol=nan", run(rtol=NAN), ValueError, "rtol", "nan"),
+        ("rtol=1", run(rtol=1.0), ValueError, "rtol", "1"),
+        ("rtol='1e-6'", run(rtol="1e-6"), TypeError, "rtol", "'1e-6'"),
+        ("rtol=None", run(rtol=None), TypeError, "rtol", "None"),
+        ("rtol of each state", run(rtol=[1e-6] * 3), TypeError, "one real number"),
+        ("atol=0", run(atol=0), ValueError, "atol > 0"),
+        ("atol=nan", run(atol=NAN), ValueError, "atol > 0"),
+        ("max_step=0", run(max_step=0), ValueError, "max_step > 0", "got max_step=0"),
+        ("max_step=nan", run(max_step=NAN), ValueError, "max_step > 0"),
+        ("max_step too short", run(max_step=1e-300), ValueError, "max_step >=", "1e-300", "Raise"),
+        ("max_step=True", run(max_step=True), TypeError, "max_step"),
+        ("max_steps=0", run(max_steps=0), ValueError, "max_steps", "integer >= 1"),
+        ("max_steps=nan", run(max_steps=NAN), ValueError, "max_steps", "nan"),
+        ("max_steps=1.5", run(max_steps=1.5), ValueError, "max_steps", "1.5"),
+        ("inputs=nan", run(inputs=NAN), ValueError, "inputs finite", "NaN"),
+        ("inputs with nan", run(inputs=np.where(T > 0.5, NAN, 0)), ValueError, "NaN at index 6"),
+        ("inputs=inf", run(inputs=INF), ValueError, "inputs finite", "infinity"),
+        ("inputs complex", run(inputs=1j * T), TypeError, "real numbers", "complex"),
+        ("inputs one complex", run(inputs=0j), TypeError, "real numbers", "complex"),
+        ("inputs text", run(inputs="0"), TypeError, "real numbers", "'0'"),
+        ("inputs None", run(inputs=None), TypeError, "None"),
+        ("inputs truth", run(inputs=T > 0.5), TypeError, "truth values"),
+        ("inputs too few", run(inputs=T[:-1]), ValueError, "(1, 11)", "(1, 10)"),
+        ("inputs too many", run(inputs=[T, T]), ValueError, "(1, 11)"),
+        ("inputs ragged", run(inputs=[[0, 1], [0]]), ValueError, "got shape (2,)", "Sample"),
+        ("inputs masked", run(inputs=np.ma.masked_greater(T, 0.5)), ValueError, "masked"),
+        ("input law of text", run(inputs=lambda t: "a"), TypeError, "inputs(t=0)", "'a'"),
+        ("input law of nan", run(inputs=lambda t: NAN), ValueError, "inputs(t=0)", "NaN"),
+        ("input law of two", run(inputs=lambda t: [0, 1]), ValueError, "return 1 numbers", "got 2"),
+        ("input law raises", run(inputs=lambda t: 1 / 0), RuntimeError, "ZeroDivisionError"),
+        ("input law of two arguments", run(inputs=lambda t, x: 0), RuntimeError, "input at t = 0"),
+        ("state nan", run(initial_state=[0, NAN, 0]), ValueError, "initial_state finite", "index 1"),
+        ("state text", run(initial_state="0"), TypeError, "initial_state"),
+        ("state None", run(initial_state=None), TypeError, "initial_state"),
+        ("state complex", run(initial_state=1j), TypeError, "initial_state", "complex"),
+        ("state too short", run(initial_state=[0, 0]), ValueError, "3", "(2,)"),
+        ("state a matrix", run(initial_state=np.zeros((2, 2))), ValueError, "(2, 2)"),
+        ("hold", run(input_hold="cubic"), ValueError, "'linear' or 'zoh'", "'cubic'"),
+        ("hold None", run(input_hold=None), TypeError, "'linear' or 'zoh'", "None"),
+        ("times falling", run(timepts=T[::-1]), ValueError, "ascending", "Sort"),
+        ("times repeated", run(timepts=[0, 1, 1]), ValueError, "ascending"),
+        ("times one", run(timepts=10), ValueError, "at least two", "linspace"),
+        ("times nan", run(timepts=[0, NAN]), ValueError, "timepts finite"),
+        ("times text", run(timepts="10"), TypeError, "timepts"),
+        ("times complex", run(timepts=T + 0j), TypeError, "timepts", "complex"),
+        ("times a table", run(timepts=np.ones((2, 2))), ValueError, "ascending"),
+        ("params", lambda: cdf.event_response(DRIVE, T, 0, params=[1]), TypeError, "params", "mapping"),
+        ("params text", lambda: cdf.event_response(DRIVE, T, 0, params={"mass": "9"}), TypeError, "'9'"),
+        ("keyword", run(rtoll=1), TypeError, "unrecognized keyword", "rtoll"),
+        ("system", lambda: cdf.event_response(5, T), TypeError, "block", "int"),
+        ("FRD", lambda: cdf.event_response(ct.frd([1], [1]), T), TypeError, "fitted transfer function"),
+    ]
+)  # fmt: skip
+def test_event_response(case):
+    refused(*case[1:])
+
+
+def test_constants_for_each_input_are_taken():
+    two = ct.ss([[-1]], [[1, 1]], [[1]], [[0, 0]])
+    assert cdf.event_response(two, T, [1, 2]).states[0, -1] == pytest.approx(3 * (1 - np.exp(-1)))
+    assert cdf.event_response(two, T, [T, 2]).inputs.shape == (2, 11)

@@ -11,6 +11,7 @@ import numpy as np
 from ..blocks.element import Element
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter
+from ..checks import is_number, number, shown
 from .sampled import Sampled
 
 
@@ -57,9 +58,13 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     """
     block = _as_block(block)
     controller = _as_lti(pid)
+    dt = 0.0 if dt is None else number(
+        "closed_loop", "dt", dt, "s", lower=0.0, meaning="sample time of the controller",
+        remedy="Use dt=0 for a continuous controller.",
+    )  # fmt: skip
     if controller.isdtime(strict=True):
         own = float(controller.dt)
-        if dt not in (0, None) and not np.isclose(own, dt):
+        if dt != 0 and not np.isclose(own, dt):
             raise ValueError(
                 f"closed_loop got dt={dt} for a controller with dt={own}; leave dt out, or make them equal."
             )
@@ -149,7 +154,7 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
         if callable(block):
             static: Any = block
             return ct.NonlinearIOSystem(
-                None, lambda t, x, u, params: np.array([float(static(u[0]))]),
+                None, lambda t, x, u, params: np.array([_one_number(static(u[0]), u[0])]),
                 inputs=["u"], outputs=["y"], name="nonlinearity",
             )  # fmt: skip
         raise TypeError(
@@ -160,27 +165,49 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
     return block
 
 
+def _one_number(y, u) -> float:
+    value = np.squeeze(y) if isinstance(y, np.ndarray) else y
+    if not is_number(value):
+        raise TypeError(f"a static law must return one real number; got {shown(y)} at u = {u:g}.")
+    return float(value)
+
+
 def _as_lti(pid) -> Any:
     if isinstance(pid, ct.FrequencyResponseData):
         raise ValueError(
             "closed_loop cannot run measured frequency points (FRD) in time; fit a transfer function first."
         )
-    if isinstance(pid, int | float):
-        pid = ct.tf([float(pid)], [1.0])
+    if is_number(pid):
+        pid = ct.tf([number("closed_loop", "pid", pid)], [1.0])
     if not isinstance(pid, ct.TransferFunction | ct.StateSpace):
         raise TypeError(
             f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}."
         )
     if not pid.issiso():
         raise ValueError(
-            f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs."
+            f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs. "
+            "Select one channel, pid[i, j]."
         )
+    parts = (pid.num[0][0], pid.den[0][0]) if isinstance(pid, ct.TransferFunction) else _matrices(pid)
+    for part in parts:
+        if not np.isfinite(part).all() or np.iscomplexobj(part):
+            raise ValueError(
+                f"closed_loop needs a controller with real, finite coefficients; got {shown(part)}. Correct it."
+            )
     return pid
 
 
+def _matrices(system):
+    return system.A, system.B, system.C, system.D
+
+
 def _label(block, output) -> str:
-    if isinstance(output, str):
-        if output not in block.output_labels:
-            raise ValueError(f"output must be one of {', '.join(block.output_labels)}; got {output!r}.")
+    labels = list(block.output_labels)
+    if isinstance(output, str) and output in labels:
         return output
-    return block.output_labels[output]
+    if isinstance(output, int | np.integer) and not isinstance(output, bool) and 0 <= output < len(labels):
+        return labels[int(output)]
+    raise (ValueError if isinstance(output, str | int | np.integer) else TypeError)(
+        f"closed_loop needs output out of {', '.join(labels)}, or a number from 0 to {len(labels) - 1}; got "
+        f"{shown(output)}."
+    )
