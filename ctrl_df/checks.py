@@ -7,7 +7,9 @@ where the value is. ``owner`` begins the sentence: the function or block that as
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -161,6 +163,55 @@ def unknown_keywords(keywords) -> None:
     """Refuse keywords that a function does not know."""
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+
+
+def returned(value) -> bool:
+    """Whether what a user's law returned can stand as one number; a comparison (True or False) can."""
+    return is_number(value) or isinstance(value, bool | np.bool_)
+
+
+def executor(owner: str, value) -> Any:
+    """Return what runs work elsewhere: None, or an object with ``submit``."""
+    if value is not None and not callable(getattr(value, "submit", None)):
+        raise TypeError(
+            f"{owner} needs executor as a concurrent.futures.Executor (anything with submit), or None; got "
+            f"{shown(value)}."
+        )
+    return value
+
+
+def path_of(owner: str, name: str, value) -> Path:
+    """Return a path given as text or path; numbers, open files and the like are refused."""
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(
+            f"{owner} needs {name} as the path of a file (text or pathlib.Path); got {shown(value)}."
+        )
+    if not os.fspath(value) or "\0" in str(value):
+        raise ValueError(f"{owner} needs {name} as the path of a file; got {shown(value)}. Give it a name.")
+    return Path(value)
+
+
+def place_to_write(owner: str, name: str, value) -> Path:
+    """Return the path of a file to be written, after trying its place; nothing of a file there is changed."""
+    path = path_of(owner, name, value)
+    if path.is_dir():
+        raise IsADirectoryError(f"{owner} needs {name} as a file; {path} is a directory. Add a file name.")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(
+            f"{owner} needs {name} in an existing directory; got {path.parent}. Create it first."
+        )
+    new = not path.exists()
+    try:
+        with open(path, "ab"):
+            pass
+        if new:
+            path.unlink()
+    except OSError as error:
+        raise type(error)(
+            f"{owner} needs {name} in a place that can be written; {path}: {error.strerror or error}. "
+            "Give another path."
+        ) from None
+    return path
 
 
 def _rule(name, lower, upper, strict, infinite):

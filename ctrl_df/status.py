@@ -32,6 +32,10 @@ class Status(Enum):
     NOT_CONVERGED = (
         "no periodic orbit was reached within the iterations allowed; start nearer or raise max_iterations"
     )
+    NO_ORBIT = (
+        "no periodic orbit was found: from the starts tried the loop comes to rest or runs away; simulate it "
+        "(event_response) to see which, or give guess=(amplitude, omega) near an orbit"
+    )
     NO_PERIOD = (
         "the motion from this start settles to no period; averages over many periods are given instead"
     )

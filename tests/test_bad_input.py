@@ -234,3 +234,142 @@ def test_constants_for_each_input_are_taken():
     two = ct.ss([[-1]], [[1, 1]], [[1]], [[0, 0]])
     assert cdf.event_response(two, T, [1, 2]).states[0, -1] == pytest.approx(3 * (1 - np.exp(-1)))
     assert cdf.event_response(two, T, [T, 2]).inputs.shape == (2, 11)
+
+
+@table(
+    [
+        ("output=9", lambda: cdf.closed_loop(PID, DRIVE, output=9), ValueError, "x, v", "0 to 1", "9"),
+        ("output=-1", lambda: cdf.closed_loop(PID, DRIVE, output=-1), ValueError, "x, v", "-1"),
+        ("output=True", lambda: cdf.closed_loop(PID, DRIVE, output=True), TypeError, "x, v", "True"),
+        ("output='z'", lambda: cdf.closed_loop(PID, DRIVE, output="z"), ValueError, "x, v", "'z'"),
+        ("dt text", lambda: cdf.closed_loop(PID, DRIVE, "1e-3"), TypeError, "dt", "'1e-3'"),
+        ("dt < 0", lambda: cdf.closed_loop(PID, DRIVE, -1e-3), ValueError, "dt >= 0", "dt=0"),
+        ("dt nan", lambda: cdf.closed_loop(PID, DRIVE, NAN), ValueError, "dt >= 0", "nan"),
+        ("controller text", lambda: cdf.closed_loop("PID", DRIVE), TypeError, "TransferFunction"),
+        ("controller nan", lambda: cdf.closed_loop(NAN, DRIVE), ValueError, "nan"),
+        ("controller True", lambda: cdf.closed_loop(True, DRIVE), TypeError, "TransferFunction"),
+        ("coefficients", lambda: cdf.closed_loop(ct.tf([INF], [1, 1]), DRIVE), ValueError, "finite"),
+        ("MIMO controller", lambda: cdf.closed_loop(ct.ss([], [], [], np.eye(2)), DRIVE), ValueError, "SISO"),
+        ("block", lambda: cdf.closed_loop(PID, 5), TypeError, "block", "5"),
+        ("sampled(5)", lambda: cdf.sampled(5), TypeError, "discrete-time", "ct.c2d"),
+        ("sampled(continuous)", lambda: cdf.sampled(ct.tf([1], [1, 1])), ValueError, "discrete-time"),
+    ]
+)  # fmt: skip
+def test_closed_loop(case):
+    refused(*case[1:])
+
+
+# --- describing functions ----------------------------------------------------------------------------------
+
+H = ct.tf([8], [1, 2, 2, 1])
+N, FAMILY, RESPONSE = (
+    cdf.describing_function,
+    cdf.describing_function_family,
+    cdf.describing_function_response,
+)
+SQUARE = ct.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
+
+
+def family(**keywords):
+    return lambda: FAMILY(DRIVE, [9.0], [2.0], **keywords)
+
+
+@table(
+    [
+        ("A nan", lambda: N(DRIVE, NAN, 1.0), ValueError, "A finite", "NaN", "peak value"),
+        ("A text", lambda: N(DRIVE, "9", 1.0), TypeError, "A as real numbers", "'9'"),
+        ("A None", lambda: N(DRIVE, None, 1.0), TypeError, "A as real numbers", "None"),
+        ("A True", lambda: N(DRIVE, True, 1.0), TypeError, "A as real numbers", "truth"),
+        ("A masked", lambda: N(DRIVE, MASKED, 1.0), ValueError, "masked"),
+        ("A < 0", lambda: N(DRIVE, [1, -2], 1.0), ValueError, "A < 0", "-2"),
+        ("omega complex", lambda: N(DRIVE, 9.0, 1j), TypeError, "omega as real numbers", "complex"),
+        ("omega 0", lambda: N(DRIVE, 9.0, 0), ValueError, "omega > 0", "got omega=0"),
+        ("omega inf", lambda: N(DRIVE, 9.0, INF), ValueError, "omega finite"),
+        ("two by two", lambda: N(SQUARE, 1.0, 1.0), ValueError, "one input and one output", "F[i, j]"),
+        ("family two by two", lambda: FAMILY(SQUARE, [1.0], [1.0]), ValueError, "one input and one output"),
+        ("FRD", lambda: N(ct.frd([1], [1]), 1.0, 1.0), TypeError, "measured points"),
+        ("law of text", lambda: N(lambda u: "a", 1.0), RuntimeError, "user-written", "real numbers", "'a'"),
+        ("law of j", lambda: N(lambda u: 1j * u, 1.0), RuntimeError, "user-written", "real numbers"),
+        ("law of None", lambda: N(lambda u: None, 1.0), RuntimeError, "user-written", "None"),
+        ("law of two arguments", lambda: N(lambda u, v: u, 1.0), RuntimeError, "user-written"),
+        ("no law", lambda: N("saturation", 1.0), TypeError, "block or a callable"),
+        ("num_points", lambda: N(DRIVE, 9.0, 1.0, num_points="a"), TypeError, "num_points", "'a'"),
+        ("num_points=0", lambda: N(DRIVE, 9.0, 1.0, num_points=0), ValueError, "num_points", "0"),
+        ("keyword", lambda: N(DRIVE, 9.0, 1.0, wrong=1), TypeError, "unrecognized keyword", "wrong"),
+        ("save=3", family(save=3), TypeError, "save", "path", "got 3"),
+        ("save=''", family(save=""), ValueError, "save", "path"),
+        ("executor=3", family(executor=3), TypeError, "executor", "submit", "got 3"),
+        ("executor class", family(executor="threads"), TypeError, "executor", "'threads'"),
+        ("progress", family(progress="yes"), TypeError, "progress", "True or False"),
+        ("orders=nan", family(orders=NAN), ValueError, "orders", "nan"),
+        ("orders=True", family(orders=True), TypeError, "orders", "True"),
+        ("orders=2.5", family(orders=2.5), ValueError, "orders", "2.5"),
+        ("family of A = 0", lambda: FAMILY(DRIVE, [0.0], [1.0]), ValueError, "A > 0"),
+        ("family of nothing", lambda: FAMILY(DRIVE, [], [1.0]), ValueError, "at least one value"),
+        ("response omega=[0, 0]", lambda: RESPONSE(H, DRIVE, [9, 10], [0, 0]), ValueError, "omega", "[0, 0]"),
+        ("response omega text", lambda: RESPONSE(H, DRIVE, [9, 10], "all"), TypeError, "omega as real numbers"),
+        ("response omega nan", lambda: RESPONSE(H, DRIVE, [9, 10], [NAN, 1]), ValueError, "omega finite"),
+        ("response omega < 0", lambda: RESPONSE(H, DRIVE, [9, 10], [-1, 1]), ValueError, "positive", "-1"),
+        ("response A text", lambda: RESPONSE(H, DRIVE, "9", [1, 2]), TypeError, "A as real numbers"),
+        ("response H", lambda: RESPONSE("H", DRIVE, [9, 10], [1, 2]), TypeError, "H must be a linear system"),
+        ("response save", lambda: RESPONSE(H, DRIVE, [9, 10], [1, 2], save=3), TypeError, "save", "path"),
+    ]
+)  # fmt: skip
+def test_describing_functions(case):
+    refused(*case[1:])
+
+
+def test_a_law_may_return_a_comparison():
+    assert N(lambda u: u > 0, 1.0).real == pytest.approx(2 / np.pi)
+
+
+# --- exact orbits ------------------------------------------------------------------------------------------
+
+
+def find(**keywords):
+    return lambda: cdf.find_limit_cycle(LOOP, **keywords)
+
+
+CHECKED = RESPONSE(H, cdf.saturation(1), [2.0, 4.0])
+
+
+@table(
+    [
+        ("max_iterations=-3", find(max_iterations=-3), ValueError, "max_iterations", "integer >= 1", "-3"),
+        ("max_iterations=2.5", find(max_iterations=2.5), ValueError, "max_iterations", "2.5"),
+        ("max_iterations='9'", find(max_iterations="9"), TypeError, "max_iterations", "'9'"),
+        ("search_time=-1", find(search_time=-1), ValueError, "search_time > 0", "-1", "Leave it out"),
+        ("search_time=nan", find(search_time=NAN), ValueError, "search_time > 0", "nan"),
+        ("search_time text", find(search_time="1"), TypeError, "search_time", "'1'"),
+        ("guess nan", find(guess=[NAN, 0, 0]), ValueError, "guess finite", "NaN at index 0"),
+        ("guess array nan", find(guess=np.array([NAN, 0, 0])), ValueError, "guess finite"),
+        ("guess pair nan", find(guess=(NAN, 1)), ValueError, "guess finite"),
+        ("guess pair < 0", find(guess=(5, -1)), ValueError, "omega > 0", "-1"),
+        ("guess text", find(guess="10 at 13"), TypeError, "guess", "'10 at 13'"),
+        ("guess number", find(guess=10.0), TypeError, "guess", "10.0", "(3,)"),
+        ("guess of four", find(guess=[1, 2, 3, 4]), TypeError, "guess", "(3,)"),
+        ("guess complex", find(guess=[1, 1j]), TypeError, "guess", "complex"),
+        ("raise_on_failure", find(raise_on_failure="yes"), TypeError, "True or False", "'yes'"),
+        ("loop", lambda: cdf.find_limit_cycle(5), TypeError, "loop", "int"),
+        ("keyword", find(max_iteration=3), TypeError, "unrecognized keyword"),
+        ("verify search_time", lambda: cdf.verify(CHECKED, search_time=0), ValueError, "search_time > 0"),
+        ("verify search", lambda: cdf.verify(CHECKED, search="all"), TypeError, "True or False"),
+        ("verify loop", lambda: cdf.verify(CHECKED, loop=5), TypeError, "loop", "int"),
+        ("verify keyword", lambda: cdf.verify(CHECKED, serach=1), TypeError, "unrecognized keyword"),
+    ]
+)  # fmt: skip
+def test_searches(case):
+    refused(*case[1:])
+
+
+def test_a_loop_that_comes_to_rest_is_not_told_to_raise_iterations():
+    loop = cdf.closed_loop(cdf.pid(200, 0, 30), DRIVE)
+    with pytest.raises(RuntimeError, match="no periodic orbit was found.*comes to rest") as caught:
+        cdf.find_limit_cycle(loop, raise_on_failure=True)
+    assert "max_iterations" not in str(caught.value)
+
+
+def test_a_state_may_be_given_as_a_list():
+    orbit = cdf.find_limit_cycle(LOOP, guess=[0.0, 0.02, 0.0])
+    other = cdf.find_limit_cycle(LOOP, guess=np.array([0.0, 0.02, 0.0]))
+    assert bool(orbit) == bool(other)

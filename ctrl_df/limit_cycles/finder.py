@@ -7,11 +7,13 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import unknown_keywords
 from ..df.describing import describing_function
 from ..simulate.engine import Engine, Event
 from ..simulate.layout import AUX, KIND, MECHANISM, MODE
 from ..simulate.loop import answers_at_once
 from ..status import Status
+from .arguments import check_search, checked_guess
 from .forced_start import harmonic_start
 from .monodromy import RTOL, Tracer
 from .orbit import Orbit
@@ -53,8 +55,12 @@ def find_limit_cycle(
         A pure delay stands in the loop: its state is a whole history, no vector that Newton could move. Its
         motion is found by simulation: `event_response`, or `verify`, whose rows tell what it settles to.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    check_search(
+        "find_limit_cycle", max_iterations=max_iterations, search_time=search_time,
+        raise_on_failure=raise_on_failure,
+    )  # fmt: skip
+    guess = checked_guess(loop, guess)
     finder = OrbitFinder(loop, max_iterations)
     if finder.engine.delayed:
         raise ValueError(
@@ -68,7 +74,7 @@ def find_limit_cycle(
     else:
         orbit = finder.from_guess(guess)
     if raise_on_failure and (orbit is None or not orbit.status.ok):
-        error = RuntimeError(str(orbit.status if orbit else Status.NOT_CONVERGED))
+        error = RuntimeError(str(orbit.status if orbit else Status.NO_ORBIT))
         error.orbit = orbit  # type: ignore[attr-defined]
         raise error
     return orbit

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import unknown_keywords
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
+from .arguments import check_search
 from .finder import OrbitFinder
 from .grade import LimitCycle
 from .orbit import Orbit
@@ -177,8 +179,8 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why`` tells how.
         An unstable cycle cannot be seen that way and stays ``not tested``.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    check_search("verify", search_time=search_time, search=search)
     if not hasattr(resp, "limit_cycles"):
         raise TypeError(
             f"verify needs the answer of describing_function_response; got {type(resp).__name__}. "

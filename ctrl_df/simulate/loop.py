@@ -11,7 +11,7 @@ import numpy as np
 from ..blocks.element import Element
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter
-from ..checks import is_number, number, shown
+from ..checks import is_number, number, returned, shown
 from .sampled import Sampled
 
 
@@ -167,7 +167,7 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
 
 def _one_number(y, u) -> float:
     value = np.squeeze(y) if isinstance(y, np.ndarray) else y
-    if not is_number(value):
+    if not returned(value):
         raise TypeError(f"a static law must return one real number; got {shown(y)} at u = {u:g}.")
     return float(value)
 
@@ -192,7 +192,8 @@ def _as_lti(pid) -> Any:
     for part in parts:
         if not np.isfinite(part).all() or np.iscomplexobj(part):
             raise ValueError(
-                f"closed_loop needs a controller with real, finite coefficients; got {shown(part)}. Correct it."
+                f"closed_loop needs a controller with real, finite coefficients; got {shown(part)}. "
+                "Correct the model."
             )
     return pid
 
@@ -207,7 +208,8 @@ def _label(block, output) -> str:
         return output
     if isinstance(output, int | np.integer) and not isinstance(output, bool) and 0 <= output < len(labels):
         return labels[int(output)]
-    raise (ValueError if isinstance(output, str | int | np.integer) else TypeError)(
+    named = isinstance(output, str) or (is_number(output) and not isinstance(output, float))
+    raise (ValueError if named else TypeError)(
         f"closed_loop needs output out of {', '.join(labels)}, or a number from 0 to {len(labels) - 1}; got "
         f"{shown(output)}."
     )

@@ -20,7 +20,7 @@ from ..blocks.effects import (
     Viscous,
 )
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
-from ..checks import is_number, shown
+from ..checks import returned, shown
 from . import layout as L
 from .pointers import address, callback
 
@@ -125,7 +125,7 @@ def user_node(system, x0):
             raise ValueError(f"{system.name} must return {wanted} values; got {len(values)}.")
         good = True
         for i, v in enumerate(values):
-            if not is_number(v):
+            if not returned(v):
                 raise TypeError(f"{system.name} must return real numbers; got {shown(v)} at t = {t:g}.")
             target[i] = float(v)
             good = good and v == v
