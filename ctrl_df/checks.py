@@ -129,10 +129,10 @@ def real_array(owner: str, name: str, values, unit: str = "", *, remedy: str = "
     return array
 
 
-def mapping(owner: str, name: str, value) -> Mapping:
+def mapping(owner: str, name: str, value, example: str = "{'mass': 9.0}") -> Mapping:
     """Return a mapping of names to values."""
     if not isinstance(value, Mapping):
-        raise TypeError(f"{owner} needs {name} as a mapping, such as {{'mass': 9.0}}; got {shown(value)}.")
+        raise TypeError(f"{owner} needs {name} as a mapping, such as {example}; got {shown(value)}.")
     return value
 
 
