@@ -639,3 +639,106 @@ def test_frequency_tables_name_the_line(tmp_path):
     refused(lambda: TABLE.from_csv(path, real="re", imag="im"), ValueError, "line 3", "'x'")
     path.write_text("A,omega,re,im\n1,2,3,4\n1,2,3,4\n")
     refused(lambda: TABLE.from_csv(path, real="re", imag="im"), ValueError, "twice", "Average")
+
+
+# --- judging -----------------------------------------------------------------------------------------------
+
+DATA = [RECORD]
+ONE = cdf.friction_mass(1, 5, 0.5)
+
+
+def compare(**keywords):
+    return lambda: cdf.compare(**{"model": ONE, "data": RECORD, **keywords})
+
+
+def refit(**keywords):
+    return lambda: cdf.refit(**{"model": ONE, "data": RECORD, **keywords})
+
+
+def diagnose(**keywords):
+    return lambda: cdf.diagnose(**{"model": ONE, "data": RECORD, **keywords})
+
+
+def improve(**keywords):
+    return lambda: cdf.improve(**{"model": ONE, "train": RECORD, **keywords})
+
+
+POINTS = TABLE([1.0, 2.0], [1.0, 2.0], np.ones((2, 2)))
+
+
+@table(
+    [
+        ("compare window", compare(window=1e-9), ValueError, "window needs a length", "20 samples", "1e-09"),
+        ("compare window text", compare(window="1"), TypeError, "window", "'1'"),
+        ("compare window nan", compare(window=NAN), ValueError, "window", "nan"),
+        ("compare mode", compare(mode="whole"), ValueError, "mode", "'whole'", "'windows'"),
+        ("compare mode None", compare(mode=None), TypeError, "mode", "None"),
+        ("compare data", compare(data=3), TypeError, "Measurement", "int"),
+        ("compare no data", compare(data=[]), TypeError, "empty sequence"),
+        ("compare text", compare(data="run.csv"), TypeError, "Measurement", "str"),
+        ("compare both kinds", compare(data=[RECORD, POINTS]), TypeError, "two calls"),
+        ("compare model", compare(model=3), TypeError, "block or a loop", "int"),
+        ("compare law", compare(model=PID), TypeError, "block or a loop"),
+        ("compare keyword", compare(windows=1), TypeError, "unrecognized keyword"),
+        ("refit free=3", refit(free=3), TypeError, "free", "sequence of names", "got 3"),
+        ("refit free of numbers", refit(free=["coulomb", 3]), TypeError, "free", "got 3"),
+        ("refit free unknown", refit(free=["coulom"]), ValueError, "free", "coulomb.level", "'coulom'"),
+        ("refit start", refit(start=[1]), TypeError, "start as a mapping"),
+        ("refit start unknown", refit(start={"coulom": 1}), ValueError, "coulomb.level"),
+        ("refit start text", refit(start={"mass": "1"}), TypeError, "mass", "'1'"),
+        ("refit start nan", refit(start={"mass": NAN}), ValueError, "mass > 0", "nan"),
+        ("refit budget=0", refit(budget=0), ValueError, "budget", "integer >= 1"),
+        ("refit budget text", refit(budget="all"), TypeError, "budget", "'all'"),
+        ("refit robust", refit(robust="yes"), TypeError, "robust", "True or False"),
+        ("refit window", refit(window=1e-9), ValueError, "window needs a length", "1e-09"),
+        ("refit mode", refit(mode="x"), ValueError, "mode", "'x'"),
+        ("refit model", refit(model=cdf.Mass), TypeError, "type"),
+        ("refit of points, free=3", refit(data=POINTS, free=3), TypeError, "free", "got 3"),
+        ("diagnose free=3", diagnose(free=3), TypeError, "free", "got 3"),
+        ("diagnose free unknown", diagnose(free=["coulom"]), ValueError, "free", "'coulom'"),
+        ("diagnose candidates", diagnose(candidates="coulom"), ValueError, "effect id", "'coulom'"),
+        ("diagnose candidates=3", diagnose(candidates=3), TypeError, "effect id", "got 3"),
+        ("diagnose no candidates", diagnose(candidates=[]), ValueError, "one effect id at least"),
+        ("diagnose limits", diagnose(limits=40), TypeError, "limits as a mapping", "stroke"),
+        ("diagnose limits key", diagnose(limits={"forse": 1}), ValueError, "force, stroke", "'forse'"),
+        ("diagnose limits < 0", diagnose(limits={"force": -1}), ValueError, "force", "-1"),
+        ("diagnose executor", diagnose(executor=4), TypeError, "executor", "submit", "got 4"),
+        ("diagnose holdout", diagnose(holdout=3), TypeError, "holdout", "int"),
+        ("diagnose the same twice", diagnose(holdout=RECORD), ValueError, "not fitted", "Leave holdout out"),
+        ("diagnose model", diagnose(model=cdf.saturation(1)), TypeError, "inertia", "ctrl_df.Mass"),
+        ("diagnose points held out", diagnose(data=POINTS, holdout=3), TypeError, "holdout", "int"),
+        ("improve max_effects=nan", improve(max_effects=NAN), ValueError, "max_effects", "nan"),
+        ("improve max_effects=-1", improve(max_effects=-1), ValueError, "max_effects", "-1"),
+        ("improve max_effects='5'", improve(max_effects="5"), TypeError, "max_effects", "'5'"),
+        ("improve max_effects=True", improve(max_effects=True), TypeError, "max_effects", "True"),
+        ("improve free", improve(free="coulom"), ValueError, "free", "'coulom'"),
+        ("improve executor", improve(executor="x"), TypeError, "executor", "'x'"),
+        ("improve candidates", improve(candidates=[None]), TypeError, "effect id", "None"),
+        ("improve of points", improve(train=POINTS, max_effects=NAN), ValueError, "max_effects"),
+        ("improve keyword", improve(max_effect=1), TypeError, "unrecognized keyword"),
+    ]
+)  # fmt: skip
+def test_judging(case):
+    refused(*case[1:])
+
+
+def test_diagnose_takes_the_names_that_refit_takes():
+    from ctrl_df.identify.diagnose import free_names
+    from ctrl_df.identify.refit import free_parameters
+
+    assert free_names is free_parameters
+    assert free_names(ONE, ["coulomb"]) == ("coulomb.level",) == free_names(ONE, "coulomb")
+    assert free_names(ONE, ["mass", "coulomb.level", "coulomb"]) == ("mass", "coulomb.level")
+
+
+def test_the_place_of_a_report_is_tried_before_it_is_drawn(tmp_path):
+    from ctrl_df.identify.report import write_report
+
+    refused(lambda: write_report(None, tmp_path / "no" / "r.html"), FileNotFoundError, "existing directory")
+    refused(lambda: write_report(None, tmp_path), IsADirectoryError, "directory", "file name")
+    refused(lambda: write_report(None, 5), TypeError, "path", "5")
+    kept = tmp_path / "kept.html"
+    kept.write_text("old")
+    with pytest.raises(AttributeError):
+        write_report(None, kept)
+    assert kept.read_text() == "old" and list(tmp_path.iterdir()) == [kept]
