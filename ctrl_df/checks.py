@@ -180,6 +180,14 @@ def executor(owner: str, value) -> Any:
     return value
 
 
+def system_name(owner: str, value) -> None:
+    """Check the name of a system: text without a point, which python-control keeps for signals."""
+    if value is not None and (not isinstance(value, str) or not value or "." in value):
+        raise (ValueError if isinstance(value, str) else TypeError)(
+            f"{owner} needs name as text without a point; got {shown(value)}. Leave it out for a default."
+        )
+
+
 def path_of(owner: str, name: str, value) -> Path:
     """Return a path given as text or path; numbers, open files and the like are refused."""
     if not isinstance(value, str | os.PathLike):
@@ -194,13 +202,13 @@ def path_of(owner: str, name: str, value) -> Path:
 def place_to_write(owner: str, name: str, value) -> Path:
     """Return the path of a file to be written, after trying its place; nothing of a file there is changed."""
     path = path_of(owner, name, value)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise IsADirectoryError(f"{owner} needs {name} as a file; {path} is a directory. Add a file name.")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise FileNotFoundError(
             f"{owner} needs {name} in an existing directory; got {path.parent}. Create it first."
         )
-    new = not path.exists()
+    new = not os.path.exists(path)
     try:
         with open(path, "ab"):
             pass

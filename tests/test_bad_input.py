@@ -4,6 +4,7 @@ Every case is a call, the type of its error, and words that the message must hol
 it takes less than two seconds, is one readable sentence or two, and comes from no inner part by accident.
 """
 
+import os
 import time
 import warnings
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.cli import main
+from ctrl_df.model_file import EXAMPLE, read_model
 
 NAN, INF = float("nan"), float("inf")
 MASKED = np.ma.masked_equal([0.0, 1.0, 2.0], 1.0)
@@ -106,6 +109,10 @@ PID = cdf.pid(2000, 44250, 130)
         ("effect_class('x')", lambda: cdf.effect_class("x"), ValueError, "'x'", "register_effect"),
         ("register_effect(5)", lambda: cdf.register_effect(5), TypeError, "ctrl_df.Effect", "5"),
         ("two gaps", lambda: cdf.Mass(9, [cdf.Backlash(1)] * 2), ValueError, "one Backlash"),
+        ("name=5", lambda: cdf.Mass(9, name=5), TypeError, "name as text", "5"),
+        ("name with a point", lambda: cdf.play(1, name="a.b"), ValueError, "without a point", "'a.b'"),
+        ("name of a controller", lambda: cdf.pid(1, name=5), TypeError, "name as text"),
+        ("name of a loop", lambda: cdf.closed_loop(PID, DRIVE, name="a.b"), ValueError, "without a point"),
         ("python-control's names", lambda: cdf.relay_hysteresis_nonlinearity("a", 1), TypeError, "'a'"),
     ]
 )  # fmt: skip
@@ -742,3 +749,130 @@ def test_the_place_of_a_report_is_tried_before_it_is_drawn(tmp_path):
     with pytest.raises(AttributeError):
         write_report(None, kept)
     assert kept.read_text() == "old" and list(tmp_path.iterdir()) == [kept]
+
+
+# --- MODEL.toml and the command line -----------------------------------------------------------------------
+
+
+def told(capsys, *arguments):
+    """Return the one line that the command line says of bad input."""
+    began = time.perf_counter()
+    assert main(list(map(str, arguments))) == 2
+    captured = capsys.readouterr()
+    assert time.perf_counter() - began < 2.0, "an error that comes late"
+    assert captured.out == "" and captured.err.count("\n") == 1, captured
+    assert captured.err.startswith("ctrl-df: error: ") and len(captured.err) < 1000
+    return captured.err
+
+
+@table(
+    [
+        ("kind list", 'kind = "mass"', 'kind = ["mass"]', "kind must be one of", "['mass']"),
+        ("kind number", 'kind = "mass"', "kind = 5", "kind must be one of", "5"),
+        ("mass true", "mass = 9.0 ", "mass = true ", "mass as one real number [kg]", "True"),
+        ("mass text", "mass = 9.0 ", 'mass = "9" ', "mass as one real number", "'9'"),
+        ("mass date", "mass = 9.0 ", "mass = 2026-01-31 ", "mass as one real number", "date"),
+        ("mass table", "mass = 9.0 ", "mass = {a = 1} ", "mass as one real number"),
+        ("mass nan", "mass = 9.0 ", "mass = nan ", "mass > 0", "nan"),
+        ("name number", "mass = 9.0 ", "mass = 9.0\nname = 5 ", "name as text", "5"),
+        ("measured list", "mass = 9.0 ", "mass = 9.0\nmeasured = [1] ", "'load' or 'motor'"),
+        ("level true", "level = 5.0", "level = true", "level as one real number", "True"),
+        ("level list", "level = 5.0", "level = [5.0]", "level as one real number"),
+        ("level missing", "level = 5.0", "", "coulomb needs level [N]", "add it"),
+        ("effect no table", "[effects.coulomb] ", "[effects]\ncoulomb = 5\n[box2] ", "box2"),
+        ("effects a number", "[effects.coulomb] ", "[x] ", "knows the keys", "'x'"),
+        ("kp text", "kp = 2000.0", 'kp = "2000"', "kp as one real number", "'2000'"),
+        ("kp true", "kp = 2000.0", "kp = true", "kp as one real number", "True"),
+        ("kp nan", "kp = 2000.0", "kp = nan", "kp finite", "nan"),
+        ("dt < 0", "dt = 0.0", "dt = -1e-3", "dt >= 0", "-0.001"),
+        ("amplitude text", "[5.2, 100.0]", '["a", 100.0]', "amplitude as one real number", "'a'"),
+        ("amplitude number", "[5.2, 100.0]", "5.2", "pair [low, high]", "5.2"),
+        ("amplitude inf", "[5.2, 100.0]", "[5.2, inf]", "both finite", "inf"),
+        ("points", "[40, 60]", "[100000000, 100000000]", "1,000,000 in all", "[1000, 1000]", "1e+16"),
+        ("points long", "[40, 60]", "[2, 600000]", "1,000,000 in all"),
+        ("points true", "[40, 60]", "[true, 60]", "two integers >= 2", "True"),
+        ("points one", "[40, 60]", "[40]", "two integers >= 2", "[40]"),
+        ("points float", "[40, 60]", "[40.0, 60.0]", "two integers >= 2"),
+        ("closed_loop text", "closed_loop = false", 'closed_loop = "false"', "true or false", "'false'"),
+        ("time list", 'time = "t"', 'time = ["t"]', "time must be a column's name"),
+        ("time true", 'time = "t"', "time = true", "time must be a column's name", "True"),
+        ("unit number", 'output_unit = "mm"', "output_unit = 5", "output_unit must be text", "5"),
+        ("unit unknown", 'output_unit = "mm"', 'output_unit = "furlong"', "unit must be one of", "furlong"),
+        ("hold", "closed_loop = false", 'input_hold = "cubic"', "'zoh' or 'linear'", "'cubic'"),
+        ("channels", "closed_loop = false", 'channels = "i"', "a list of columns", "'i'"),
+        ("section a number", "[box] ", "[x]\n", "knows the keys"),
+        ("not closed", "[plant]", "[plant", "no TOML file", "--help"),
+        ("twice", "mass = 9.0 ", "mass = 9.0\nmass = 8.0 ", "no TOML file"),
+    ]
+)  # fmt: skip
+def test_model_files(tmp_path, capsys, case):
+    _, old, new, *words = case
+    assert old in EXAMPLE, old
+    path = tmp_path / "model.toml"
+    path.write_text(EXAMPLE.replace(old, new, 1))
+    text = told(capsys, "limit-cycles", path)
+    for word in ("model.toml", *words):
+        assert word in text, text
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "section [plant]"),
+        (b"plant = 5", "section [plant]"),
+        (b"effects = 5\n[plant]\nmass = 1.0", "effects must be tables"),
+        (b"[[effects]]\nlevel = 5.0\n[plant]\nmass = 1.0", "needs an id"),
+        (b"[[effects]]\nid = 5\n[plant]\nmass = 1.0", "effect id"),
+        (EXAMPLE.encode("utf-16"), "UTF-8"),
+        (EXAMPLE.replace("# kg", "# µ").encode("latin-1"), "UTF-8"),
+        (bytes(range(256)), "UTF-8"),
+        (b"a = " + b"[" * 5000, "no TOML file"),
+    ],
+)
+def test_model_files_that_are_none(tmp_path, capsys, content, words):
+    path = tmp_path / "model.toml"
+    path.write_bytes(content)
+    assert words in told(capsys, "limit-cycles", path)
+
+
+def test_a_model_file_with_a_byte_order_mark_is_read(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_bytes(EXAMPLE.encode("utf-8-sig"))
+    assert read_model(path).plant.mass == 9.0
+    refused(lambda: read_model(5), TypeError, "path", "5")
+
+
+def test_the_place_of_the_report_is_tried_first(tmp_path, capsys):
+    model, data = tmp_path / "model.toml", tmp_path / "run.csv"
+    model.write_text(EXAMPLE)
+    data.write_text("no table at all")  # never looked at
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    for place, words in (
+        (tmp_path / "no" / "r.html", "existing directory"),
+        (closed, "is a directory"),
+        (tmp_path / ("n" * 300), "place that can be written"),
+    ):
+        assert words in told(capsys, "improve", data, "--model", model, "--report", place)
+    closed.chmod(0o500)
+    if not os.access(closed, os.W_OK):  # root writes everywhere
+        place = closed / "r.html"
+        assert "can be written" in told(capsys, "improve", data, "--model", model, "--report", place)
+
+
+def test_bad_records_on_the_command_line(tmp_path, capsys):
+    model, data = tmp_path / "model.toml", tmp_path / "run.csv"
+    model.write_text(EXAMPLE)
+    for content, words in (
+        (b"", "empty"),
+        (bytes(range(256)), "binary"),
+        (b"PK\x03\x04", "workbook"),
+        (b"t,F,y\n0,1,2\n", "'x'"),
+        (b"t,F,x\n0,1,2\n1,2,word\n", "line 3"),
+        (lines(head="t,F,x").encode("utf-16")[:-1], "binary"),
+    ):
+        data.write_bytes(content)
+        assert words in told(capsys, "improve", data, "--model", model)
+    assert "directory" in told(capsys, "improve", tmp_path, "--model", model)
+    assert "none.csv" in told(capsys, "improve", tmp_path / "none.csv", "--model", model)
+    assert "directory" in told(capsys, "limit-cycles", tmp_path)

@@ -12,7 +12,7 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonlinearity
 
-from ..checks import known_name, mapping, shown
+from ..checks import known_name, mapping, shown, system_name
 from .linearization import warn_of_element
 from .parameter import Parameter
 
@@ -48,6 +48,7 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
     _static = True
 
     def __init__(self, kind, values, primitive, *, specs=None, name=None):
+        system_name(kind, name)
         self._kind: str = kind
         self._values = MappingProxyType(dict(values))
         self._specs: dict = specs or {}

@@ -10,7 +10,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import known_name, mapping, number, shown
+from ..checks import known_name, mapping, number, shown, system_name
 from . import compliant
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
@@ -32,6 +32,7 @@ class Mechanism(ct.NonlinearIOSystem):
 
     def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
         owner = type(self).__name__
+        system_name(owner, name)
         self._values = {
             k: checked(owner, k, v, {**_MASS, "meaning": k.replace("_", " ")}) for k, v in inertias.items()
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import control as ct
 
-from ..checks import number
+from ..checks import number, system_name
 
 
 def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
@@ -29,6 +29,7 @@ def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
     ----------
     Azenha & Machado (1997), eqs. (7)-(8).
     """
+    system_name("pid", name)
     kp, ki, kd = (
         number("pid", key, value, unit)
         for key, value, unit in (("kp", kp, "N/m"), ("ki", ki, "N/(m s)"), ("kd", kd, "N s/m"))

@@ -11,7 +11,7 @@ import numpy as np
 from ..blocks.element import Element
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter
-from ..checks import is_number, number, returned, shown
+from ..checks import is_number, number, returned, shown, system_name
 from .sampled import Sampled
 
 
@@ -56,6 +56,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
         MIMO controller, improper controller without a velocity to act on, sample times that differ, algebraic
         loop.
     """
+    system_name("closed_loop", name)
     block = _as_block(block)
     controller = _as_lti(pid)
     dt = 0.0 if dt is None else number(
