@@ -53,10 +53,7 @@ def number(
         kind = f"one real number [{unit}]" if unit else "one real number"
         tail = "Convert text with float()." if isinstance(value, str | bytes) else remedy
         raise TypeError(f"{owner} needs {name} as {kind}; got {shown(value)}. {tail}")
-    try:
-        given = float(value)
-    except OverflowError:  # an integer beyond the range of floats
-        given = math.inf if value > 0 else -math.inf
+    given = _as_float(value)
     enough = given > lower if strict else given >= lower
     finite = infinite or not math.isinf(given)
     if not (enough and given <= upper and finite):  # NaN fails every comparison
@@ -64,6 +61,13 @@ def number(
         rule = _rule(name, lower, upper, strict, infinite)
         raise ValueError(f"{owner} needs {rule}{described}; got {name}={shown(value)}. {remedy}")
     return given
+
+
+def _as_float(value) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer beyond the range of floats
+        return math.inf if value > 0 else -math.inf
 
 
 def positive(owner: str, name: str, value, unit: str = "", **keywords: Any) -> float:
@@ -77,7 +81,7 @@ def count(owner: str, name: str, value, least: int = 1, *, meaning: str = "", re
     tail = f" {remedy}" if remedy else ""
     if not is_number(value):
         raise TypeError(f"{owner} needs {rule}; got {shown(value)}.{tail}")
-    given = float(value)
+    given = _as_float(value)
     if not (math.isfinite(given) and given == int(given) and given >= least):
         raise ValueError(f"{owner} needs {rule}; got {name}={shown(value)}.{tail}")
     return int(value)
@@ -112,7 +116,8 @@ def real_array(owner: str, name: str, values, unit: str = "", *, remedy: str = "
         given = np.asarray(values)
     except ValueError:
         raise ValueError(f"{owner} needs {rule}; got rows of unequal length.{tail}") from None
-    if given.dtype.kind == "O":  # numbers of several kinds, or none at all
+    mixed = given.dtype.kind == "O"  # numbers of several kinds, or none at all
+    if mixed:
         if not all(is_number(v) for v in given.ravel()):
             raise TypeError(f"{owner} needs {rule}; got {shown(values)}.{tail}")
     elif given.dtype.kind not in "iuf":
@@ -120,7 +125,8 @@ def real_array(owner: str, name: str, values, unit: str = "", *, remedy: str = "
             given.dtype.kind, f"dtype {given.dtype}"
         )
         raise TypeError(f"{owner} needs {rule}; got {kind}: {shown(values)}.{tail}")
-    array = given.astype(float)
+    flat = [_as_float(v) for v in given.ravel()] if mixed else given
+    array = np.array(flat, dtype=float).reshape(given.shape)
     bad = ~np.isfinite(array)
     if bad.any():
         what = "NaN" if np.isnan(array[bad][0]) else "infinity"
