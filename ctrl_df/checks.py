@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,10 @@ def shown(value) -> str:
 
 def is_number(value) -> bool:
     """Whether a value is one real number: no text, no truth value, nothing complex, no array of several."""
-    if isinstance(value, bool | np.bool_ | str | bytes | complex | np.complexfloating):
+    if (
+        isinstance(value, bool | np.bool_ | str | bytes | complex | np.complexfloating)
+        or value is np.ma.masked
+    ):
         return False
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and value.dtype.kind in "iuf"
@@ -156,8 +159,8 @@ def names(owner: str, name: str, value) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     try:
-        given = tuple(value)
-    except TypeError:
+        given = tuple(value) if isinstance(value, Iterable) else (value,)
+    except TypeError:  # an array of no dimension
         given = (value,)
     wrong = [v for v in given if not isinstance(v, str)]
     if wrong:

@@ -228,6 +228,9 @@ def run(**keywords):
         ("times a table", run(timepts=np.ones((2, 2))), ValueError, "ascending"),
         ("params", lambda: cdf.event_response(DRIVE, T, 0, params=[1]), TypeError, "params", "mapping"),
         ("params text", lambda: cdf.event_response(DRIVE, T, 0, params={"mass": "9"}), TypeError, "'9'"),
+        ("squeeze", run(squeeze="yes"), TypeError, "squeeze", "True or False"),
+        ("keep_events", run(keep_events=5), TypeError, "keep_events", "True or False"),
+        ("rtol masked", run(rtol=np.ma.masked), TypeError, "rtol"),
         ("keyword", run(rtoll=1), TypeError, "unrecognized keyword", "rtoll"),
         ("system", lambda: cdf.event_response(5, T), TypeError, "block", "int"),
         ("FRD", lambda: cdf.event_response(ct.frd([1], [1]), T), TypeError, "fitted transfer function"),
@@ -277,6 +280,9 @@ N, FAMILY, RESPONSE = (
 SQUARE = ct.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
 
 
+SMALL = FAMILY(DRIVE, [9.0], [2.0])
+
+
 def family(**keywords):
     return lambda: FAMILY(DRIVE, [9.0], [2.0], **keywords)
 
@@ -319,6 +325,12 @@ def family(**keywords):
         ("response omega < 0", lambda: RESPONSE(H, DRIVE, [9, 10], [-1, 1]), ValueError, "positive", "-1"),
         ("response A text", lambda: RESPONSE(H, DRIVE, "9", [1, 2]), TypeError, "A as real numbers"),
         ("response H", lambda: RESPONSE("H", DRIVE, [9, 10], [1, 2]), TypeError, "H must be a linear system"),
+        ("response H huge", lambda: RESPONSE(10**400, DRIVE, [9, 10], [1, 2]), ValueError, "H finite"),
+        ("response H True", lambda: RESPONSE(True, DRIVE, [9, 10], [1, 2]), TypeError, "linear system"),
+        ("frd text", lambda: SMALL.frd("9"), TypeError, "amplitude", "'9'"),
+        ("frd outside", lambda: SMALL.frd(99), ValueError, "the family's grid", "99"),
+        ("save(5)", lambda: SMALL.save(5), TypeError, "path", "5"),
+        ("load_family(1)", lambda: cdf.load_family(1), TypeError, "path", "1"),
         ("response save", lambda: RESPONSE(H, DRIVE, [9, 10], [1, 2], save=3), TypeError, "save", "path"),
     ]
 )  # fmt: skip
@@ -394,6 +406,8 @@ def record(t=TIME, u=U, y=Y, **keywords):
 
 
 RECORD = record()()
+RUN = cdf.event_response(DRIVE, TIME, U)
+FROM = cdf.Measurement.from_response
 TABLE = cdf.FrequencyMeasurement
 
 
@@ -433,6 +447,9 @@ TABLE = cdf.FrequencyMeasurement
         ("from_csv(None)", lambda: cdf.Measurement.from_csv(None), TypeError, "path", "None"),
         ("from_mat(5)", lambda: cdf.Measurement.from_mat(5), TypeError, "path", "got 5"),
         ("from_dataframe(5)", lambda: cdf.Measurement.from_dataframe(5), TypeError, "DataFrame", "int"),
+        ("from_response row", lambda: FROM(RUN, input=INF), ValueError, "0 to 0", "inf"),
+        ("from_response label", lambda: FROM(RUN, output="z"), ValueError, "x, v", "'z'"),
+        ("from_response None", lambda: FROM(RUN, output=None), TypeError, "0 to 1"),
         ("from_response(5)", lambda: cdf.Measurement.from_response(5), TypeError, "TimeResponseData", "5"),
         ("table N text", lambda: TABLE([1.0], [1.0], [["a"]]), TypeError, "N as complex numbers"),
         ("table N truth", lambda: TABLE([1.0], [1.0], [[True]]), TypeError, "N as complex numbers"),

@@ -13,6 +13,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import number, path_of
 from ..drawing import draw
 
 FORMAT = 1
@@ -89,6 +90,7 @@ class Family:
         """
         if not np.isfinite(self.omega).all():
             raise ValueError("frd needs frequencies; this family has none. Give omega when computing it.")
+        amplitude = number("frd", "amplitude", amplitude)
         low, high = self.amplitudes.min(), self.amplitudes.max()
         if not low * (1 - 1e-12) <= amplitude <= high * (1 + 1e-12):
             raise ValueError(
@@ -122,7 +124,7 @@ class Family:
 
     def save(self, path) -> Path:
         """Write the family to an ``.npz`` file (no pickle inside), whole or not at all."""
-        return write_arrays(path, _arrays(self))
+        return write_arrays(path_of("save", "path", path), _arrays(self))
 
     def __repr__(self) -> str:
         """Return what was described, its size and regimes."""
@@ -140,7 +142,7 @@ def load_family(path) -> Family:
         The file holds no complete family (interrupted work is finished by the call that began it), or needs
         pickle.
     """
-    data = read_arrays(path)
+    data = read_arrays(path_of("load_family", "path", path))
     if not bool(np.all(data.get("done", True))):
         raise ValueError(
             f"load_family needs a complete family; {path} holds {int(data['done'].sum())} of "

@@ -112,7 +112,7 @@ def _row(which, labels, array, kind):
                 f"the {kind} must be one of {', '.join(labels) or 'the numbers'}; got {which!r}."
             )
         return labels.index(which)
-    if not (is_number(which) and which == int(which) and 0 <= which < rows):
+    if not (is_number(which) and which in range(rows)):
         raise (ValueError if is_number(which) else TypeError)(
             f"the {kind} must be a label or a number from 0 to {rows - 1}; got {shown(which)}."
         )

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import real_array, shown
+from ..checks import is_number, number, real_array, shown
 
 _SMOOTH_STEP = 0.5 * math.pi  # largest phase step between data points for which their phase is followed [rad]
 
@@ -30,8 +30,8 @@ class LinearPart:
     """
 
     def __init__(self, H):
-        if isinstance(H, int | float | np.integer | np.floating):
-            H = ct.tf([float(H)], [1.0])
+        if is_number(H):
+            H = ct.tf([number("describing_function_response", "H", H)], [1.0])
         if not isinstance(H, ct.TransferFunction | ct.StateSpace | ct.FrequencyResponseData):
             raise TypeError(
                 f"H must be a linear system (transfer function, state space or FRD); got {type(H).__name__}. "

@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import choice, count, mapping, number, positive, real_array, shown, unknown_keywords
+from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
 from ..status import Status
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
 
@@ -99,6 +99,9 @@ def event_response(
         A user-written law or input raised, or returned NaN; its exception is the cause.
     """
     unknown_keywords(keywords)
+    for name, value in dict(keep_events=keep_events, return_states=return_states, squeeze=squeeze).items():
+        if value is not None:
+            flag("event_response", name, value)
     times = _times(timepts)
     limits = _limits(rtol, atol, max_step, max_steps, float(times[-1] - times[0]))
     engine = Engine(_with_params(sys, params))
