@@ -159,7 +159,7 @@ def names(owner: str, name: str, value) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     try:
-        given = tuple(value) if isinstance(value, Iterable) else (value,)
+        given: tuple[Any, ...] = tuple(value) if isinstance(value, Iterable) else (value,)
     except TypeError:  # an array of no dimension
         given = (value,)
     wrong = [v for v in given if not isinstance(v, str)]

@@ -367,7 +367,7 @@ CHECKED = RESPONSE(H, cdf.saturation(1), [2.0, 4.0])
         ("guess text", find(guess="10 at 13"), TypeError, "guess", "'10 at 13'"),
         ("guess number", find(guess=10.0), TypeError, "guess", "10.0", "(3,)"),
         ("guess of four", find(guess=[1, 2, 3, 4]), TypeError, "guess", "(3,)"),
-        ("guess complex", find(guess=[1, 1j]), TypeError, "guess", "complex"),
+        ("guess complex", find(guess=[1, 1j]), TypeError, "guess", "1j"),
         ("raise_on_failure", find(raise_on_failure="yes"), TypeError, "True or False", "'yes'"),
         ("loop", lambda: cdf.find_limit_cycle(5), TypeError, "loop", "int"),
         ("keyword", find(max_iteration=3), TypeError, "unrecognized keyword"),

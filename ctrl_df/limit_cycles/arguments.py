@@ -15,17 +15,18 @@ def checked_guess(loop, guess: Any) -> Any:
     if guess is None or hasattr(guess, "amplitude") or not isinstance(loop, ct.NonlinearIOSystem):
         return guess
     n = loop.nstates or 0
-    values = real_array(
-        "find_limit_cycle", "guess", guess,
-        remedy="Give a predicted cycle, an orbit, a pair (amplitude, omega), or a state.",
-    )  # fmt: skip
+    wrong = (
+        "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an array of "
+        f"shape ({n},); got {shown(guess)}."
+    )
+    try:
+        values = real_array("find_limit_cycle", "guess", guess)
+    except TypeError:
+        raise TypeError(wrong) from None
     if isinstance(guess, np.ndarray) and values.shape == (n,):
         return values
     if values.shape not in ((2,), (n,)):
-        raise TypeError(
-            "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an "
-            f"array of shape ({n},); got {shown(guess)}."
-        )
+        raise TypeError(wrong)
     return tuple(values.tolist()) if values.shape == (2,) else values
 
 
