@@ -157,6 +157,15 @@ def test_linearizing_friction_at_rest_warns_with_reason_and_remedy():
         ct.linearize(cdf.backlash_masses(1, 8, 0.1), np.zeros(4), [0])
 
 
+def test_linearizing_a_loop_warns_as_its_block_does():
+    loop = cdf.closed_loop(PID, DRIVE)
+    with pytest.warns(UserWarning, match="dry friction"):
+        ct.linearize(loop, 0, 0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ct.linearize(loop, [0, 0, 0.1], 0)
+
+
 def test_linearizing_where_there_is_a_slope_does_not_warn():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

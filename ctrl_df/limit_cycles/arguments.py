@@ -16,8 +16,8 @@ def checked_guess(loop, guess: Any) -> Any:
         return guess
     n = loop.nstates or 0
     wrong = (
-        "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an array of "
-        f"shape ({n},); got {shown(guess)}."
+        "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an "
+        f"array of shape ({n},); got {shown(guess)}."
     )
     try:
         values = real_array("find_limit_cycle", "guess", guess)

@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from ..blocks.element import Element
+from ..blocks.linearization import warn_of_mechanism
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter
 from ..checks import is_number, number, returned, shown, system_name
@@ -22,6 +23,21 @@ class LoopParts:
     controller: Any
     block: ct.NonlinearIOSystem
     dt: float
+
+
+class ClosedLoop(ct.InterconnectedSystem):
+    """A loop of `closed_loop`; its linearization warns where its mechanism has none."""
+
+    parts: LoopParts
+
+    def linearize(self, x0, u0=None, t=0, params=None, eps=1e-6, copy_names=False, **kwargs):
+        """Linearize the compliant form; see `ct.linearize`."""
+        block, before = self.syslist[1], self.syslist[0].nstates or 0
+        if isinstance(block, Mechanism):
+            x = np.atleast_1d(np.asarray(getattr(x0, "states", x0), dtype=float)).ravel()
+            x = x[before:] if x.size > 1 else x
+            warn_of_mechanism(block.core, block.effects, x, self.parts.block.name)
+        return super().linearize(x0, u0, t, params, eps, copy_names, **kwargs)
 
 
 def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> ct.InterconnectedSystem:
@@ -99,6 +115,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
         warn_duplicate=False,
         check_unused=False,
     )
+    loop.__class__ = ClosedLoop  # python-control's interconnect makes no other
     loop.parts = LoopParts(pid, block, float(dt or 0))
     return loop
 
