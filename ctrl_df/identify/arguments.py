@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..blocks.effect import Effect, effect_class, effect_library
-from ..checks import choice, count, flag, known_name, mapping, names, number, positive, shown
+from ..checks import count, flag, known_name, mapping, names, number, positive, shown
 from .measurement import Measurement
 from .variables import default_free
 
@@ -46,7 +46,10 @@ def effect_classes(candidates: Any) -> list[Any]:
 
 def check_window(records: Sequence[Measurement], mode, window) -> None:
     """Check how records are to be cut: the mode, and a length of window that holds samples enough."""
-    choice("a comparison", "mode", mode, MODES)
+    if not isinstance(mode, str) or mode not in MODES:
+        raise (ValueError if isinstance(mode, str) else TypeError)(
+            f"mode must be one of {', '.join(MODES)}; got {shown(mode)}. Leave it out for auto."
+        )
     if window is None:
         return
     length = number(
