@@ -158,6 +158,24 @@ def test_a_law_that_returns_nan_text_or_complex_is_told():
             cdf.event_response(block, [0, 1], 1.0)
 
 
+def test_a_trial_step_into_nan_is_retried_not_told():
+    """A tank runs empty: trial steps look below zero, where the root of the level is NaN."""
+    met = []
+
+    def flow(t, x, u, params):
+        with np.errstate(invalid="ignore"):
+            rate = u[0] - np.sqrt(x[0])
+        met.append(np.isnan(rate))
+        return [rate]
+
+    tank = ct.nlsys(flow, lambda t, x, u, p: x, states=1, inputs=1, outputs=1)
+    times = np.linspace(0, 60, 61)
+    inflow = np.where((times > 5) & (times < 20), 2.0, 1e-3)
+    response = cdf.event_response(tank, times, inflow, [1e-6], input_hold="zoh", rtol=1e-4)
+    assert any(met) and response.status.ok
+    assert response.outputs[-1] == pytest.approx(1e-6, rel=0.1)
+
+
 def test_a_state_beyond_the_range_of_floats_is_divergence_not_an_error_of_the_law():
     block = ct.nlsys(
         lambda t, x, u, p: [float(x[0]) ** 3 + 1.0], lambda t, x, u, p: x, states=1, inputs=1, outputs=1

@@ -21,6 +21,7 @@ RTOL = 1e-9
 _CHUNK_TIME = 0.2
 """Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed."""
 _FIRST_CHUNK = 10_000  # steps of a small system until the pace is known
+_FAR = 1e50  # a state beyond has run away: NaN is then no mistake of a law
 _MOST_OUTPUTS = 100_000  # recorded in one go
 
 _STATUS = {
@@ -207,7 +208,7 @@ class Engine:
         Raises
         ------
         RuntimeError
-            A user-written law or system raised; its exception is the cause.
+            A user-written law or system raised (its exception is the cause), or returned NaN.
         KeyboardInterrupt
             Ctrl-C, within a fraction of a second.
         """
@@ -231,6 +232,7 @@ class Engine:
         kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         fresh = int(now.fresh)
         pointers.raised.clear()
+        pointers.gave_nan.clear()
         memo = self._space[-2]
         memo[2] = 0.0
         chunk = max(int(_FIRST_CHUNK / (1 + (self.nstates / 6) ** 2)), 10)
@@ -271,6 +273,8 @@ class Engine:
                 continue
             break
         status = _STATUS[reason]
+        if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < _FAR:
+            raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
         events: Any = (
             tuple(np.concatenate(c) for c in zip(*kept, strict=True))
             if kept

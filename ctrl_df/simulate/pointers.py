@@ -46,6 +46,8 @@ _CALLBACKS = {
 _compiled: weakref.WeakKeyDictionary[Callable, tuple[Any, object]] = weakref.WeakKeyDictionary()
 raised: list[BaseException] = []
 """Exceptions of laws called back in Python, newest last; the engine sees them as NaN."""
+gave_nan: list[str] = []
+"""Which law returned NaN last, and where, from numbers that were finite."""
 
 
 def address(law: Callable, kind: str) -> int:
