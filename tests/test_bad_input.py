@@ -454,6 +454,8 @@ TABLE = cdf.FrequencyMeasurement
         ("cutoff 1e9", lambda: RECORD.velocity_estimate(1e9), ValueError, "Nyquist", "cutoff"),
         ("from_csv(5)", lambda: cdf.Measurement.from_csv(5), TypeError, "path", "got 5"),
         ("from_csv(None)", lambda: cdf.Measurement.from_csv(None), TypeError, "path", "None"),
+        ("from_csv keyword", lambda: cdf.Measurement.from_csv("x", units="mm"), TypeError, "units"),
+        ("from_response keyword", lambda: FROM(RUN, outputs=1), TypeError, "unrecognized keyword", "outputs"),
         ("from_mat(5)", lambda: cdf.Measurement.from_mat(5), TypeError, "path", "got 5"),
         ("from_dataframe(5)", lambda: cdf.Measurement.from_dataframe(5), TypeError, "DataFrame", "int"),
         ("from_response row", lambda: FROM(RUN, input=INF), ValueError, "0 to 0", "inf"),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import choice, count, mapping, number, shown
+from ..checks import choice, count, mapping, number, shown, unknown_keywords
 from . import derivatives, readers
 from .checks import as_channel, check_input, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
@@ -148,6 +148,7 @@ class Measurement:
             An unknown column (the message lists those there are), one column asked for twice, a cell that
             is no number (with its line), a file that is no text.
         """
+        cls._check_keywords(keywords)
         table = readers.read_csv(path, delimiter, decimal)
         keywords.setdefault("name", readers.stem(path))
         return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
@@ -160,6 +161,7 @@ class Measurement:
 
         See `from_csv` for the parameters.
         """
+        cls._check_keywords(keywords)
         table = readers.read_mat(path)
         keywords.setdefault("name", readers.stem(path))
         return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
@@ -172,6 +174,7 @@ class Measurement:
 
         See `from_csv` for the parameters.
         """
+        cls._check_keywords(keywords)
         table = readers.read_dataframe(frame, time)
         time = readers.INDEX if time is None else time
         return cls(
@@ -185,10 +188,16 @@ class Measurement:
         The input of python-control's simulations runs straight between samples: ``input_hold='linear'``
         unless told otherwise.
         """
+        cls._check_keywords(keywords)
         t, u, y = readers.read_response(response, input, output)
         keywords.setdefault("input_hold", "linear")
         keywords.setdefault("name", getattr(response, "sysname", None) or "response")
         return cls(t, u, y, **keywords)
+
+    @classmethod
+    def _check_keywords(cls, keywords):
+        known = [f.name for f in dataclasses.fields(cls) if f.name not in ("t", "u", "y")]
+        unknown_keywords([k for k in keywords if k not in known])
 
     # --- what it is -------------------------------------------------------------------------------
 
