@@ -1,8 +1,8 @@
 """How far the grades can be trusted: random loops of seven families, predicted and held against exact orbits.
 
-``python benchmarks/trust.py [--seed 1] [--loops 20] [--units 10]`` draws so many loops of each family, predicts their
-cycles, traces the exact orbits, closes each orbit once more by an integrator of its own, repeats the prediction on
-other grids and in other units, and prints Markdown tables.
+``python benchmarks/trust.py [--seed 1] [--loops 20] [--units 10]`` draws so many loops of each family,
+predicts their cycles, traces the exact orbits, closes each orbit once more by an integrator of its own,
+repeats the prediction on other grids and in other units, and prints Markdown tables.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from .checks import place_to_write
 from .model_file import EXAMPLE, ModelFile, read_model
 
 BAD_INPUT = 2
@@ -20,7 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(argv)
     try:
         return options.run(options)
-    except (ValueError, TypeError, OSError) as error:
+    except (ValueError, TypeError, OSError, RuntimeError) as error:
         print(f"ctrl-df: error: {' '.join(str(error).split())}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
@@ -124,9 +125,7 @@ def _improve(options) -> int:
 
     model = read_model(options.model)
     if options.report:
-        folder = Path(options.report).resolve().parent
-        if not folder.is_dir():
-            raise ValueError(f"--report needs an existing directory; got {folder}. Create it first.")
+        place_to_write("improve", "--report", options.report)
     columns = {"time": "t", "input": "r" if model.closed_loop else "F", "output": "x", **model.columns}
     record = Measurement.from_csv(options.data, **columns)
     study = improve(_subject(model), record)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ import numpy as np
 from .blocks.effect import Effect, effect_class
 from .blocks.mechanism import Mass, Mechanism, TwoMass
 from .blocks.pid import pid
+from .checks import choice, is_number, number, path_of, shown
+from .identify.units import si_unit
 
 EXAMPLE = """\
 [plant]
@@ -42,14 +44,18 @@ points = [40, 60]          # of the grid, optional
 time = "t"
 input = "F"
 output = "x"
-input_unit = "N"           # optional; also time_unit, velocity, velocity_unit, input_hold
+input_unit = "N"           # optional; also time_unit, velocity, velocity_unit, input_hold, decimal
 output_unit = "mm"
 closed_loop = false        # true: the input column is the reference of the loop with [controller]
 """
 
+MOST_POINTS = 1_000_000
+"""Grid points of a box: some 200 MB, and more than any search for cycles needs."""
+
+_GAINS = ("kp", "ki", "kd", "tf", "dt")
 _PLANTS: dict[str, type[Mechanism]] = {"mass": Mass, "two_mass": TwoMass}
 _SECTIONS = ("plant", "effects", "controller", "box", "data")
-_COLUMNS = ("time", "input", "output", "velocity", "channels", "delimiter")
+_COLUMNS = ("time", "input", "output", "velocity", "channels", "delimiter", "decimal")
 _DATA = (
     *_COLUMNS,
     "name",
@@ -101,10 +107,14 @@ def read_model(path) -> ModelFile:
     OSError
         The file cannot be read.
     """
-    text = Path(path).read_bytes()
+    raw = path_of("read_model", "path", path).read_bytes()
     try:
-        table = tomllib.loads(text.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = tomllib.loads(raw.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ValueError(
+            f"{path} is no TOML file: it must be text in UTF-8, byte {error.start} is not. Save it as UTF-8."
+        ) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise ValueError(f"{path} is no TOML file: {error}. See ctrl-df --help for an example.") from None
     _known(path, "file", table, _SECTIONS)
     plant = _within(path, "plant and effects", lambda: _plant(table))
@@ -124,8 +134,8 @@ def _plant(table) -> Mechanism:
         raise ValueError('a model needs a section [plant] with kind = "mass" or "two_mass".')
     given = dict(_mapping(table["plant"], "plant"))
     kind = given.pop("kind", "mass")
-    if kind not in _PLANTS:
-        raise ValueError(f"kind must be one of {', '.join(_PLANTS)}; got {kind!r}.")
+    if not isinstance(kind, str) or kind not in _PLANTS:
+        raise ValueError(f"kind must be one of {', '.join(_PLANTS)}; got {shown(kind)}. Write it in quotes.")
     cls = _PLANTS[kind]
     needed = [n for n, p in inspect.signature(cls).parameters.items() if p.default is inspect.Parameter.empty]
     _known(None, kind, given, (*needed, "measured", "name"))
@@ -147,28 +157,32 @@ def _effects(given) -> list[Effect]:
                 raise ValueError('every table of [[effects]] needs an id, such as id = "coulomb".')
             pairs.append((values.pop("id"), values))
     else:
-        raise ValueError(f"effects must be tables [effects.ID]; got {given!r}.")
+        raise ValueError(
+            f"effects must be tables [effects.ID] with parameters; got {shown(given)}. See --help."
+        )
     made = []
     for key, values in pairs:
         cls = effect_class(key)
-        _known(None, f"effect {key}", values, [f.name for f in dataclasses.fields(cls)])
-        try:
-            made.append(cls(**values))
-        except TypeError as error:
-            names = ", ".join(f.name for f in dataclasses.fields(cls))
-            raise ValueError(f"effect {key} has the parameters {names}; {error}.") from None
+        fields = dataclasses.fields(cls)
+        _known(None, f"effect {key}", values, [f.name for f in fields])
+        for f in fields:
+            if f.name not in values and f.default is f.default_factory is dataclasses.MISSING:
+                unit = f.metadata.get("parameter", {}).get("unit", "")
+                raise ValueError(f"effect {key} needs {f.name} [{unit or '-'}]; add it.")
+        made.append(cls(**values))
     return made
 
 
 def _controller(given):
     given = dict(_mapping(given, "controller"))
-    _known(None, "controller", given, ("kp", "ki", "kd", "tf", "dt"))
+    _known(None, "controller", given, _GAINS)
     if "kp" not in given:
         raise ValueError("a controller needs kp [N/m]; add it (0 if there is none).")
     numbers = {k: _number(k, v) for k, v in given.items()}
     dt = numbers.pop("dt", 0.0)
-    if dt < 0:
-        raise ValueError(f"dt must be >= 0 (sample time [s]); got {dt!r}. Use 0 for a continuous controller.")
+    number(
+        "controller", "dt", dt, "s", lower=0.0, meaning="sample time", remedy="Use 0 for a continuous one."
+    )
     return pid(**numbers), dt
 
 
@@ -178,17 +192,26 @@ def _box(given):
     given = _mapping(given, "box")
     _known(None, "box", given, ("amplitude", "omega", "points"))
     points = given.get("points", [40, 60])
-    whole = isinstance(points, list) and all(isinstance(n, int) and n >= 2 for n in points)
+    whole = isinstance(points, list) and all(type(n) is int and n >= 2 for n in points)
     if not whole or len(points) != 2:
-        raise ValueError(f"points must be two integers >= 2 (amplitudes, frequencies); got {points!r}.")
+        raise ValueError(
+            f"points must be two integers >= 2 (amplitudes, frequencies); got {shown(points)}. "
+            "Leave it out for [40, 60]."
+        )
+    if points[0] * points[1] > MOST_POINTS:
+        side = math.isqrt(MOST_POINTS)
+        raise ValueError(
+            f"points may be {MOST_POINTS:,} in all, such as [{side}, {side}]; got {points!r}, "
+            f"{points[0] * points[1]:.3g}. [40, 60] finds cycles; a finer grid only splits what lies close."
+        )
     edges = []
     for key, count in zip(("amplitude", "omega"), points, strict=True):
         pair = given.get(key)
         if not (isinstance(pair, list) and len(pair) == 2):
-            raise ValueError(f"{key} must be a pair [low, high]; got {pair!r}.")
-        low, high = (_number(key, v) for v in pair)
+            raise ValueError(f"{key} must be a pair [low, high]; got {shown(pair)}. Give both ends.")
+        low, high = (v if is_number(v) else _number(key, v) for v in pair)
         if not 0 < low < high < np.inf:
-            raise ValueError(f"{key} needs 0 < low < high; got {pair!r}.")
+            raise ValueError(f"{key} needs 0 < low < high, both finite; got {pair!r}. Put them in order.")
         edges.append(np.geomspace(low, high, count))
     return tuple(edges)
 
@@ -196,18 +219,34 @@ def _box(given):
 def _data(given):
     given = dict(_mapping(given, "data"))
     _known(None, "data", given, _DATA)
+    for key, value in given.items():
+        if key in ("time", "input", "output", "velocity"):
+            good, what = isinstance(value, str) or type(value) is int, "a column's name or number"
+        elif key == "channels":
+            good = isinstance(value, list) and all(isinstance(v, str) or type(v) is int for v in value)
+            what = "a list of columns"
+        elif key == "closed_loop":
+            good, what = isinstance(value, bool), "true or false, without quotes"
+        else:
+            good, what = isinstance(value, str), "text in quotes"
+        if not good:
+            raise ValueError(f"{key} must be {what}; got {shown(value)}. Correct it.")
+        if key.endswith("_unit"):
+            si_unit(str(value))
+        if key == "input_hold":
+            choice("data", key, value, ("zoh", "linear"))
     return given
 
 
 def _number(name, value) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{name} must be a number; got {value!r}.")
-    return float(value)
+    return number("controller" if name in _GAINS else "box", name, value)
 
 
 def _mapping(value, name) -> Mapping:
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a table of key = value; got {value!r}.")
+        raise ValueError(
+            f"{name} must be a section [{name}] of key = value lines; got {shown(value)}. See --help."
+        )
     return value
 
 

@@ -117,7 +117,7 @@ def test_a_name_cannot_break_the_page(study, tmp_path):
 
 
 def test_a_folder_that_is_not_there(study, tmp_path):
-    with pytest.raises(ValueError, match="folder that exists"):
+    with pytest.raises(FileNotFoundError, match="existing directory"):
         write_report(study, tmp_path / "no" / "report.html")
 
 

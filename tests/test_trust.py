@@ -22,7 +22,7 @@ def near_fold():
     return cdf.describing_function_response(*NEAR_FOLD, np.geomspace(2.4, 90, 30), np.geomspace(1, 11, 40))
 
 
-# --- finding 2: trusted predictions of a loop that diverges from every start -------------------------------------
+# --- finding 2: trusted predictions of a loop that diverges from every start --------------------------------
 
 
 def test_predictions_that_merge_are_not_trusted():
@@ -70,7 +70,7 @@ def test_fate_tells_rest_cycle_and_the_border_between():
     assert {round(row.orbit.omega, 4) for row in hunting.fate.cycles} == {11.6287}
 
 
-# --- finding 3: unstable orbits, guesses, states ------------------------------------------------------------------
+# --- finding 3: unstable orbits, guesses, states ------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_no_orbit_is_false_and_says_what_was_tried():
         cdf.find_limit_cycle(cdf.closed_loop(*NEAR_FOLD), raise_on_failure=True)
 
 
-# --- finding 4: the same in every unit -----------------------------------------------------------------------------
+# --- finding 4: the same in every unit ----------------------------------------------------------------------
 
 
 def _friction(force, length, time):
@@ -236,7 +236,7 @@ def test_simulations_in_other_units(units):
         assert np.abs(runs[0][0] - runs[1][0]).max() < 1e-8 * np.abs(runs[0][0]).max()
 
 
-# --- findings 5 and 9: several laps, centres -----------------------------------------------------------------------
+# --- findings 5 and 9: several laps, centres ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("laps", [2, 3, 5, 7, 11])

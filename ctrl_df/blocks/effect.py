@@ -29,6 +29,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
+from ..checks import shown
 from .parameter import Parameter, checked
 from .primitives import Primitive
 
@@ -116,9 +117,16 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
 
     Raises
     ------
+    TypeError
+        If it is no dataclass derived from `Effect`.
     ValueError
         If the id is taken or the role unknown.
     """
+    if not (isinstance(cls, type) and issubclass(cls, Effect) and dataclasses.is_dataclass(cls)):
+        raise TypeError(
+            f"register_effect needs a frozen dataclass derived from ctrl_df.Effect; got {shown(cls)}. "
+            "Decorate the class: @register_effect above @dataclass(frozen=True)."
+        )
     if cls.role not in ROLES:
         raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
     known = _LIBRARY.get(cls.id)
@@ -143,11 +151,10 @@ def effect_library() -> dict[str, type[Effect]]:
 
 def effect_class(effect_id: str) -> type[Effect]:
     """Look an effect class up by id; an unknown id raises ValueError with the list of those known."""
-    try:
-        return _LIBRARY[effect_id]
-    except KeyError:
-        raise ValueError(
-            f"an effect id must be one of the library's; got {effect_id!r}. "
+    if not isinstance(effect_id, str) or effect_id not in _LIBRARY:
+        raise (ValueError if isinstance(effect_id, str) else TypeError)(
+            f"an effect id must be one of the library's; got {shown(effect_id)}. "
             f"Known: {', '.join(sorted(_LIBRARY))}. "
             "Register your own with ctrl_df.register_effect."
-        ) from None
+        )
+    return _LIBRARY[effect_id]

@@ -12,6 +12,8 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonlinearity
 
+from ..checks import known_name, mapping, shown, system_name
+from .linearization import warn_of_element
 from .parameter import Parameter
 
 
@@ -46,6 +48,7 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
     _static = True
 
     def __init__(self, kind, values, primitive, *, specs=None, name=None):
+        system_name(kind, name)
         self._kind: str = kind
         self._values = MappingProxyType(dict(values))
         self._specs: dict = specs or {}
@@ -87,11 +90,8 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
 
     def with_parameters(self, values: Mapping[str, float]) -> Element:
         """Return the element with some of its numbers changed; an unknown name raises ValueError."""
-        for key in values:
-            if key not in self._specs:
-                raise ValueError(
-                    f"a parameter name must be one of {', '.join(self._specs) or 'none'}; got {key!r}."
-                )
+        for key in mapping("with_parameters", "values", values):
+            known_name("with_parameters", "names", key, self._specs)
         return build(self._kind, {**self._values, **values})
 
     def __reduce__(self):
@@ -116,10 +116,19 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
 
     def __call__(self, u, params=None, squeeze=None):
         """Return ``y = f(u)``, elementwise; an element with memory answers as from rest at u = 0."""
-        y = self._from_rest(self._primitive_for(params), np.asarray(u, dtype=float))
+        values = np.asarray(u)
+        if values.dtype.kind not in "iuf":
+            raise TypeError(f"{self._kind} needs its input u as real numbers; got {shown(u)}.")
+        y = self._from_rest(self._primitive_for(params), values.astype(float))
         if squeeze:
             y = np.squeeze(y)
         return float(y) if np.ndim(y) == 0 else y
+
+    def linearize(self, x0, u0=None, t=0, params=None, eps=1e-6, copy_names=False, **kwargs):
+        """Linearize; see `ct.linearize`. Warns where there is no slope."""
+        at = getattr(x0, "inputs", 0.0) if u0 is None else u0
+        warn_of_element(self._kind, self._primitive_for(params), at, eps)
+        return super().linearize(x0, u0, t, params, eps, copy_names, **kwargs)
 
     def _isstatic(self) -> bool:
         return self._static

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
@@ -10,10 +10,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import known_name, mapping, number, shown, system_name
 from . import compliant
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Stribeck, Viscous
+from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
 
 _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
@@ -30,6 +32,7 @@ class Mechanism(ct.NonlinearIOSystem):
 
     def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
         owner = type(self).__name__
+        system_name(owner, name)
         self._values = {
             k: checked(owner, k, v, {**_MASS, "meaning": k.replace("_", " ")}) for k, v in inertias.items()
         }
@@ -117,9 +120,8 @@ class Mechanism(ct.NonlinearIOSystem):
 
     def _changed(self, values: Mapping[str, float]):
         known = self.parameters
-        for name in values:
-            if name not in known:
-                raise ValueError(f"a parameter name must be one of {', '.join(known)}; got {name!r}.")
+        for name in mapping("with_parameters", "values", values):
+            known_name("with_parameters", "names", name, known)
         inertias = {k: values.get(k, v) for k, v in self._values.items()}
         effects = []
         for key, effect in zip(self._keys, self._effects, strict=True):
@@ -156,8 +158,17 @@ class Mechanism(ct.NonlinearIOSystem):
         if not params:
             return self._core
         known = self.parameters
-        changed = {k: float(v) for k, v in params.items() if k in known and known[k].value != v}
+        changed = {
+            k: number(type(self).__name__, k, v)
+            for k, v in params.items()
+            if k in known and known[k].value != v
+        }
         return self._core if not changed else _core_with(self, tuple(sorted(changed.items())))
+
+    def linearize(self, x0, u0=None, t=0, params=None, eps=1e-6, copy_names=False, **kwargs):
+        """Linearize the compliant form; see `ct.linearize`. Warns where the machine itself has no slope."""
+        warn_of_mechanism(self._core_for(params), self._effects, x0, self.name)
+        return super().linearize(x0, u0, t, params, eps, copy_names, **kwargs)
 
     def _updfcn(self, t, x, u, params):
         return np.array(compliant.rates(self._core_for(params), t, x, float(u[0])))
@@ -282,17 +293,23 @@ def _unpickle(cls, inertias, effects, measured, name):
 @lru_cache(maxsize=64)
 def _core_with(block: Mechanism, changed) -> Core:
     inertias, effects = block._changed(dict(changed))
+    type(block)._make(inertias, effects, block.measured)  # checks them
     return block._build(inertias, effects)
 
 
 def _as_effects(effects) -> tuple[Effect, ...]:
-    effects = tuple(effects)
-    for effect in effects:
+    if isinstance(effects, Effect):
+        return (effects,)
+    given: tuple[Any, ...] = (
+        tuple(effects) if isinstance(effects, Iterable) and not isinstance(effects, str) else (effects,)
+    )
+    for effect in given:
         if not isinstance(effect, Effect):
             raise TypeError(
-                f"an effect must be an instance of a ctrl_df Effect, e.g. Coulomb(5); got {effect!r}."
+                "effects must be instances of ctrl_df's effects, such as [Coulomb(5), Viscous(0.5)]; got "
+                f"{shown(effect)}. Call the class with its parameters."
             )
-    return effects
+    return given
 
 
 def _effect_keys(effects) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import warnings
 
 import numpy as np
 
+from ..checks import real_array, shown
 from .element import DescribingFunctionNonlinearity, Element, builder, finite
 from .parameter import checked
 from .primitives import PiecewiseAffine, Quantizer, Smooth
@@ -34,24 +35,30 @@ def saturation(ub=1.0, lb=None, *, name=None) -> Element:
     Parameters
     ----------
     ub : float
-        Upper level, unit of the input.
+        Upper level, unit of the input; > 0 where `lb` is left out.
     lb : float or None
-        Lower level, < `ub`; None: ``-abs(ub)`` to ``abs(ub)``.
+        Lower level, < `ub`; None: ``-ub``.
     name : str
         System name.
 
     Raises
     ------
     ValueError
-        lb >= ub, or a level that is not finite.
+        lb >= ub, one level alone that is not positive, or a level that is not finite.
+    TypeError
+        A level that is no real number.
 
     References
     ----------
     Gelb & Vander Velde (1968), appendix B, nonlinearity 9; unequal levels by direct integration.
     """
     ub = checked("saturation", "ub", ub, finite(meaning="upper level"))
-    if lb is None:
-        lb, ub = -abs(ub), abs(ub)
+    if lb is None and ub <= 0:
+        raise ValueError(
+            f"saturation needs ub > 0 (upper level; the lower one is -ub); got ub={ub:g}. "
+            "Give the size of the level, or both levels in order: saturation(ub, lb)."
+        )
+    lb = -ub if lb is None else lb
     lb = checked("saturation", "lb", lb, finite(meaning="lower level"))
     if lb >= ub:
         raise ValueError(
@@ -255,17 +262,15 @@ def piecewise_linear(x, y, *, name=None) -> Element:
     ValueError
         Fewer than two points, unequal lengths, x not ascending, a number that is not finite.
     """
-    xs, ys = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    xs, ys = (real_array("piecewise_linear", k, v) for k, v in (("x", x), ("y", y)))
     if xs.ndim != 1 or xs.shape != ys.shape or xs.size < 2:
         raise ValueError(
             f"piecewise_linear needs x and y of one equal length >= 2; got shapes {xs.shape} and {ys.shape}. "
             "Give one output for every input."
         )
-    if not (np.isfinite(xs).all() and np.isfinite(ys).all()):
-        raise ValueError("piecewise_linear needs finite x and y; got NaN or infinity. Remove those points.")
     if np.any(np.diff(xs) <= 0):
         raise ValueError(
-            f"piecewise_linear needs x strictly ascending; got x={x!r}. Sort it; for a jump use a relay."
+            f"piecewise_linear needs x strictly ascending; got x={shown(x)}. Sort it; for a jump use a relay."
         )
     slopes = np.diff(ys) / np.diff(xs)
     intercepts = ys[:-1] - slopes * xs[:-1]
@@ -312,11 +317,13 @@ class saturation_nonlinearity(Element):
     ub : float
         Upper level.
     lb : float or None
-        Lower level; None: ``-abs(ub)`` to ``abs(ub)``. Unequal levels warn, as python-control's class does:
-        the output then has a mean, which a loop analysis by the first harmonic leaves out.
+        Lower level; None: ``-abs(ub)`` to ``abs(ub)``, as there. Unequal levels warn, as python-control's
+        class does: the output then has a mean, which a loop analysis by the first harmonic leaves out.
     """
 
     def __init__(self, ub=1, lb=None):
+        if lb is None:
+            ub = abs(checked("saturation_nonlinearity", "ub", ub, finite(meaning="upper level")))
         element = saturation(ub, lb)
         if element.values["lb"] + element.values["ub"] != 0:
             warnings.warn(

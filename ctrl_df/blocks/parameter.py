@@ -7,6 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..checks import CHECK_VALUE, number
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -56,28 +58,8 @@ def parameter(
 
 
 def checked(owner: str, name: str, value, spec: dict, remedy: str = "") -> float:
-    """Return `value` as a float, or raise ValueError naming rule, value and remedy."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise TypeError(
-            f"{owner} needs {name} as one real number [{spec['unit'] or '-'}]; got {value!r}."
-        ) from None
-    lower, upper, strict = spec["lower"], spec["upper"], spec["strict"]
-    low_ok = number > lower if strict else number >= lower
-    if math.isnan(number) or not low_ok or not number <= upper or math.isinf(number):
-        rule = _rule(name, lower, upper, strict)
-        meaning = f" ({spec['meaning']}, unit {spec['unit'] or '1'})" if spec["meaning"] else ""
-        tail = f" {remedy}" if remedy else " Check the value and its unit (SI)."
-        raise ValueError(f"{owner} needs {rule}{meaning}; got {name}={value!r}.{tail}")
-    return number
-
-
-def _rule(name, lower, upper, strict):
-    if math.isfinite(lower) and math.isfinite(upper):
-        return f"{lower:g} {'<' if strict else '<='} {name} <= {upper:g}"
-    if math.isfinite(lower):
-        return f"{name} {'>' if strict else '>='} {lower:g} and finite"
-    if math.isfinite(upper):
-        return f"{name} <= {upper:g} and finite"
-    return f"{name} finite"
+    """Return `value` as a float, or raise TypeError or ValueError naming rule, value and remedy."""
+    return number(
+        owner, name, value, spec["unit"], lower=spec["lower"], upper=spec["upper"], strict=spec["strict"],
+        meaning=spec["meaning"], remedy=remedy or CHECK_VALUE,
+    )  # fmt: skip

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import control as ct
+
+from ..checks import number, system_name
 
 
 def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
@@ -22,18 +22,21 @@ def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
     ------
     ValueError
         A gain that is not finite, or tf < 0.
+    TypeError
+        A gain that is no real number.
 
     References
     ----------
     Azenha & Machado (1997), eqs. (7)-(8).
     """
-    for key, value in dict(kp=kp, ki=ki, kd=kd, tf=tf).items():
-        if not math.isfinite(value):
-            raise ValueError(f"pid needs finite numbers; got {key}={value!r}.")
-    if tf < 0:
-        raise ValueError(
-            f"pid needs tf >= 0 (filter time constant [s]); got tf={tf!r}. Use tf=0 for the ideal PID."
-        )
+    system_name("pid", name)
+    kp, ki, kd = (
+        number("pid", key, value, unit)
+        for key, value, unit in (("kp", kp, "N/m"), ("ki", ki, "N/(m s)"), ("kd", kd, "N s/m"))
+    )
+    tf = number(
+        "pid", "tf", tf, "s", lower=0.0, meaning="filter time constant", remedy="Use tf=0 for the ideal PID."
+    )
     if ki == 0:
         num, den = [kp * tf + kd, kp], [tf, 1.0]
     else:

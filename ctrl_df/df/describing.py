@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import control as ct
 import numpy as np
 
+from ..checks import count, flag, path_of, real_array
+from ..checks import executor as checked_executor
 from .dispatch import method_for
 from .family import Family
 from .points import points
@@ -80,6 +83,7 @@ def _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)
         num_points, zero_check, try_method, omega = shifted, bool(num_points), zero_check, None
     A = _amplitudes(A)
     omega = None if omega is None else _frequencies(omega)
+    num_points = _check_block(F, num_points)
     shape = _common_shape(A, omega)
     largest = float(A.max()) if A.size and A.max() > 0 else 1.0
     method = method_for(F, output, try_method, num_points, largest, options)
@@ -155,22 +159,37 @@ def describing_function_family(
             "a family needs A > 0; got A=0. Leave it out, or ask describing_function for the slope."
         )
     omega = None if omega is None else _axis("omega", _frequencies(omega), "rad/s")
-    if not isinstance(orders, int | np.integer) or isinstance(orders, bool) or orders < 1:
-        raise ValueError(f"a family needs orders as an integer >= 1 (highest harmonic); got {orders!r}.")
+    orders = count("a family", "orders", orders, meaning="highest harmonic")
+    checked_executor("a family", executor)
+    save = None if save is None else path_of("a family", "save", save)
+    if progress is not None:
+        flag("a family", "progress", progress)
+    num_points = _check_block(F, num_points)
     method = method_for(F, output, try_method, num_points, float(A.max()), options)
     _check_options(method, options)
     _check_omega(method, omega)
-    work = Work(F, method, A, omega, int(orders), save)
+    work = Work(F, method, A, omega, orders, save)
     work.run(executor, progress)
     return work.family()
 
 
-def _amplitudes(A) -> np.ndarray:
-    A = _real("A", A)
-    if np.isnan(A).any() or np.isinf(A).any():
-        raise ValueError(
-            "cannot evaluate describing function: A must be finite; got NaN or infinity. Remove it."
+def _check_block(F, num_points) -> int:
+    """Check what is described beyond what `method_for` asks: linear systems have one input, one output."""
+    if isinstance(F, ct.FrequencyResponseData):
+        raise TypeError(
+            "a describing function needs a block or a law; got measured points (FrequencyResponseData). "
+            "They are linear: their N is the response itself."
         )
+    if isinstance(F, ct.StateSpace | ct.TransferFunction) and not F.issiso():
+        raise ValueError(
+            f"a describing function needs one input and one output; got {F.ninputs} inputs and {F.noutputs} "
+            "outputs. Select one channel, F[i, j]."
+        )
+    return count("a describing function", "num_points", num_points, meaning="calls a period")
+
+
+def _amplitudes(A) -> np.ndarray:
+    A = real_array("a describing function", "A", A, remedy="An amplitude is a peak value.")
     if (A < 0).any():
         bad = A[A < 0].flat[0]
         raise ValueError(
@@ -180,23 +199,13 @@ def _amplitudes(A) -> np.ndarray:
 
 
 def _frequencies(omega) -> np.ndarray:
-    omega = _real("omega", omega)
-    if not ((omega > 0) & np.isfinite(omega)).all():
-        bad = omega[~((omega > 0) & np.isfinite(omega))].flat[0]
+    omega = real_array("a describing function", "omega", omega, "rad/s")
+    if (omega <= 0).any():
+        bad = omega[omega <= 0].flat[0]
         raise ValueError(
             f"a describing function needs omega > 0 and finite [rad/s]; got omega={bad}. Remove it."
         )
     return omega
-
-
-def _real(name, values) -> np.ndarray:
-    array = np.asarray(values)
-    if np.iscomplexobj(array):
-        raise TypeError(f"{name} must be real numbers; got complex ones. An amplitude is a peak value.")
-    try:
-        return array.astype(float)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} must be real numbers; got {values!r}.") from None
 
 
 def _common_shape(A, omega):

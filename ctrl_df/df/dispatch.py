@@ -14,6 +14,7 @@ from ..blocks.element import Element
 from ..blocks.hysteresis import play, relay_with_hysteresis
 from ..blocks.mechanism import Mass, Mechanism, TwoMass
 from ..blocks.memoryless import saturation
+from ..checks import shown
 from ..status import Status
 from .branch import Branch
 from .memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
@@ -234,7 +235,10 @@ class _Guarded:
 
     def __call__(self, u):
         try:
-            return self.law(u)
+            y = self.law(u)
+            if np.asarray(y).dtype.kind not in "fiub":
+                raise TypeError(f"it must return real numbers; got {shown(y)}")
+            return y
         except NotImplementedError:  # a class with N but no law
             raise
         except Exception as error:

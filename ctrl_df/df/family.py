@@ -11,6 +11,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import number, path_of
 from ..drawing import draw
 from .journal import is_journal, lines_done, read_header
 
@@ -90,6 +91,7 @@ class Family:
         """
         if not np.isfinite(self.omega).all():
             raise ValueError("frd needs frequencies; this family has none. Give omega when computing it.")
+        amplitude = number("frd", "amplitude", amplitude)
         low, high = self.amplitudes.min(), self.amplitudes.max()
         if not low * (1 - 1e-12) <= amplitude <= high * (1 + 1e-12):
             raise ValueError(
@@ -123,7 +125,7 @@ class Family:
 
     def save(self, path) -> Path:
         """Write the family to an ``.npz`` file (no pickle inside), whole or not at all."""
-        return write_arrays(path, _arrays(self))
+        return write_arrays(path_of("save", "path", path), _arrays(self))
 
     def __repr__(self) -> str:
         """Return what was described, its size and regimes."""
@@ -145,7 +147,7 @@ def load_family(path) -> Family:
         The file is damaged, holds no family or no complete one (interrupted work is finished by the call that
         began it), or needs pickle.
     """
-    path = _as_path("load_family", path)
+    path = path_of("load_family", "path", path)
     if is_journal(path):
         done, lines = lines_done(path), read_header(path)["lines"]
         raise ValueError(_incomplete(path, done, lines))

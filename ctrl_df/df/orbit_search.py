@@ -346,7 +346,9 @@ class OrbitSearch:
 
 
 def user_error(block, error) -> RuntimeError:
-    """Return the one error for a law that raises or returns NaN."""
+    """Return the one error for a law that raises or returns NaN; Ctrl-C is none and goes on."""
+    if not isinstance(error, Exception):
+        raise error
     wrapped = RuntimeError(f"{Status.USER_ERROR} (block {block.name}: {error!r})")
     wrapped.__cause__ = error
     return wrapped

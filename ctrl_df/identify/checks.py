@@ -2,26 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+
+from ..checks import is_number, shown
 
 MINIMUM = 10
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
     """Return a private 1-D float array without NaN or infinity, of the given length."""
-    if values is None or isinstance(values, str | bytes):
-        raise TypeError(f"{owner} needs {name} as a 1-D array of numbers; got {values!r}.")
-    raw = np.asarray(values)
+    if values is None or isinstance(values, str | bytes | Mapping | set) or is_number(values):
+        raise TypeError(f"{owner} needs {name} as a 1-D array of numbers; got {shown(values)}.")
+    hidden = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else np.zeros(0, bool)
+    masked = np.flatnonzero(hidden)
+    if len(masked):
+        raise ValueError(
+            f"{owner} needs every sample; {name} has {len(masked)} masked, the first at sample {masked[0]}. "
+            "Take the parts between them as records of their own, or fill them yourself where that is honest."
+        )
+    try:
+        raw = np.asarray(values)
+    except ValueError:
+        raise ValueError(
+            f"{owner} needs {name} as a 1-D array of numbers; got rows of unequal length."
+        ) from None
     if raw.dtype.kind == "c":
         raise ValueError(
             f"{owner} needs real numbers in {name}; got complex ones. Is this a frequency response?"
         )
-    try:
-        array = np.array(raw, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(
-            f"{owner} needs numbers in {name}; got dtype {raw.dtype}. Convert the column first."
-        ) from None
+    if name == "t" and raw.dtype.kind in "mM" and raw.ndim == 1 and len(raw):
+        raw = (raw - raw[0]) / np.timedelta64(1, "s")  # dates and durations: seconds from the first
+    mixed = raw.dtype.kind == "O" and not all(is_number(v) for v in raw.ravel())
+    if mixed or raw.dtype.kind not in "fiuO" + ("b" if name not in ("t", "u", "y") else ""):
+        kind = {"U": "text", "S": "text", "b": "truth values", "M": "dates", "m": "durations"}
+        got = kind.get(raw.dtype.kind, f"dtype {raw.dtype}")
+        raise TypeError(f"{owner} needs numbers in {name}; got {got}. Convert the column first.")
+    array = np.array(raw, dtype=float)
     if array.ndim == 2 and 1 in array.shape:
         array = array.ravel()
     if array.ndim != 1:

@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..checks import unknown_keywords
+from .arguments import check_window
 from .candidate import window_lengths
 from .compared import Compared
 from .derivatives import automatic_cutoff, derivative
@@ -238,13 +240,13 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     -------
     Comparison
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
     if has_tables(data):
         from .frequency_compare import compare_frequency
 
         return compare_frequency(model, data)  # pyright: ignore[reportReturnType]
     records = as_records(data)
+    check_window(records, mode, window)
     lengths = window_lengths(
         model, records, "windows" if mode == "auto" and window is not None else mode, window
     )

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from ..checks import number
+
 
 def uniform(t: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Return (dt, times, values) on a regular grid; irregular samples are interpolated linearly."""
@@ -85,6 +87,7 @@ def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -
     dt, grid, values = uniform(t, y)
     if cutoff is None:
         cutoff = automatic_cutoff(values, dt)
+    cutoff = number("a derivative", "cutoff", cutoff, "Hz")
     if not 0 < cutoff < 0.5 / dt:
         raise ValueError(
             f"a cutoff must lie between 0 and the Nyquist frequency {0.5 / dt:g} Hz; got cutoff={cutoff!r}."

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.mechanism import Mechanism
+from ..checks import executor as checked_executor
+from ..checks import unknown_keywords
+from .arguments import check_held_out, check_limits, effect_classes
+from .arguments import free_parameters as free_names
 from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from .evidence import ROUNDED
 from .explain import explain, find_regions, remains
@@ -18,7 +20,6 @@ from .lack_of_fit import lacks
 from .records import as_records, has_tables
 from .study import Study
 from .trial import Trial
-from .variables import default_free
 from .windows import EXACT, facts
 
 SIGNIFICANT = 20.0
@@ -56,7 +57,8 @@ def diagnose(
     candidates : sequence of str or None
         Effect ids to consider; None: the whole library.
     free : sequence of str or None
-        Parameters of the model that may be refitted; None: all that are free.
+        Parameters of the model that may be refitted, by name or by effect id, as for `refit`; None: all that
+        are free.
     executor : concurrent.futures.Executor or None
         Runs candidates side by side.
     limits : mapping or None
@@ -71,8 +73,10 @@ def diagnose(
     TypeError, ValueError
         Data that are no measurements, an unknown effect id, a model that is no block.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    checked_executor("diagnose", executor)
+    check_limits(limits)
+    candidates = effect_classes(candidates)
     began = time.perf_counter()
     if has_tables(data):
         from .frequency_diagnosis import diagnose_frequency
@@ -84,8 +88,9 @@ def diagnose(
     held = as_records(holdout, "holdout") if holdout is not None else ()
     block = block_of(model)
     free = free_names(block, free)
+    check_held_out(records, held)
     study = Study(block, records, held, free)
-    found = study.candidates(effect_classes(candidates), executor)
+    found = study.candidates(candidates, executor)
     return verdict_of(study, found, began, limits)
 
 
@@ -101,27 +106,6 @@ def block_of(model) -> Mechanism:
         f"{type(model).__name__}. "
         "Effects can only be added to ctrl_df.Mass and ctrl_df.TwoMass."
     )
-
-
-def free_names(block, free=None) -> tuple[str, ...]:
-    """Return the parameters that a refit moves."""
-    if free is None:
-        return default_free(block)
-    table = block.parameters
-    for name in free:
-        if name not in table:
-            raise ValueError(f"a free parameter must be one of {', '.join(table)}; got {name!r}.")
-    return tuple(free)
-
-
-def effect_classes(candidates: Any) -> list[Any]:
-    """Return effect classes by id or as given; None: the whole library."""
-    if candidates is None:
-        return list(effect_library().values())
-    return [
-        c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c)  # pyright: ignore[reportArgumentType]
-        for c in candidates
-    ]
 
 
 def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> Diagnosis:

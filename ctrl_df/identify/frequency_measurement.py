@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import control as ct
 import numpy as np
 
+from ..checks import positive, real_array, shown
 from . import readers
+from .text_table import refuse_text
 from .units import si_unit
 
 
@@ -51,7 +53,7 @@ class FrequencyMeasurement:
         scale_u, input_unit = si_unit(self.input_unit)
         scale_y, output_unit = si_unit(self.output_unit)
         amplitudes, omega = _axis("A", self.A), _axis("omega", self.omega)
-        table = np.array(self.N, dtype=complex)
+        table = _table(self.N)
         if table.ndim == 1 and 1 in (len(amplitudes), len(omega)):
             table = (
                 table.reshape(len(amplitudes), len(omega))
@@ -81,7 +83,7 @@ class FrequencyMeasurement:
     @classmethod
     def from_csv(
         cls, path, *, amplitude="A", omega="omega", frequency=None, real=None, imag=None, magnitude=None,
-        phase=None, delimiter=None, **keywords,
+        phase=None, delimiter=None, decimal=None, **keywords,
     ):  # fmt: skip
         """Read one measured point a row, in any order; points that are missing become NaN.
 
@@ -98,10 +100,12 @@ class FrequencyMeasurement:
         magnitude, phase : str
             columns of ``|N|`` and of its phase [deg].
         """
-        table = readers.read_csv(path, delimiter)
+        table = readers.read_csv(path, delimiter, decimal)
 
         def column(name):
-            return table[readers.find_column(table, name, str(path))[0]]
+            found = readers.find_column(table, name, str(path))[0]
+            refuse_text(table, found, str(path))
+            return table[found]
 
         if (
             (real is None) == (magnitude is None)
@@ -114,7 +118,7 @@ class FrequencyMeasurement:
             )
         n = (
             column(real) + 1j * column(imag)
-            if real
+            if real is not None
             else column(magnitude) * np.exp(1j * np.radians(column(phase)))
         )
         a = column(amplitude)
@@ -144,7 +148,7 @@ class FrequencyMeasurement:
 
     def frd(self, amplitude: float) -> ct.FrequencyResponseData:
         """Return the measured response at the amplitude nearest to `amplitude`."""
-        i = int(np.argmin(np.abs(self.A - amplitude)))
+        i = int(np.argmin(np.abs(self.A - positive("frd", "amplitude", amplitude, self.input_unit))))
         good = np.isfinite(self.N[i])
         if not np.any(good):
             raise ValueError(f"frd needs an amplitude with measured points; A = {self.A[i]:g} has none.")
@@ -160,6 +164,8 @@ class FrequencyMeasurement:
 
 
 def _noise(noise, table):
+    if np.asarray(noise).dtype.kind not in "fiu":
+        raise TypeError(f"FrequencyMeasurement needs noise as real numbers; got {shown(noise)}.")
     try:
         array = np.broadcast_to(np.asarray(noise, dtype=float), table.shape).copy()
     except ValueError:
@@ -175,8 +181,20 @@ def _noise(noise, table):
     return array
 
 
+def _table(values):
+    if isinstance(values, np.ma.MaskedArray):
+        values = np.ma.filled(values.astype(complex), np.nan)  # what is masked was not measured
+    try:
+        raw = np.asarray(values)
+    except ValueError:
+        raise ValueError("FrequencyMeasurement needs N as a table; got rows of unequal length.") from None
+    if raw.dtype.kind not in "fiuc":
+        raise TypeError(f"FrequencyMeasurement needs N as complex numbers; got {shown(values)}.")
+    return np.array(raw, dtype=complex)
+
+
 def _axis(name, values):
-    array = np.atleast_1d(np.array(values, dtype=float))
+    array = np.atleast_1d(real_array("FrequencyMeasurement", name, values)).copy()
     if array.ndim != 1 or len(array) == 0:
         raise ValueError(f"FrequencyMeasurement needs {name} as a 1-D array; got shape {array.shape}.")
     if not np.all(np.isfinite(array)) or np.any(array <= 0) or np.any(np.diff(array) <= 0):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .arguments import check_fit, free_parameters
 from .frequency_compare import comparison_of_tables, inner_block
 from .frequency_fit import FittedTable, fit_table, points_of, table_scales
 from .records import as_tables
@@ -31,7 +32,7 @@ def refit_frequency(model, data, free=None, *, start=None, budget=600, **keyword
     -------
     Fit
     """
-    from .refit import Fit, FittedParameter, _names
+    from .refit import Fit, FittedParameter
 
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
@@ -41,7 +42,8 @@ def refit_frequency(model, data, free=None, *, start=None, budget=600, **keyword
             f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got "
             f"{type(block).__name__}. Build it from ctrl_df.Mass and effects."
         )
-    names = _names(block, free)
+    names = free_parameters(block, free)
+    check_fit(block, start, True, budget)
     begun = block.with_parameters(dict(start)) if start else block
     points = points_of(records)
     found = fit_table(

@@ -6,6 +6,9 @@ import time
 from dataclasses import replace
 from typing import Any
 
+from ..checks import count, unknown_keywords
+from ..checks import executor as checked_executor
+from .arguments import check_held_out
 from .attach import attach
 from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
 from .diagnosis import NONE
@@ -41,8 +44,9 @@ def improve(
     -------
     Study
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
+    checked_executor("improve", executor)
     if has_tables(train):
         from .frequency_improve import improve_frequency
 
@@ -52,6 +56,7 @@ def improve(
     began = time.perf_counter()
     records = as_records(train, "train")
     held = as_records(holdout, "holdout") if holdout is not None else ()
+    check_held_out(records, held)
     start, classes = block_of(model), effect_classes(candidates)
     last: Any = None
     rivals: dict[str, list] = {}

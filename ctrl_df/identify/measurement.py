@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import choice, count, mapping, number, shown, unknown_keywords
 from . import derivatives, readers
 from .checks import as_channel, check_input, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
@@ -67,10 +68,11 @@ class Measurement:
     velocity_unit: str | None = None
 
     def __post_init__(self):
-        if self.input_hold not in HOLDS:
-            raise ValueError(
-                f"Measurement needs input_hold='zoh' (held) or 'linear'; got {self.input_hold!r}."
-            )
+        choice("Measurement", "input_hold", self.input_hold, HOLDS)
+        if not isinstance(self.name, str):
+            raise TypeError(f"Measurement needs name as text; got {shown(self.name)}.")
+        if self.channels is not None:
+            mapping("Measurement", "channels", self.channels, "{'current': (i, 'A')}")
         owner = f"Measurement {self.name!r}"
         t = as_channel(owner, "t", self.t)
         n = len(t)
@@ -115,40 +117,51 @@ class Measurement:
 
     @classmethod
     def from_csv(
-        cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), delimiter=None, **keywords
-    ):
+        cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), delimiter=None,
+        decimal=None, **keywords,
+    ):  # fmt: skip
         """Read a text table with a header line.
+
+        Read rightly, or refused with the line that is wrong: UTF-8, UTF-16 or Latin-1; units in the header or
+        in a row below it; decimal commas; thousands marks; times as numbers, ISO (``2026-01-31T12:00:00.5``)
+        or clock times (``12:00:00.5``), the last two in seconds from the first.
 
         Parameters
         ----------
         path : path-like
-            Comma, semicolon, tab or blank separated; lines starting with ``#`` are skipped. A semicolon
-            table may use decimal commas.
+            Comma, semicolon, tab or blank separated; lines starting with ``#`` are skipped.
         time, input, output, velocity : str or int
             Column names, or numbers from 0. A unit in the header, as in ``x [mm]``, is used unless one is
             given, and need not be repeated in the name.
         channels : sequence of str
             Further columns to keep.
         delimiter : str or None
-            None: found from the first line.
+            None: found from the first lines.
+        decimal : {'.', ','} or None
+            Decimal mark; None: as the numbers show it.
         **keywords
             As for `Measurement`: ``name``, ``input_unit``, ``output_unit``, ``time_unit``, ``input_hold`` ...
 
         Raises
         ------
         ValueError
-            An unknown column (the message lists those there are) or a cell that is no number (with its line).
+            An unknown column (the message lists those there are), one column asked for twice, a cell that
+            is no number (with its line), a file that is no text.
         """
-        table = readers.read_csv(path, delimiter)
+        cls._check_keywords(keywords)
+        table = readers.read_csv(path, delimiter, decimal)
         keywords.setdefault("name", readers.stem(path))
         return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
 
     @classmethod
     def from_mat(cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), **keywords):
-        """Read variables of a MATLAB file (version 4 to 7.2); ``data.x`` reaches into a struct.
+        """Read variables of a MATLAB file (version 4 to 7.2).
+
+        ``data.x`` reaches into a struct, ``data.0`` is the first column of a matrix.
 
         See `from_csv` for the parameters.
         """
+        cls._check_keywords(keywords)
         table = readers.read_mat(path)
         keywords.setdefault("name", readers.stem(path))
         return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
@@ -161,6 +174,7 @@ class Measurement:
 
         See `from_csv` for the parameters.
         """
+        cls._check_keywords(keywords)
         table = readers.read_dataframe(frame, time)
         time = readers.INDEX if time is None else time
         return cls(
@@ -174,10 +188,16 @@ class Measurement:
         The input of python-control's simulations runs straight between samples: ``input_hold='linear'``
         unless told otherwise.
         """
+        cls._check_keywords(keywords)
         t, u, y = readers.read_response(response, input, output)
         keywords.setdefault("input_hold", "linear")
         keywords.setdefault("name", getattr(response, "sysname", None) or "response")
         return cls(t, u, y, **keywords)
+
+    @classmethod
+    def _check_keywords(cls, keywords):
+        known = [f.name for f in dataclasses.fields(cls) if f.name not in ("t", "u", "y")]
+        unknown_keywords([k for k in keywords if k not in known])
 
     # --- what it is -------------------------------------------------------------------------------
 
@@ -232,8 +252,8 @@ class Measurement:
 
     def slice(self, start=None, stop=None) -> Measurement:
         """Return the samples with ``start <= t <= stop`` [s]; at least 10 must remain."""
-        low = self.t[0] if start is None else float(start)
-        high = self.t[-1] if stop is None else float(stop)
+        low = self.t[0] if start is None else number("slice", "start", start, "s", infinite=True)
+        high = self.t[-1] if stop is None else number("slice", "stop", stop, "s", infinite=True)
         margin = 1e-9 * max(self.dt, abs(low), abs(high))
         first = int(np.searchsorted(self.t, low - margin, "left"))
         last = int(np.searchsorted(self.t, high + margin, "right"))
@@ -259,14 +279,20 @@ class Measurement:
         tuple of Measurement
             Of `length` each; what is left at the end joins the last one.
         """
+        length, overlap = number("windows", "length", length, "s"), number("windows", "overlap", overlap)
         if not 0 <= overlap < 1:
             raise ValueError(f"windows needs 0 <= overlap < 1 (share of a window); got overlap={overlap!r}.")
         if not length > 9 * self.dt:
             raise ValueError(
                 f"windows needs a length over 9 samples ({9 * self.dt:g} s); got length={length!r}."
             )
-        count = max(int((self.duration - length) / (length * (1 - overlap)) + 1 + 1e-9), 1)
-        starts = self.t[0] + length * (1 - overlap) * np.arange(count)
+        if not length * (1 - overlap) > 0.5 * self.dt:
+            raise ValueError(
+                f"windows needs an overlap that moves on by a sample at least; got overlap={overlap!r} of "
+                f"{length:g} s. Lower it."
+            )
+        number_of = max(int((self.duration - length) / (length * (1 - overlap)) + 1 + 1e-9), 1)
+        starts = self.t[0] + length * (1 - overlap) * np.arange(number_of)
         edges = np.searchsorted(self.t, starts - 1e-9 * self.dt)
         ends = np.searchsorted(self.t, starts + length - 1e-9 * self.dt)
         ends[-1] = len(self.t)
@@ -285,9 +311,7 @@ class Measurement:
         ValueError
             Irregular sampling, a factor that is no integer >= 1, or fewer than 10 samples left.
         """
-        if factor != int(factor) or factor < 1:
-            raise ValueError(f"decimate needs an integer factor >= 1; got factor={factor!r}.")
-        factor = int(factor)
+        factor = count("decimate", "factor", factor)
         if not self.regular:
             raise ValueError(
                 "decimate needs regular sampling; these intervals differ by more than 1 %. Resample first."

@@ -17,7 +17,7 @@ def has_tables(data) -> bool:
 
 def as_tables(data, name: str = "data") -> tuple[FrequencyMeasurement, ...]:
     """Return tables as a tuple; TypeError for anything else, records over time among them included."""
-    records = (data,) if isinstance(data, FrequencyMeasurement) else tuple(data)
+    records = tuple(data) if isinstance(data, Iterable) else (data,)
     bad = [r for r in records if not isinstance(r, FrequencyMeasurement)]
     if bad or not records:
         got = f"also {type(bad[0]).__name__}" if bad else "an empty sequence"

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
+from ..checks import unknown_keywords
+from .arguments import check_fit, check_window, free_parameters
 from .candidate import Candidate, fit_candidate, fit_windows
 from .compare import Comparison, comparison_of
 from .ready import REFERENCE
@@ -163,13 +165,13 @@ def refit(
     ----------
     Bock (1983), multiple shooting; Golub & Pereyra (1973), variable projection; Ljung (1999), sec. 9.4.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
     if has_tables(data):
         from .frequency_refit import refit_frequency
 
         return refit_frequency(model, data, free, start=start, budget=budget)
     records = as_records(data)
+    check_window(records, mode, window)
     fitted = _fitted_model(model, records)
     block = Simulator(fitted, records[0]).block
     if not hasattr(block, "with_parameters") or not hasattr(block, "parameters"):
@@ -177,7 +179,8 @@ def refit(
             f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got "
             f"{type(block).__name__}. Build it from ctrl_df.Mass and effects."
         )
-    names = _names(block, free)
+    names = free_parameters(block, free)
+    check_fit(block, start, robust, budget)
     start_values = {**{k: block.parameters[k].value for k in names}, **dict(start or {})}
     settings: dict[str, Any] = dict(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
@@ -244,26 +247,12 @@ def _as_given(model, fitted):
     return fitted
 
 
-def _names(block, free) -> tuple[str, ...]:
-    if free is None:
-        return default_free(block)
-    wanted = [free] if isinstance(free, str) else list(free)
-    table, names = block.parameters, []
-    for name in wanted:
-        group = [k for k in table if k.startswith(f"{name}.")] if name not in table else [name]
-        group = [k for k in group if table[k].free or k == name]
-        if not group:
-            raise ValueError(f"free needs names out of {', '.join(table)}; got {name!r}.")
-        names += [k for k in group if k not in names]
-    return tuple(names)
-
-
 def _with_steps(found: Candidate, records, block, free) -> Candidate:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
     from .derivatives import step_of
 
     key = "sensor_quantization.step"
-    if key not in block.parameters or (free is not None and key not in _names(block, free)):
+    if key not in block.parameters or (free is not None and key not in free_parameters(block, free)):
         return found
     steps = [step_of(r.y) for r in records]
     if min(steps) > 0:

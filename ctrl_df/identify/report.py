@@ -6,8 +6,9 @@ import base64
 import html
 import io
 import math
-from pathlib import Path
 from string import Template
+
+from ..checks import place_to_write
 
 _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
@@ -86,12 +87,10 @@ def write_report(study, path) -> str:
 
     Raises
     ------
-    ValueError
-        The folder does not exist.
+    OSError
+        The folder does not exist, or the file cannot be written; said before any picture is drawn.
     """
-    target = Path(path)
-    if not target.parent.exists():
-        raise ValueError(f"report needs a folder that exists; got {str(target.parent)!r}. Create it first.")
+    target = place_to_write("report", "path", path)
     target.write_text(render(study), encoding="utf-8")
     return str(target)
 

@@ -206,7 +206,8 @@ def near_folds(cycles):
     """Grade down pairs of predictions that come together as their harmonics are fed back.
 
     Near a fold the distance of two solutions goes with the square root of what is missing to it: from d0 as
-    predicted and d1 with all harmonics, the two merge at ``1 / (1 - (d1 / d0)^2)`` times the harmonics there are.
+    predicted and d1 with all harmonics, the two merge at ``1 / (1 - (d1 / d0)^2)`` times the harmonics there
+    are.
     """
     out = list(cycles)
     for i, one in enumerate(cycles):

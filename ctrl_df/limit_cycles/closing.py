@@ -103,9 +103,9 @@ class Closing:
     def trace(self, x0, period: float) -> Orbit:
         """Let what is missing to a closed lap shrink little by little, from a state near the orbit.
 
-        ``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1. At
-        share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns back to 1
-        first, the orbit and its neighbour have merged: there is none near (`Merged`).
+        ``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1.
+        At share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns
+        back to 1 first, the orbit and its neighbour have merged: there is none near (`Merged`).
 
         References
         ----------
@@ -315,7 +315,8 @@ def _tangent(J, along):
 def _round_corner(equations, y, border, step, tolerance):
     """Go on beyond a corner of the path, where an event begins or ends to take part and the Jacobian jumps.
 
-    The path beyond is a tangent of the Jacobian there; of its two directions the one is right that stays there.
+    The path beyond is a tangent of the Jacobian there; of its two directions the one is right that stays
+    there.
     """
     try:
         _, before = equations(y - step * border)

@@ -8,12 +8,14 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import unknown_keywords
 from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine
 from ..simulate.loop import answers_at_once
 from ..status import Status
 from .answer import responder
+from .arguments import check_search, checked_guess
 from .closing import Centre, Closing, Merged, NoClosure
 from .fate import Explorer
 from .forced_start import harmonic_start
@@ -41,10 +43,10 @@ def find_limit_cycle(
         first output is taken as the output and the last one as the block's input.
     guess : LimitCycle, Orbit, (amplitude, omega), state array, or None
         Where to start. From a prediction, or an amplitude at the block's input and a frequency [rad/s], the
-        harmonics that the describing function drops are fed back little by little until none is missing, which
-        reaches unstable orbits as well as stable ones; a state is closed as it stands, then simulated. None
-        simulates from starts of several sizes, closes what they settle to and what stands between starts of
-        different fate, and returns the first orbit found, stable ones first.
+        harmonics that the describing function drops are fed back little by little until none is missing,
+        which reaches unstable orbits as well as stable ones; a state is closed as it stands, then simulated.
+        None simulates from starts of several sizes, closes what they settle to and what stands between starts
+        of different fate, and returns the first orbit found, stable ones first.
     max_iterations : int
         Bound on Newton steps.
     search_time : float
@@ -55,8 +57,8 @@ def find_limit_cycle(
     Returns
     -------
     Orbit or NoOrbit
-        An orbit whose ``note`` says if it is another one than the guess speaks of; or the false `NoOrbit`, whose
-        ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
+        An orbit whose ``note`` says if it is another one than the guess speaks of; or the false `NoOrbit`,
+        whose ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
 
     Raises
     ------
@@ -64,8 +66,12 @@ def find_limit_cycle(
         A pure delay stands in the loop: its state is a whole history, no vector that Newton could move. Its
         motion is found by simulation: `event_response`, or `verify`, whose rows tell what it settles to.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    check_search(
+        "find_limit_cycle", max_iterations=max_iterations, search_time=search_time,
+        raise_on_failure=raise_on_failure,
+    )  # fmt: skip
+    guess = checked_guess(loop, guess)
     finder = OrbitFinder(loop, max_iterations)
     if finder.engine.delayed:
         raise ValueError(

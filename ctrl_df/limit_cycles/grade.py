@@ -18,7 +18,7 @@ SENSITIVITY = (6.0, 40.0)  # relative change of a for a relative error of N
 BAND = (0.15, 0.7)  # half width of the amplitude band, in ln a
 LOEB = 0.02  # sine of the angle between the curves below which Loeb's sign means nothing
 
-_IRREGULAR = ("aperiodic", "subharmonic", "diverged", "work limit", "stuck", "free")
+_IRREGULAR = ("aperiodic", "subharmonic", "diverged", "work limit", "stuck", "free", "resonance", "unstable")
 
 
 class Sensitivity(NamedTuple):
@@ -69,7 +69,8 @@ class LimitCycle:
     regime : str
         What the block does there.
     path : Path or None
-        The way from this solution to the cycle with all its harmonics, where the block's answer to them is known.
+        The way from this solution to the cycle with all its harmonics, where the block's answer to them is
+        known.
     corrected : tuple of float or None
         (amplitude, omega) with the fed-back harmonics taken into account, where that path leads so far.
     bound : tuple or None

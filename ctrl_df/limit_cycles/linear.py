@@ -8,6 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import is_number, number, real_array, shown
+
 _SMOOTH_STEP = 0.5 * math.pi  # largest phase step between data points for which their phase is followed [rad]
 
 
@@ -28,8 +30,8 @@ class LinearPart:
     """
 
     def __init__(self, H):
-        if isinstance(H, int | float | np.integer | np.floating):
-            H = ct.tf([float(H)], [1.0])
+        if is_number(H):
+            H = ct.tf([number("describing_function_response", "H", H)], [1.0])
         if not isinstance(H, ct.TransferFunction | ct.StateSpace | ct.FrequencyResponseData):
             raise TypeError(
                 f"H must be a linear system (transfer function, state space or FRD); got {type(H).__name__}. "
@@ -97,17 +99,21 @@ class LinearPart:
         if omega is None:
             return self._own_grid(points)
         is_range = isinstance(omega, list | tuple) and len(omega) == 2
-        values = np.unique(np.atleast_1d(np.asarray(omega, dtype=float)))
+        values = np.unique(np.atleast_1d(real_array("describing_function_response", "omega", omega, "rad/s")))
         if values.ndim != 1 or values.size == 0:
             raise ValueError(
                 "omega needs at least one frequency [rad/s]; got none. Leave it out to scan by default."
             )
-        if not np.isfinite(values).all() or (values < 0).any():
+        if (values < 0).any():
             raise ValueError(
                 f"omega must be positive and finite [rad/s]; got {values.min():g} to {values.max():g}."
             )
         if values[0] == 0:  # python-control starts some of its contours at zero, where no cycle can be
             values = values[1:] if not is_range else np.array([1e-3 * values[-1], values[-1]])
+        if not values.size or values[-1] == 0:
+            raise ValueError(
+                f"omega must be positive and finite [rad/s]; got {shown(omega)}. A range is [low, high]."
+            )
         if is_range and values.size == 2:
             values = np.geomspace(values[0], values[1], points)
         if self.measured:

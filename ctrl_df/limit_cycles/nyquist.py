@@ -38,7 +38,7 @@ def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
     elif isinstance(omega, list | tuple) and len(omega) == 2:
         omega = linear.grid(omega, 1000)
     elif omega is not None:
-        omega = linear.grid(np.asarray(omega, dtype=float).reshape(-1))
+        omega = linear.grid(np.asarray(omega).reshape(-1))
         omega = refined_omega(linear, omega, most=1000)  # the drawn curve passes through the crossings
     if omega is None and not linear.proper:  # its contour never closes: draw what is scanned
         omega, warn = linear.grid(), False

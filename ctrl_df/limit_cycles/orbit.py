@@ -101,8 +101,8 @@ class NoOrbit:
     Attributes
     ----------
     status : Status
-        NOT_FOUND: nothing was reached, which proves nothing. NO_SUCH_ORBIT: the prediction was shown to belong
-        to no orbit. CENTRE: motions of every size repeat, none of them a limit cycle.
+        NOT_FOUND: nothing was reached, which proves nothing. NO_SUCH_ORBIT: the prediction was shown to
+        belong to no orbit. CENTRE: motions of every size repeat, none of them a limit cycle.
     tried : tuple of Try
         Every start, and what it came to.
     """

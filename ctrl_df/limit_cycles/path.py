@@ -1,10 +1,11 @@
 """The way from a describing function's solution to the cycle with all its harmonics.
 
 A describing function drops the harmonics that H returns to the block's input. Here a share of them is fed
-back, ``u = a cos(omega t) + Re sum U_k exp(j k omega t)`` with ``U_k = -share H(j k omega) Y_k(u)`` for k other
-than 1, and ``1 + H(j omega) Y_1(u) / a = 0``: share 0 is the prediction, share 1 the cycle (up to the harmonics
-kept). The solutions form a curve, followed by its arclength, which passes folds. Where the curve comes back
-to share 0 it ends on another prediction: the two have merged on the way, and no cycle belongs to either.
+back, ``u = a cos(omega t) + Re sum U_k exp(j k omega t)`` with ``U_k = -share H(j k omega) Y_k(u)`` for k
+other than 1, and ``1 + H(j omega) Y_1(u) / a = 0``: share 0 is the prediction, share 1 the cycle (up to the
+harmonics kept). The solutions form a curve, followed by its arclength, which passes folds. Where the curve
+comes back to share 0 it ends on another prediction: the two have merged on the way, and no cycle belongs to
+either.
 
 References
 ----------

@@ -22,8 +22,9 @@ _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
 _BEYOND = 10.0  # times the largest kick's first swing: growth at a steady ratio from there has no bound
 _GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
-# Change of the swings from the third to the last quarter of a course below which they keep their size, and the
-# share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if quadratic).
+# Change of the swings from the third to the last quarter of a course below which they keep their size, and
+# the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
+# quadratic).
 _STEADY, _LASTING_GROWTH, _LASTING_DECAY = 1.25, 0.5, 0.9
 
 RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"

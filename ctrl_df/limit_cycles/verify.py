@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import unknown_keywords
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
+from .arguments import check_search
 from .fate import Fate
 from .finder import SAME_CYCLE, OrbitFinder
 from .grade import LimitCycle
@@ -23,7 +25,8 @@ DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simu
 
 _UNHELD = "Newton from the motion it stands on closes no orbit near"
 
-# Within 5 % in frequency and amplitude a prediction is called confirmed; beyond that it is the same cycle, shifted.
+# Within 5 % in frequency and amplitude a prediction is called confirmed; beyond that it is the same cycle,
+# shifted.
 CONFIRMED_WITHIN = 0.05
 
 
@@ -41,8 +44,8 @@ class Row:
     simulated : tuple of (omega, output amplitude) or None
         What a simulation started beside the orbit settles to; None where it leaves (an unstable orbit).
     verdict : str
-        ``confirmed``, ``shifted``, ``no such orbit`` (shown), ``not found`` (which shows nothing), ``missed by the
-        describing function``, ``not tested``.
+        ``confirmed``, ``shifted``, ``no such orbit`` (shown), ``not found`` (which shows nothing), ``missed
+        by the describing function``, ``not tested``.
     why : str
         What the verdict rests on where there is no exact orbit to rest on: with which prediction this one
         merges, or what was tried and how each try ended.
@@ -177,13 +180,13 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     Returns
     -------
     Check
-        ``.rows``, ``.table()``, ``.orbits``, ``.fate``. Where the loop cannot be simulated (H is measured points,
-        or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure delay,
-        whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why`` tells how.
-        An unstable cycle cannot be seen that way and stays ``not tested``.
+        ``.rows``, ``.table()``, ``.orbits``, ``.fate``. Where the loop cannot be simulated (H is measured
+        points, or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure
+        delay, whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why``
+        tells how. An unstable cycle cannot be seen that way and stays ``not tested``.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    check_search("verify", search_time=search_time, search=search)
     if not hasattr(resp, "limit_cycles"):
         raise TypeError(
             f"verify needs the answer of describing_function_response; got {type(resp).__name__}. "

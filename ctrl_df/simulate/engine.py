@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import Any
 
 import control as ct
@@ -16,6 +17,12 @@ from .pack import pack
 
 RTOL = 1e-9
 """Default relative tolerance; the absolute one is a thousandth of it."""
+
+_CHUNK_TIME = 0.2
+"""Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed."""
+_FIRST_CHUNK = 10_000  # steps of a small system until the pace is known
+_FAR = 1e50  # a state beyond has run away: NaN is then no mistake of a law
+_MOST_OUTPUTS = 100_000  # recorded in one go
 
 _STATUS = {
     driver.DONE: Status.CONVERGED,
@@ -182,8 +189,8 @@ class Engine:
         order : {8, 5}
             Runge-Kutta order; 5 is faster where inputs are sampled finely.
         rtol, atol : float
-            Error tolerances of a step: relative to the running size of each state, and (default 0) absolute, in
-            the units of the states.
+            Error tolerances of a step: relative to the running size of each state, and (default 0) absolute,
+            in the units of the states.
         locate : bool
             False integrates on in the fixed mode, events ignored.
         stop_at_event : bool
@@ -198,6 +205,13 @@ class Engine:
             Events kept between returns to Python; all are returned. 1: none kept.
         spectrum : (ny, kmax + 1) complex array
             Receives (is added) the integrals of the outputs against exp(-j k omega t).
+
+        Raises
+        ------
+        RuntimeError
+            A user-written law or system raised (its exception is the cause), or returned NaN.
+        KeyboardInterrupt
+            Ctrl-C, within a fraction of a second.
         """
         atol = 0.0 if atol is None else atol
         height = max(rtol, 1e-10) if height is None else height
@@ -219,6 +233,10 @@ class Engine:
         kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         fresh = int(now.fresh)
         pointers.raised.clear()
+        pointers.gave_nan.clear()
+        memo = self._space[-2]
+        memo[2] = 0.0
+        chunk = max(int(_FIRST_CHUNK / (1 + (self.nstates / 6) ** 2)), 10)
         past = history.stored(self.program, self._space[0][0])
         if self.delayed and not fresh:
             if now.history is None:
@@ -228,23 +246,36 @@ class Engine:
                 )
             past[:] = now.history
         while True:
-            room = max_steps - int(clock[3])
-            chunk = min(room, 1_000_000)
-            reason = driver.run(
-                self.program, drive, clock, now.x, now.mode, t_end, times, xout, yout, order, rtol, atol,
-                max_step, locate, stop_at_event, watch, level, -direction, height, chunk, log_t, log_n, log_k,
-                before, scale, fresh, self._space, spectrum, omega,
-            )  # fmt: skip
+            # Python sees Ctrl-C between the chunks only: none may take long
+            began = perf_counter()
+            until = t_end
+            if len(times) - int(clock[1]) > _MOST_OUTPUTS:
+                until = min(t_end, times[int(clock[1]) + _MOST_OUTPUTS])
+            with pointers.interruptible():
+                reason = driver.run(
+                    self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order, rtol, atol,
+                    max_step, locate, stop_at_event, watch, level, -direction, height,
+                    min(max_steps - int(clock[3]), chunk), log_t, log_n, log_k, before, scale, fresh,
+                    self._space, spectrum, omega,
+                )  # fmt: skip
+            pointers.raise_kept()
+            pace = _CHUNK_TIME / max(perf_counter() - began, 1e-6)
+            chunk = max(int(chunk * min(max(pace, 0.05), 4.0)), 10)
             fresh = 0
             used = min(int(clock[5]), len(log_t))
             if log > 1 and used:
                 kept.append((log_t[:used].copy(), log_n[:used].copy(), log_k[:used].copy()))
-            if reason == driver.FULL or (reason == driver.STEPS and int(clock[3]) < max_steps):
+            if (
+                reason == driver.FULL
+                or (reason == driver.STEPS and int(clock[3]) < max_steps)
+                or (reason == driver.DONE and until < t_end)
+            ):
+                memo[2] = 1.0  # the same run goes on: so does its count of events without progress
                 continue
             break
         status = _STATUS[reason]
-        if pointers.raised:
-            status = Status.USER_ERROR
+        if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < _FAR:
+            raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
         events: Any = (
             tuple(np.concatenate(c) for c in zip(*kept, strict=True))
             if kept

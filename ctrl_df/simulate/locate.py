@@ -109,8 +109,8 @@ def renewed(prog, mode, scale, node):
     """Begin the scales of margins anew after an event of `node` (-1: of those alone whose quantity changed).
 
     One margin is a speed while its body slides and a force while it sticks, a distance over a gap and a force
-    in contact. Rows of `scale` (4, ng): size of each margin in its present mode, the largest ever of either of
-    its two quantities, and which of the two rows is the present one.
+    in contact. Rows of `scale` (4, ng): size of each margin in its present mode, the largest ever of either
+    of its two quantities, and which of the two rows is the present one.
     """
     for n in range(prog.nodes.shape[0]):
         kind, go, mo = prog.nodes[n, KIND], prog.nodes[n, G], prog.nodes[n, MODE]

@@ -9,8 +9,10 @@ import control as ct
 import numpy as np
 
 from ..blocks.element import Element
+from ..blocks.linearization import warn_of_mechanism
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter
+from ..checks import is_number, number, returned, shown, system_name
 from .sampled import Sampled
 
 
@@ -21,6 +23,21 @@ class LoopParts:
     controller: Any
     block: ct.NonlinearIOSystem
     dt: float
+
+
+class ClosedLoop(ct.InterconnectedSystem):
+    """A loop of `closed_loop`; its linearization warns where its mechanism has none."""
+
+    parts: LoopParts
+
+    def linearize(self, x0, u0=None, t=0, params=None, eps=1e-6, copy_names=False, **kwargs):
+        """Linearize the compliant form; see `ct.linearize`."""
+        block, before = self.syslist[1], self.syslist[0].nstates or 0
+        if isinstance(block, Mechanism):
+            x = np.atleast_1d(np.asarray(getattr(x0, "states", x0), dtype=float)).ravel()
+            x = x[before:] if x.size > 1 else x
+            warn_of_mechanism(block.core, block.effects, x, self.parts.block.name)
+        return super().linearize(x0, u0, t, params, eps, copy_names, **kwargs)
 
 
 def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> ct.InterconnectedSystem:
@@ -55,11 +72,16 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
         MIMO controller, improper controller without a velocity to act on, sample times that differ, algebraic
         loop.
     """
+    system_name("closed_loop", name)
     block = _as_block(block)
     controller = _as_lti(pid)
+    dt = 0.0 if dt is None else number(
+        "closed_loop", "dt", dt, "s", lower=0.0, meaning="sample time of the controller",
+        remedy="Use dt=0 for a continuous controller.",
+    )  # fmt: skip
     if controller.isdtime(strict=True):
         own = float(controller.dt)
-        if dt not in (0, None) and not np.isclose(own, dt):
+        if dt != 0 and not np.isclose(own, dt):
             raise ValueError(
                 f"closed_loop got dt={dt} for a controller with dt={own}; leave dt out, or make them equal."
             )
@@ -93,6 +115,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
         warn_duplicate=False,
         check_unused=False,
     )
+    loop.__class__ = ClosedLoop  # python-control's interconnect makes no other
     loop.parts = LoopParts(pid, block, float(dt or 0))
     return loop
 
@@ -149,7 +172,7 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
         if callable(block):
             static: Any = block
             return ct.NonlinearIOSystem(
-                None, lambda t, x, u, params: np.array([float(static(u[0]))]),
+                None, lambda t, x, u, params: np.array([_one_number(static(u[0]), u[0])]),
                 inputs=["u"], outputs=["y"], name="nonlinearity",
             )  # fmt: skip
         raise TypeError(
@@ -160,27 +183,51 @@ def _as_block(block: Any) -> ct.NonlinearIOSystem:
     return block
 
 
+def _one_number(y, u) -> float:
+    value = np.squeeze(y) if isinstance(y, np.ndarray) else y
+    if not returned(value):
+        raise TypeError(f"a static law must return one real number; got {shown(y)} at u = {u:g}.")
+    return float(value)
+
+
 def _as_lti(pid) -> Any:
     if isinstance(pid, ct.FrequencyResponseData):
         raise ValueError(
             "closed_loop cannot run measured frequency points (FRD) in time; fit a transfer function first."
         )
-    if isinstance(pid, int | float):
-        pid = ct.tf([float(pid)], [1.0])
+    if is_number(pid):
+        pid = ct.tf([number("closed_loop", "pid", pid)], [1.0])
     if not isinstance(pid, ct.TransferFunction | ct.StateSpace):
         raise TypeError(
             f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}."
         )
     if not pid.issiso():
         raise ValueError(
-            f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs."
+            f"closed_loop needs a SISO controller; got {pid.ninputs} inputs and {pid.noutputs} outputs. "
+            "Select one channel, pid[i, j]."
         )
+    parts = (pid.num[0][0], pid.den[0][0]) if isinstance(pid, ct.TransferFunction) else _matrices(pid)
+    for part in parts:
+        if not np.isfinite(part).all() or np.iscomplexobj(part):
+            raise ValueError(
+                f"closed_loop needs a controller with real, finite coefficients; got {shown(part)}. "
+                "Correct the model."
+            )
     return pid
 
 
+def _matrices(system):
+    return system.A, system.B, system.C, system.D
+
+
 def _label(block, output) -> str:
-    if isinstance(output, str):
-        if output not in block.output_labels:
-            raise ValueError(f"output must be one of {', '.join(block.output_labels)}; got {output!r}.")
+    labels = list(block.output_labels)
+    if isinstance(output, str) and output in labels:
         return output
-    return block.output_labels[output]
+    if isinstance(output, int | np.integer) and not isinstance(output, bool) and 0 <= output < len(labels):
+        return labels[int(output)]
+    named = isinstance(output, str) or (is_number(output) and not isinstance(output, float))
+    raise (ValueError if named else TypeError)(
+        f"closed_loop needs output out of {', '.join(labels)}, or a number from 0 to {len(labels) - 1}; got "
+        f"{shown(output)}."
+    )

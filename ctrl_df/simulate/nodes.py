@@ -20,8 +20,9 @@ from ..blocks.effects import (
     Viscous,
 )
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
+from ..checks import returned, shown
 from . import layout as L
-from .pointers import address, callback
+from .pointers import address, callback, gave_nan
 
 _JOINT = {None: L.J_NONE, RIGID: L.J_RIGID, IMPACT: L.J_IMPACT, ELASTIC: L.J_ELASTIC}
 # between events these are affine in place and speed; of a law not known here nothing is assumed
@@ -122,8 +123,15 @@ def user_node(system, x0):
         wanted = nx if what == 1 else ny
         if len(values) != wanted:
             raise ValueError(f"{system.name} must return {wanted} values; got {len(values)}.")
+        good = True
         for i, v in enumerate(values):
+            if not returned(v):
+                raise TypeError(f"{system.name} must return real numbers; got {shown(v)} at t = {t:g}.")
             target[i] = float(v)
+            good = good and v == v
+        if not good and np.isfinite(xs).all() and np.isfinite(us).all():
+            # a shorter step may pass beside it: an error only where the run ends here
+            gave_nan[:] = [f"{system.name} returned NaN at t = {t:g}, x = {xs}, u = {us}"]
 
     pointer, keep = callback(call, "system")
     feed = 1 if nx == 0 else int(_has_feedthrough(output, nx, nu, params))

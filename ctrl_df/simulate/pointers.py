@@ -2,14 +2,18 @@
 
 A law is a plain Python function. `address` compiles it (cached beside its file where possible) and returns
 the address of the machine code; the engine, compiled once, calls through that address. What numba cannot
-compile is called back in Python, slower but with the same result.
+compile is called back in Python, slower but with the same result. What it raises
+may not cross machine code: it is kept, and raised again by `raise_kept` once the machine code has returned.
 """
 
 from __future__ import annotations
 
 import ctypes
+import signal
+import threading
 import weakref
 from collections.abc import Callable
+from contextlib import contextmanager
 from typing import Any
 
 import numba
@@ -17,6 +21,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from ..status import Status
 from .compiled import cfunc
 
 _D, _P = types.float64, types.CPointer(types.float64)
@@ -42,6 +47,8 @@ _CALLBACKS = {
 _compiled: weakref.WeakKeyDictionary[Callable, tuple[Any, object]] = weakref.WeakKeyDictionary()
 raised: list[BaseException] = []
 """Exceptions of laws called back in Python, newest last; the engine sees them as NaN."""
+gave_nan: list[str] = []
+"""Which law returned NaN last, and where, from numbers that were finite."""
 
 
 def address(law: Callable, kind: str) -> int:
@@ -62,20 +69,83 @@ def _compile(law, kind):
 
 def callback(function: Callable, kind: str) -> tuple[int, object]:
     """Return (address, keep-alive object) of a Python function called back from the engine."""
-
-    def guarded(*args):
-        try:
-            return function(*args)
-        except BaseException as error:  # noqa: BLE001 - no exception may cross machine code
-            raised.append(error)
-            if kind == "input":
-                args[1][0] = float("nan")
-            elif kind == "system":
-                args[3][0] = args[4][0] = float("nan")
-            return float("nan")
-
-    c = _CALLBACKS[kind](guarded)
+    c = _CALLBACKS[kind](_Guarded(function, kind))
     return ctypes.cast(c, ctypes.c_void_p).value or 0, c
+
+
+class _Guarded:
+    """A function as machine code calls it: what it raises is kept, and NaN is handed back."""
+
+    made = False  # whether there is any; without one Ctrl-C needs no care
+
+    def __init__(self, function: Callable, kind: str):
+        self.function, self.kind, self.overflown = function, kind, False
+        _Guarded.made = True
+
+    def __call__(self, *args):
+        try:
+            if not interrupted():
+                value = self.function(*args)
+                self.overflown = False
+                return value
+        except OverflowError as error:
+            # a state that runs away leaves the range of floats: divergence, no mistake of the law
+            self.overflown = True
+            if self.kind == "input":
+                raised.append(error)
+        except BaseException as error:  # noqa: BLE001 - no exception may cross machine code
+            if not (self.overflown and isinstance(error, ValueError | ArithmeticError)):
+                raised.append(error)
+        if self.kind == "input":
+            args[1][0] = float("nan")
+        elif self.kind == "system":
+            args[3][0] = args[4][0] = float("nan")
+        return float("nan")
+
+
+def interrupted() -> bool:
+    """Whether Ctrl-C came while machine code was calling back."""
+    return bool(raised) and isinstance(raised[-1], KeyboardInterrupt)
+
+
+def raise_kept() -> None:
+    """Raise what a law called back has raised: Ctrl-C as it is, anything else as one RuntimeError."""
+    if not raised:
+        return
+    error = next((e for e in raised if not isinstance(e, Exception)), raised[0])
+    raised.clear()
+    if not isinstance(error, Exception):
+        raise error
+    raise RuntimeError(f"{Status.USER_ERROR} ({error!r}).") from error
+
+
+@contextmanager
+def interruptible():
+    """Keep a Ctrl-C that arrives on the very threshold of a function called back.
+
+    Python acts on signals as it enters a function. Where machine code has just called it, nobody could catch
+    the exception that is raised there: ctypes would print and drop it. Such a signal is kept as if the
+    function itself had raised it; any other is raised where it meets Python.
+    """
+    mine = (
+        _Guarded.made
+        and threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
+    if mine:
+        signal.signal(signal.SIGINT, _keep_or_raise)
+    try:
+        yield
+    finally:
+        if mine:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _keep_or_raise(number, frame):
+    if frame is not None and frame.f_code is _Guarded.__call__.__code__:
+        raised.append(KeyboardInterrupt())
+    else:
+        signal.default_int_handler(number, frame)
 
 
 def _call(builder, returns, address_value, values, is_pointer):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import control as ct
 import numpy as np
 
+from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
 from ..status import Status
-from . import pointers
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
 
 
@@ -71,10 +72,11 @@ def event_response(
     input_hold : {'linear', 'zoh'}
         How samples are read between the times.
     rtol, atol : float
-        Tolerances of the integration, relative to the running size of each state, and, if asked, absolute in the units
-        of the states.
+        Tolerances of the integration, relative to the running size of each state: 1e-14 <= rtol <= 0.1, and,
+        if asked, absolute in the units of the states: atol > 0.
     max_step : float
-        Longest step [s]. Needed only where a callable input has features shorter than five time points.
+        Longest step [s], > 0; inf: no bound. Needed only where a callable input has features shorter than
+        five time points.
     max_steps : int
         Bound on the work.
     keep_events : bool
@@ -89,26 +91,30 @@ def event_response(
     Raises
     ------
     ValueError
-        Times not ascending, wrong shapes, NaN, an initial state inside a stop or outside a gap, algebraic
-        loops.
+        Times not ascending, wrong shapes, NaN, tolerances or steps that are not positive, an initial state
+        inside a stop or outside a gap, algebraic loops.
+    TypeError
+        Text, complex numbers or truth values in the place of numbers; unknown keywords.
+    RuntimeError
+        A user-written law or input raised, or returned NaN; its exception is the cause.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    unknown_keywords(keywords)
+    for name, value in dict(keep_events=keep_events, return_states=return_states, squeeze=squeeze).items():
+        if value is not None:
+            flag("event_response", name, value)
     times = _times(timepts)
+    limits = _limits(rtol, atol, max_step, max_steps, float(times[-1] - times[0]))
     engine = Engine(_with_params(sys, params))
     system = engine.system
     x0 = _initial(system, initial_state)
     check_positions(system, x0)
     drive, samples, keep = _drive(inputs, engine.ninputs, times, input_hold)
-    if max_step is None:
-        max_step = 5 * float(np.median(np.diff(times))) if callable(inputs) else np.inf
+    if max_step is None and callable(inputs):
+        limits["max_step"] = 5 * float(np.median(np.diff(times)))
     run = engine.run(
-        engine.start(x0, times[0]), times[-1], drive, times, rtol=rtol, atol=atol, max_step=max_step,
-        max_steps=max_steps, log=4096 if keep_events else 1,
-    )  # fmt: skip
+        engine.start(x0, times[0]), times[-1], drive, times, log=4096 if keep_events else 1, **limits
+    )
     del keep
-    if run.status is Status.USER_ERROR:
-        raise RuntimeError(f"{Status.USER_ERROR} ({pointers.raised[0]!r})") from pointers.raised[0]
     n = run.recorded
     if not np.all(np.isfinite(run.outputs[:n])):
         n = int(np.argmin(np.isfinite(run.outputs[:n]).all(axis=1)))
@@ -169,9 +175,34 @@ def _cores(system, first=0):
         yield system.core, first, system.name
 
 
+def _limits(rtol, atol, max_step, max_steps, span) -> dict[str, Any]:
+    """Return the checked tolerances and bounds as keywords of `Engine.run`."""
+    owner = "event_response"
+    rtol = number(
+        owner, "rtol", rtol, lower=1e-14, upper=0.1, meaning="relative tolerance",
+        remedy=f"Leave it out for {RTOL:g}; floats resolve no less than 1e-14.",
+    )  # fmt: skip
+    if atol is not None:
+        atol = positive(owner, "atol", atol, remedy="Leave it out: rtol alone bounds the error.")
+    if max_step is not None:
+        max_step = positive(
+            owner, "max_step", max_step, "s", infinite=True, meaning="longest step",
+            remedy="Leave it out where the step may be as long as the tolerance allows.",
+        )  # fmt: skip
+    max_steps = count(owner, "max_steps", max_steps, meaning="bound on the work")
+    if max_step is not None and span / max_step > max_steps:
+        raise ValueError(
+            f"{owner} needs max_step >= {span / max_steps:.3g} s to cover {span:g} s within "
+            f"max_steps={max_steps} steps; got max_step={max_step:g}. Raise max_step or max_steps, or "
+            "shorten the time."
+        )
+    return dict(rtol=rtol, atol=atol, max_step=np.inf if max_step is None else max_step, max_steps=max_steps)
+
+
 def _with_params(system, params):
-    if not params:
+    if params is None or (isinstance(params, Mapping) and not params):
         return system
+    mapping("event_response", "params", params)
     if isinstance(system, ct.InterconnectedSystem):
         raise ValueError(
             "params of an interconnection: change the block itself with with_parameters, then interconnect."
@@ -185,45 +216,70 @@ def _with_params(system, params):
 
 
 def _times(timepts):
-    times = np.atleast_1d(np.asarray(timepts, dtype=float))
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0):
+    times = np.atleast_1d(real_array("event_response", "timepts", timepts, "s"))
+    if times.ndim != 1 or len(times) < 2 or np.any(np.diff(times) <= 0):
         raise ValueError(
-            f"timepts must be at least two finite times in ascending order [s]; got {timepts!r}."
+            "event_response needs timepts as at least two times in ascending order [s], each once; got "
+            f"{shown(timepts)}. Sort them; for a run to 10 s give np.linspace(0, 10, 1001)."
         )
     return np.ascontiguousarray(times)
 
 
 def _initial(system, initial_state):
     n = system.nstates or 0
-    x0 = np.asarray(initial_state, dtype=float)
+    x0 = real_array("event_response", "initial_state", initial_state)
     if x0.ndim == 0:
-        x0 = np.full(n, float(x0))
-    x0 = x0.ravel()
-    if len(x0) != n:
-        raise ValueError(f"initial_state needs {n} values ({', '.join(system.state_labels)}); got {len(x0)}.")
-    if not np.all(np.isfinite(x0)):
-        raise ValueError(f"initial_state must be finite; got {x0}.")
-    return x0
+        return np.full(n, float(x0))
+    if x0.size != n or max(x0.shape) != x0.size:
+        raise ValueError(
+            f"initial_state needs {n} numbers ({', '.join(system.state_labels)}), or one for all; got shape "
+            f"{x0.shape}. Give the states in that order."
+        )
+    return x0.ravel()
 
 
 def _drive(inputs, nr, times, hold):
-    if hold not in ("linear", "zoh"):
-        raise ValueError(f"input_hold must be 'linear' or 'zoh'; got {hold!r}.")
+    owner = "event_response"
+    choice(owner, "input_hold", hold, ("linear", "zoh"))
     if callable(inputs):
+        samples = np.array([_values(inputs, float(t), nr) for t in times]).T
         drive, keep = callback_drive(inputs, nr)
-        samples = np.array([np.broadcast_to(np.asarray(inputs(t), float), nr) for t in times]).T
         return drive, samples, keep
-    if isinstance(inputs, list | tuple):
-        rows = [np.broadcast_to(np.asarray(u, float), times.shape) for u in inputs]
-        u = np.array(rows).reshape(len(rows), len(times))
+    if isinstance(inputs, list | tuple) and any(np.ndim(u) for u in inputs):
+        rows = [real_array(owner, f"inputs[{i}]", u) for i, u in enumerate(inputs)]
+        if not all(r.shape in ((), times.shape) for r in rows):
+            wrong = next(r for r in rows if r.shape not in ((), times.shape))
+            raise ValueError(
+                f"event_response needs each of its inputs as one number or {len(times)}, one a time; got "
+                f"shape {wrong.shape}. Sample it at timepts."
+            )
+        u = np.array([np.broadcast_to(r, times.shape) for r in rows])
     else:
-        u = np.asarray(inputs, dtype=float)
+        u = real_array(owner, "inputs", inputs)
+        if isinstance(inputs, list | tuple) and u.shape == (nr,):  # a constant for each
+            u = np.repeat(u[:, None], len(times), axis=1)
     if u.ndim == 0:
         samples = np.full((nr, len(times)), float(u))
         return constant_drive(np.full(nr, float(u))), samples, None
     u = np.atleast_2d(u)
     if u.shape != (nr, len(times)):
-        raise ValueError(f"inputs must have shape ({nr}, {len(times)}) (inputs, times); got {u.shape}.")
-    if not np.all(np.isfinite(u)):
-        raise ValueError("inputs must be finite; got NaN or inf among them.")
+        raise ValueError(
+            f"event_response needs inputs of shape ({nr}, {len(times)}) (inputs, times), or one number; got "
+            f"shape {u.shape}. Sample them at timepts, or give a function of time."
+        )
     return sampled_drive(times, u, hold), u, None
+
+
+def _values(function, t, count) -> np.ndarray:
+    """Return what an input function says at a time; what it raises or returns wrongly is told once."""
+    try:
+        given = function(t)
+    except Exception as error:
+        raise RuntimeError(f"{Status.USER_ERROR} (the input at t = {t:g}: {error!r}).") from error
+    values = real_array("event_response", f"inputs(t={t:g})", given)
+    if values.size not in (1, count):
+        raise ValueError(
+            f"event_response needs inputs(t) to return {count} numbers; got {values.size} at t = {t:g}. "
+            "Return one for each input."
+        )
+    return np.broadcast_to(values.ravel(), count)

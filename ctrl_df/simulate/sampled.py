@@ -7,6 +7,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..checks import positive, shown
+
 
 class Sampled(ct.NonlinearIOSystem):
     """A discrete-time system run at its sample times inside a continuous loop, its output held in between.
@@ -28,8 +30,7 @@ class Sampled(ct.NonlinearIOSystem):
         b, d = np.atleast_2d(np.asarray(B, float)), np.atleast_2d(np.asarray(D, float))
         a = np.asarray(A, float).reshape(b.shape[0], b.shape[0])
         c = np.asarray(C, float).reshape(d.shape[0], a.shape[0])
-        if not float(dt) > 0:
-            raise ValueError(f"a sampled system needs dt > 0 (sample time [s]); got dt={dt!r}.")
+        dt = positive("a sampled system", "dt", dt, "s", meaning="sample time")
         self.sampled = (a, b, c, d, float(dt))
         n, ny = a.shape[0], d.shape[0]
 
@@ -56,7 +57,10 @@ def sampled(system, **keywords) -> Sampled:
         Discrete, with a sample time ``dt`` > 0.
     """
     if not isinstance(system, ct.TransferFunction | ct.StateSpace) or not system.isdtime(strict=True):
-        raise ValueError(f"sampled needs a discrete-time TransferFunction or StateSpace; got {system!r}.")
+        raise (ValueError if isinstance(system, ct.TransferFunction | ct.StateSpace) else TypeError)(
+            f"sampled needs a discrete-time TransferFunction or StateSpace; got {shown(system)}. "
+            "Make it discrete with ct.c2d(system, dt)."
+        )
     if system.dt is True:
         raise ValueError("sampled needs a sample time in seconds; got dt=True. Give the system its dt.")
     ss: Any = ct.ss(system)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ...checks import number
 from ..effect import Effect, register_effect
 from ..parameter import parameter
 
@@ -33,8 +34,12 @@ class HardStop(Effect):
 
     def check(self):
         """Check that the stroke has a length."""
+        if self.lower is not None:
+            object.__setattr__(
+                self, "lower", number("HardStop", "lower", self.lower, "m", meaning="lower stop")
+            )
         low = self.span[0]
-        if not (math.isfinite(low) and low < self.limit):
+        if not low < self.limit:
             raise ValueError(
                 "HardStop needs lower < limit (a stroke of some length); "
                 f"got lower={low:g}, limit={self.limit:g}. "

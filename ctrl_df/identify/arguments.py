@@ -1,0 +1,90 @@
+"""What compare, refit, diagnose and improve may be asked, checked before any work begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from ..blocks.effect import Effect, effect_class, effect_library
+from ..checks import count, flag, known_name, mapping, names, number, positive, shown
+from .measurement import Measurement
+from .variables import default_free
+
+MODES = ("auto", "free", "windows")
+_LEAST = 20  # samples of a window, below which nothing is left once its start is fitted
+
+
+def free_parameters(block, free=None) -> tuple[str, ...]:
+    """Return the parameters that a fit moves: those named, all of an effect named by its id, or the usual."""
+    if free is None:
+        return default_free(block)
+    table, chosen = block.parameters, []
+    for name in names("a fit", "free", free):
+        group = [k for k in table if k.startswith(f"{name}.")] if name not in table else [name]
+        group = [k for k in group if table[k].free or k == name]
+        if not group:
+            raise ValueError(
+                f"free needs names out of {', '.join(table)}, or ids of the model's effects; got {name!r}."
+            )
+        chosen += [k for k in group if k not in chosen]
+    return tuple(chosen)
+
+
+def effect_classes(candidates: Any) -> list[Any]:
+    """Return effect classes by id or as given; None: the whole library."""
+    if candidates is None:
+        return list(effect_library().values())
+    several = isinstance(candidates, Iterable) and not isinstance(candidates, str | Mapping)
+    given: list[Any] = list(candidates) if several else [candidates]
+    if not given:
+        raise ValueError("candidates needs one effect id at least; got none. Leave it out for the library.")
+    return [
+        c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c)  # pyright: ignore[reportArgumentType]
+        for c in given
+    ]
+
+
+def check_window(records: Sequence[Measurement], mode, window) -> None:
+    """Check how records are to be cut: the mode, and a length of window that holds samples enough."""
+    if not isinstance(mode, str) or mode not in MODES:
+        raise (ValueError if isinstance(mode, str) else TypeError)(
+            f"mode must be one of {', '.join(MODES)}; got {shown(mode)}. Leave it out for auto."
+        )
+    if window is None:
+        return
+    length = number(
+        "a comparison", "window", window, "s", remedy="Leave it out for one that fits the motion."
+    )
+    for record in records:
+        if not length >= _LEAST * record.dt * (1 - 1e-9):
+            raise ValueError(
+                f"window needs a length >= {_LEAST * record.dt:g} s ({_LEAST} samples of {record.name!r}); "
+                f"got window={window!r}. Leave it out for one that fits the motion."
+            )
+
+
+def check_fit(block, start, robust, budget) -> None:
+    """Check start values, and how a fit is to be done."""
+    flag("refit", "robust", robust)
+    count("refit", "budget", budget, meaning="bound on the simulations")
+    if start is not None:
+        block.with_parameters(mapping("refit", "start", start, "{'coulomb.level': 5.0}"))
+
+
+def check_limits(limits) -> None:
+    """Check what the next experiment may do to the machine."""
+    if limits is None:
+        return
+    for name, value in mapping("diagnose", "limits", limits, "{'force': 40.0, 'stroke': 0.1}").items():
+        known_name("diagnose", "limits", name, ("force", "stroke"))
+        positive("diagnose", f"limits[{name!r}]", value, "N" if name == "force" else "m")
+
+
+def check_held_out(records, held) -> None:
+    """Check that no record is both fitted and held out."""
+    for record in held:
+        if any(record is other for other in records):
+            raise ValueError(
+                f"holdout needs records that are not fitted; got {shown(record.name)} in both. "
+                "Leave holdout out to hold out every third part."
+            )

@@ -1,0 +1,42 @@
+"""What the searches for exact orbits may be asked: numbers of the right kind, a guess that can be one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..checks import count, flag, positive, real_array, shown
+
+
+def checked_guess(loop, guess: Any) -> Any:
+    """Return a guess as it is meant: a cycle, a pair (amplitude, omega), or the state as an array."""
+    if guess is None or hasattr(guess, "amplitude") or not isinstance(loop, ct.NonlinearIOSystem):
+        return guess
+    n = loop.nstates or 0
+    wrong = (
+        "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an "
+        f"array of shape ({n},); got {shown(guess)}."
+    )
+    try:
+        values = real_array("find_limit_cycle", "guess", guess)
+    except TypeError:
+        raise TypeError(wrong) from None
+    if isinstance(guess, np.ndarray) and values.shape == (n,):
+        return values
+    if values.shape not in ((2,), (n,)):
+        raise TypeError(wrong)
+    return tuple(values.tolist()) if values.shape == (2,) else values
+
+
+def check_search(owner: str, *, max_iterations: Any = 1, search_time: Any = None, **flags: Any) -> None:
+    """Check the bounds of a search, and that its flags are True or False."""
+    count(owner, "max_iterations", max_iterations, meaning="bound on Newton steps")
+    if search_time is not None:
+        positive(
+            owner, "search_time", search_time, "s", infinite=True, meaning="longest simulation of the search",
+            remedy="Leave it out for some hundred swings.",
+        )  # fmt: skip
+    for name, value in flags.items():
+        flag(owner, name, value)
