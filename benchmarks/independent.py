@@ -6,7 +6,6 @@ flow of a mode is a matrix exponential, a guard is met by bisection.
 
 from __future__ import annotations
 
-import control as ct
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
@@ -30,6 +29,12 @@ class Affine:
         big[:n, :n], big[:n, n] = M, c
         return (expm(big * t) @ np.append(x, 1.0))[:n]
 
+    def _met(self, mode, x, h, row, constant, resolution):
+        """Return the time within h at which a guard is met."""
+        return brentq(
+            lambda s: float(row @ self.flow(mode, x, s) + constant), 0.0, h, xtol=resolution, rtol=1e-15
+        )
+
     def run(self, mode, x, span):
         """Follow the loop; returns the state at the end."""
         t, step, events = 0.0, span / _PIECES, 0
@@ -40,11 +45,7 @@ class Affine:
             for row, constant, following in self.modes[mode][2]:
                 here, there = row @ x + constant, row @ ahead + constant
                 if there < 0 <= here or (here < 0 and there < here):
-
-                    def guard(s, row=row, constant=constant):
-                        return row @ self.flow(mode, x, s) + constant
-
-                    at = 0.0 if here <= 0 else brentq(guard, 0.0, h, xtol=1e-15 * span, rtol=1e-15)
+                    at = self._met(mode, x, h, row, constant, 1e-15 * span) if here > 0 else 0.0
                     if first is None or at < first:
                         first, after = at, following
             if first is None:
@@ -58,8 +59,8 @@ class Affine:
 
 
 def lap_error(loop, orbit) -> float:
-    """Mismatch after one period by independent integration, relative to the size of each state; nan if not known."""
-    block, H = loop.block, loop.H
+    """Return the mismatch after one period, relative to the size of each state; nan if not known."""
+    block = loop.block
     x0 = np.asarray(orbit.states)[:, 0]
     size = np.maximum(np.abs(np.asarray(orbit.states)).max(axis=1), 1e-12 * np.abs(orbit.states).max())
     if loop.dt:
@@ -68,10 +69,8 @@ def lap_error(loop, orbit) -> float:
         return _friction(loop, orbit, x0, size)
     if loop.family == "gap":
         return _gap(loop, orbit, x0, size)
-    ss = ct.ss(H) if not isinstance(H, ct.StateSpace) else H
     controller = orbit.loop.syslist[0]
     A, B, C = (np.asarray(m, float) for m in (controller.A, controller.B, controller.C))
-    del ss
     lines = _lines(block)
     if lines is not None:
         modes = {}

@@ -69,8 +69,8 @@ def judge(loop, tally: Tally, rng, name):
                 tally.unstable_found += 1
             if not row.in_band:
                 tally.remarks.append(
-                    f"{name}: {cycle.grade} {cycle.amplitude:.4g} @ {cycle.omega:.4g}, exact {truth.amplitude:.4g} @ "
-                    f"{truth.omega:.4g}, band {cycle.amplitude_band[0]:.4g}..{cycle.amplitude_band[1]:.4g} @ "
+                    f"{name}: {cycle.grade} {cycle.amplitude:.4g} @ {cycle.omega:.4g}, exact "
+                    f"{truth.amplitude:.4g} @ {truth.omega:.4g}, band {cycle.amplitude_band[0]:.4g}..{cycle.amplitude_band[1]:.4g} @ "
                     f"{cycle.omega_band[0]:.4g}..{cycle.omega_band[1]:.4g}"
                 )  # fmt: skip
             continue
@@ -86,7 +86,8 @@ def judge(loop, tally: Tally, rng, name):
         if cycle.grade != "unreliable" or other is not None:
             tally.remarks.append(
                 f"{name}: {cycle.grade} {cycle.amplitude:.4g} @ {cycle.omega:.4g} {row.verdict}"
-                f"{'' if other is None else f', yet {other.amplitude:.5g} @ {other.omega:.5g} is there'}; {row.why[:300]}"
+                f"{'' if other is None else f', yet {other.amplitude:.5g} @ {other.omega:.5g} is there'}; "
+                f"{row.why[:300]}"
             )
     for orbit in check.orbits:
         tally.orbits += 1
@@ -140,7 +141,7 @@ def other_grids(loop, response, tally, name):
 
 
 def other_units(loop, check, response, tally, rng, name):
-    """The same loop with force, length and time written in other units: nothing may change beyond 1e-6."""
+    """Write the same loop in other units of force, length and time: nothing may change beyond 1e-6."""
     factors = 10.0 ** rng.integers(-9, 10, 3)
     units = Units(*factors)
     scaled = loop.scaled(units)
@@ -166,8 +167,8 @@ def other_units(loop, check, response, tally, rng, name):
 
 def report(tally: Tally, seconds):
     """Print the tables."""
-    print("\n| grade | predicted | an orbit exists | and lies in the band | no such orbit | not found | not tested | "
-          "error of omega, median and 95 % | error of amplitude |")  # fmt: skip
+    print("\n| grade | predicted | an orbit exists | and lies in the band | no such orbit | not found | "
+          "not tested | error of omega, median and 95 % | error of amplitude |")  # fmt: skip
     print("|---|---|---|---|---|---|---|---|---|")
     for grade in ("trusted", "doubtful", "unreliable"):
         c = tally.grade[grade]
@@ -175,8 +176,8 @@ def report(tally: Tally, seconds):
         e = np.array(tally.errors[grade] or [(np.nan, np.nan)])
         w, a = (f"{100 * np.median(e[:, k]):.2g} %, {100 * np.quantile(e[:, k], 0.95):.2g} %" for k in (0, 1))
         print(
-            f"| {grade} | {c['predicted']} | {100 * c['exists'] / tested:.1f} % | {100 * c['in band'] / tested:.1f} % | "
-            f"{c['no such orbit']} | {c['not found']} | {c['not tested']} | {w} | {a} |"
+            f"| {grade} | {c['predicted']} | {100 * c['exists'] / tested:.1f} % | "
+            f"{100 * c['in band'] / tested:.1f} % | {c['no such orbit']} | {c['not found']} | {c['not tested']} | {w} | {a} |"
         )
     found = 100 * tally.unstable_found / max(tally.unstable, 1)
     print("\n| what | measured |\n|---|---|")
@@ -184,10 +185,12 @@ def report(tally: Tally, seconds):
     print(f"| `no such orbit` said | {tally.denied}, of orbits that exist: {tally.falsely_denied} |")
     print(f"| orbits that exist near a prediction and were not found | {tally.overlooked} |")
     print(
-        f"| unstable orbits near a trusted or doubtful prediction, found | {found:.1f} % of {tally.unstable} |"
+        "| unstable orbits near a trusted or doubtful prediction, found | "
+        f"{found:.1f} % of {tally.unstable} |"
     )
     print(
-        f"| exact orbits wrong by an integrator of its own | {tally.wrong} of {tally.checked} ({tally.orbits} in all) |"
+        f"| exact orbits wrong by an integrator of its own | {tally.wrong} of {tally.checked} "
+        f"({tally.orbits} in all) |"
     )
     print(f"| trusted or doubtful answers that change with the grid | {tally.grids} |")
     print(f"| loops that answer otherwise in other units | {tally.units_wrong} of {tally.units} |")
@@ -218,8 +221,8 @@ def main(arguments=None):
                 other_grids(loop, response, tally, name)
             if k < chosen.units:
                 other_units(loop, check, response, tally, rng, name)
-            print(f"{name}: {len(response.limit_cycles)} predicted, {len(check.orbits)} orbits, {spent:.1f} s",
-                  file=sys.stderr, flush=True)  # fmt: skip
+            told = f"{len(response.limit_cycles)} predicted, {len(check.orbits)} orbits"
+            print(f"{name}: {told}, {spent:.1f} s", file=sys.stderr, flush=True)
     for remark in tally.remarks:
         print("-", remark)
     report(tally, time.perf_counter() - begin)

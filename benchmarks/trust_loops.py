@@ -48,8 +48,8 @@ class Loop:
 def draw(family: str, rng: np.random.Generator) -> Loop:
     """Draw one loop of a family."""
     maker = {
-        "friction": _friction, "gap": _gap, "saturation": _saturation, "dead zone": _dead_zone, "relay": _relay,
-        "steps": _steps, "user function": _user,
+        "friction": _friction, "gap": _gap, "saturation": _saturation, "dead zone": _dead_zone,
+        "relay": _relay, "steps": _steps, "user function": _user,
     }[family](rng)  # fmt: skip
     return maker(Units())
 
@@ -59,7 +59,7 @@ def _log(rng, low, high):
 
 
 def _pid(rng, mass):
-    """Gains of a PID on a mass, relative to its own corner; more or less damped, often conditionally stable."""
+    """Gains of a PID on a mass, relative to its own corner; often conditionally stable."""
     pace = _log(rng, 1.0, 60.0)
     return (
         mass * pace**2 * rng.uniform(0.5, 1.5), mass * pace**3 * rng.uniform(0.1, 1.0),
@@ -82,7 +82,8 @@ def _friction(rng):
     def make(u):
         block = cdf.friction_mass(
             mass=mass * u.force * u.time**2 / u.length, coulomb=level * u.force,
-            viscous=viscous * u.force * u.time / u.length, static=None if static is None else static * u.force,
+            viscous=viscous * u.force * u.time / u.length,
+            static=None if static is None else static * u.force,
         )  # fmt: skip
         least = 1.01 * (static or level) * u.force
         omega = (0.1 * gains[3] / u.time, 6 * gains[3] / u.time)

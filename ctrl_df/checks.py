@@ -181,10 +181,10 @@ def returned(value) -> bool:
 
 def executor(owner: str, value) -> Any:
     """Return what runs work elsewhere: None, or an object with ``submit``."""
-    if value is not None and not callable(getattr(value, "submit", None)):
+    if value is not None and (isinstance(value, type) or not callable(getattr(value, "submit", None))):
         raise TypeError(
             f"{owner} needs executor as a concurrent.futures.Executor (anything with submit), or None; got "
-            f"{shown(value)}."
+            f"{shown(value)}. Leave it out to compute here."
         )
     return value
 

@@ -103,7 +103,7 @@ def test_rigorous_bound_holds_the_exact_cycle(responses):
 
 
 def test_second_friction_prediction_is_called_spurious(responses):
-    """The stable cycle predicted at 13.05 rad/s does not exist; with its harmonics it passes folds, far away."""
+    """The stable cycle predicted at 13.05 rad/s does not exist; with its harmonics it is far away."""
     low, high = responses["friction mass under PID"].limit_cycles
     assert low.amplitude == pytest.approx(9.535886, rel=1e-6) and low.grade == "unreliable"
     assert "passes a fold" in low.why

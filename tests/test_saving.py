@@ -327,10 +327,10 @@ def test_a_damaged_file_gives_one_clear_error(name, saved):
 def test_what_is_no_file_is_said(saved, tmp_path):
     with pytest.raises(FileNotFoundError):
         cdf.load_family(tmp_path / "none.npz")
-    with pytest.raises(TypeError, match="needs the path of a file"):
+    with pytest.raises(TypeError, match="path of a file"):
         cdf.load_family(0)  # to open() a number is an open file
     for place, error in ((3, TypeError), (tmp_path, IsADirectoryError)):
-        with pytest.raises(error, match="save needs the path"):
+        with pytest.raises(error, match="save needs (the )?path"):
             cdf.load_family(saved).save(place)
 
 
@@ -365,7 +365,7 @@ def test_a_file_of_format_1_is_read_but_not_taken_up(saved):
 def test_a_place_that_cannot_be_is_refused_before_the_work(save, error, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("ctrl_df.df.work.compute_part", lambda *args: pytest.fail("computed"))
-    with pytest.raises(error, match="save needs"):
+    with pytest.raises(error, match="save (as|needs)|needs save"):
         family(FRICTION, save, [6.0], [2.0])
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
-from ..checks import count, flag, path_of, real_array
-from ..checks import executor as checked_executor
+from ..checks import count, flag, real_array
 from .dispatch import method_for
 from .family import Family
 from .points import points
@@ -160,8 +159,6 @@ def describing_function_family(
         )
     omega = None if omega is None else _axis("omega", _frequencies(omega), "rad/s")
     orders = count("a family", "orders", orders, meaning="highest harmonic")
-    checked_executor("a family", executor)
-    save = None if save is None else path_of("a family", "save", save)
     if progress is not None:
         flag("a family", "progress", progress)
     num_points = _check_block(F, num_points)

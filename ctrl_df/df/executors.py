@@ -11,15 +11,6 @@ from typing import Any
 _AHEAD = 256  # parts submitted before the first is taken: what is done and waits takes memory
 
 
-def check_executor(executor) -> None:
-    """Refuse what has no method ``submit`` (TypeError)."""
-    if not callable(getattr(executor, "submit", None)) or isinstance(executor, type):
-        raise TypeError(
-            f"executor needs a method submit, such as concurrent.futures.ProcessPoolExecutor() has; got "
-            f"{executor!r}. Leave it out to compute here."
-        )
-
-
 def check_picklable(executor, example) -> None:
     """Refuse a process pool for work that cannot be sent to one (TypeError), before it begins."""
     if isinstance(executor, ProcessPoolExecutor):

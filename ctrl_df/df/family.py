@@ -181,7 +181,7 @@ def minus_inverse(N) -> np.ndarray:
 
 def place_for(save) -> Path:
     """Return the path of a file to be written, or say why there can be none: to be asked before work."""
-    path = _as_path("save", save)
+    path = path_of("a family", "save", save)
     if not path.parent.is_dir():
         raise FileNotFoundError(f"save needs a folder that exists; got {path.parent}. Make it first.")
     if path.is_dir():
@@ -189,12 +189,6 @@ def place_for(save) -> Path:
     if not os.access(path.parent, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
         raise PermissionError(f"save needs a file that can be written; got {path}. Choose another folder.")
     return path
-
-
-def _as_path(what, path) -> Path:
-    if not isinstance(path, str | os.PathLike) or isinstance(path, bytes):
-        raise TypeError(f"{what} needs the path of a file (text or Path); got {path!r}.")
-    return Path(path)
 
 
 def write_arrays(path, arrays: Mapping[str, Any]) -> Path:

@@ -179,8 +179,9 @@ class OrbitSolver(OrbitSearch):
             while goes_on and p + done < n:  # compiled code hears no Ctrl-C: some points at a time
                 one, end = p + done, min(p + done + _AT_ONCE, n)
                 more, _, known = sweep(
-                    self.shot, samples, scratch, A[one:end], omega[one:end], power, past, mode, known, self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end],
-                    ends[one:end], miss[one:end], kinds[one:end], still[one:end],
+                    self.shot, samples, scratch, A[one:end], omega[one:end], power, past, mode, known,
+                    self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end], ends[one:end],
+                    miss[one:end], kinds[one:end], still[one:end],
                 )  # fmt: skip
                 self._raise_if_raised()
                 done, goes_on = done + more, one + more == end

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import executor as checked_executor
 from .dispatch import Method, _Guarded
-from .executors import by_executor, check_executor, check_picklable
+from .executors import by_executor, check_picklable
 from .family import FORMAT, Family, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
@@ -67,7 +68,7 @@ class Work:
     def run(self, executor, progress):
         """Compute what is still to do; `executor` and `progress` as in `describing_function_family`."""
         if executor is not None:
-            check_executor(executor)
+            checked_executor("a family", executor)
             if self.method.name in _BRIEF:
                 executor = None
             else:

@@ -179,8 +179,8 @@ class Assessor:
         if path.end is End.MERGED:
             other = "{:.4g} @ {:.4g} rad/s".format(*path.solution)
             note = (
-                f"with {path.share:.0%} of its harmonics fed back it merges with the solution at {other}: with all of "
-                f"them neither is left"
+                f"with {path.share:.0%} of its harmonics fed back it merges with the solution at {other}: "
+                "with all of them neither is left"
             )
             return spread, path, [(2, note)]
         if path.end is not End.REACHED:

@@ -14,25 +14,20 @@ from .multiple_shooting import shoot
 from .orbit import Orbit
 from .symmetry import shift_directions, transverse
 
-_CLOSED = 3e-10  # mismatch after a lap, relative to the size of each state
+CLOSED = 3e-10  # mismatch after a lap, relative to the size of each state
 _ACCEPTED = 1e-7  # the same where events limit what can be reached
 _STRETCH = 4.0  # of the period on the way
 _STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
-_MOST_STEPS = 120  # along the path of a shrinking mismatch
 _MOST_LAPS = 32  # an orbit closed after so many laps or fewer is told from the one of a single lap
 _ON_CIRCLE = 1e-6  # distance from the unit circle below which a multiplier says nothing of stability
 
 
 class NoClosure(Exception):
-    """No orbit was closed; the message says why, `mismatch` how near it came (relative to the orbit's size)."""
+    """No orbit was closed: the message says why, `mismatch` how near it came."""
 
     def __init__(self, why: str, mismatch: float = np.inf):
         super().__init__(why)
         self.mismatch = mismatch
-
-
-class Merged(NoClosure):
-    """What is missing to a closed lap cannot be made to vanish: the orbit has merged with a neighbour."""
 
 
 class Centre(NoClosure):
@@ -58,7 +53,7 @@ class Closing:
 
     def close(self, x0, period: float) -> Orbit:
         """Newton from a state near the orbit and an estimate of the period; NoClosure if it fails."""
-        start, size = self._free_state(np.array(x0, float), period)
+        start, size = self.free_state(np.array(x0, float), period)
         status, best, grown, first = Status.NOT_CONVERGED, np.inf, 0, period
         lap = beside = None
         for _ in range(self.max_iterations):
@@ -71,7 +66,7 @@ class Closing:
                 beside = np.eye(self.tracer.n) - free @ free.T
             residual = beside @ ((lap.end.x - start.x) / size)
             mismatch = float(np.max(np.abs(residual)))
-            if mismatch < _CLOSED:
+            if mismatch < CLOSED:
                 status, best = Status.CONVERGED, mismatch
                 break
             if mismatch > 0.9 * best:
@@ -83,7 +78,7 @@ class Closing:
             period += step[-1]
             if not first / _STRETCH < period < first * _STRETCH:
                 raise NoClosure("Newton left for another period", best)
-            start = self._rebuilt(start.x + step[:-1])
+            start = self.rebuilt(start.x + step[:-1])
         if lap is None or self._at_rest(start, lap, period, size):
             raise NoClosure("Newton ended at rest")
         if status is not Status.CONVERGED and best > _ACCEPTED:
@@ -94,91 +89,11 @@ class Closing:
     def close_along(self, states, period: float) -> Orbit:
         """Close an orbit from states at equal steps of time along it, by multiple shooting."""
         largest = np.abs(states).max(axis=0)
-        size = self.tracer.sizes(self._rebuilt(states[0]), period, largest)
-        met = shoot(self.tracer, self._rebuilt, np.asarray(states, float), period, size)
+        size = self.tracer.sizes(self.rebuilt(states[0]), period, largest)
+        met = shoot(self.tracer, self.rebuilt, np.asarray(states, float), period, size)
         if met is None:
             raise NoClosure("the pieces of multiple shooting do not meet")
         return self.close(*met)
-
-    def trace(self, x0, period: float) -> Orbit:
-        """Let what is missing to a closed lap shrink little by little, from a state near the orbit.
-
-        ``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1.
-        At share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns
-        back to 1 first, the orbit and its neighbour have merged: there is none near (`Merged`).
-
-        References
-        ----------
-        Keller (1978), Global homotopies and Newton methods.
-        """
-        start, size = self._free_state(np.array(x0, float), period)
-        origin, rate = start.x.copy(), self.tracer.rate(start.time, start.x, start.mode)
-        phase = rate * period / size
-        phase = phase / max(np.linalg.norm(phase), 1e-300)
-        n = self.tracer.n
-        beside = free = None
-
-        def mismatch(y):
-            nonlocal beside, free
-            here = self._rebuilt(origin + y[:n] * size)
-            lap = self.tracer.lap(here, period * np.exp(y[n]), size=size)
-            if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
-                raise NoClosure("no lap could be followed")
-            if beside is None:
-                free = shift_directions(self.tracer, lap.segments, size)
-                beside = np.eye(n) - free @ free.T
-            gap = beside @ ((lap.end.x - here.x) / size)
-            f_end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
-            slope = np.zeros((n, n + 1))
-            slope[:, :n] = beside @ (lap.monodromy * size / size[:, None] - np.eye(n))
-            slope[:, n] = beside @ (f_end * period * np.exp(y[n]) / size)
-            return gap, slope
-
-        first, _ = mismatch(np.zeros(n + 1))
-        scale = float(np.max(np.abs(first)))
-        if scale < _CLOSED:
-            return self.close(x0, period)
-
-        def equations(y):
-            gap, slope = mismatch(y[:-1])
-            held = np.append(phase, [0.0, 0.0])
-            J = np.vstack([np.column_stack([slope, -first]), held])
-            return np.append(gap - y[-1] * first, phase @ y[:n]), J
-
-        y = np.zeros(n + 2)
-        y[-1] = 1.0
-        _, J = equations(y)
-        border = _tangent(J, -np.eye(n + 2)[-1])
-        step, least = 0.1 * min(1.0, scale), 1.0
-        for _ in range(_MOST_STEPS):
-            ahead = y + step * border
-            try:
-                found, J = _onto(equations, ahead, border, 1e-4 * scale)
-            except NoClosure:
-                found = None
-            turned = None if found is None else _tangent(J, border)
-            if turned is None or turned @ border < 0.8:
-                step *= 0.5
-                if step > 1e-5 * scale:
-                    continue
-                round_it = _round_corner(equations, y, border, 1e-3 * scale, 1e-4 * scale)
-                if round_it is None:
-                    break
-                (found, turned), step = round_it, 1e-3 * scale
-            y, border = found, turned
-            least = min(least, float(y[-1]))
-            if y[-1] <= 0.0:
-                return self.close(origin + y[:n] * size, period * np.exp(y[n]))
-            if y[-1] >= 1.0:
-                raise Merged(
-                    f"what is missing to a closed lap falls to {least:.0%} of {scale:.1g} and grows again: the orbit "
-                    "and its neighbour have merged",
-                    least * scale,
-                )
-            if np.max(np.abs(y[: n + 1])) > 2.0:
-                break
-            step = min(1.5 * step, 0.2)
-        raise NoClosure("what is missing to a closed lap could not be followed to zero", least * scale)
 
     def _newton(self, start, lap, period, size, beside, residual):
         """Step of state and period, bounded to three tenths of the orbit's size."""
@@ -209,7 +124,7 @@ class Closing:
                     return short, period / part
         return lap, period
 
-    def _free_state(self, x0, period) -> tuple[Any, Any]:
+    def free_state(self, x0, period) -> tuple[Any, Any]:
         """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
         state = self.engine.start(x0)
         lap = self.tracer.lap(state, period, differentiate=False)
@@ -248,7 +163,7 @@ class Closing:
         moved = np.max([np.abs(s.start.x - start.x) for s in lap.segments], axis=0)
         return bool(np.max(speed / size) < 1e-6) and bool(np.max(moved / size) < 1e-6)
 
-    def _rebuilt(self, x):
+    def rebuilt(self, x):
         """Return a state in freshly settled modes: rigid joints closed, within gaps and stops."""
         state = self.tracer.settle(self.engine.start(self.feasible(x)))
         if not np.all(np.isfinite(state.x)):
@@ -299,47 +214,7 @@ class Closing:
                 events.append(Event(t, s.node, s.event))
         amplitudes = 2 * np.abs(spectrum[:, 1]) / period
         return Orbit(
-            float(omega), float(period), float(amplitudes[-1]), float(amplitudes[0]), floquet, stable, residual,
-            tuple(events), Status.CONVERGED, lap.grazing, times, run.outputs.T, run.states.T, self.loop,
+            float(omega), float(period), float(amplitudes[-1]), float(amplitudes[0]), floquet, stable,
+            residual, tuple(events), Status.CONVERGED, lap.grazing, times, run.outputs.T, run.states.T,
+            self.loop,
         )  # fmt: skip
-
-
-def _tangent(J, along):
-    """Direction in which the equations with Jacobian J stay fulfilled, the side of `along`."""
-    right = np.zeros(J.shape[0] + 1)
-    right[-1] = 1.0
-    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-12)[0]
-    return t / np.linalg.norm(t)
-
-
-def _round_corner(equations, y, border, step, tolerance):
-    """Go on beyond a corner of the path, where an event begins or ends to take part and the Jacobian jumps.
-
-    The path beyond is a tangent of the Jacobian there; of its two directions the one is right that stays
-    there.
-    """
-    try:
-        _, before = equations(y - step * border)
-        _, beyond = equations(y + step * border)
-    except NoClosure:
-        return None
-    along = _tangent(beyond, border)
-    for direction in (along, -along):
-        try:
-            found, J = _onto(equations, y + step * direction, direction, tolerance)
-        except NoClosure:
-            continue
-        if np.abs(J - beyond).max() < 0.5 * np.abs(J - before).max():
-            return found, direction
-    return None
-
-
-def _onto(equations, y, border, tolerance):
-    """Newton onto the path within the plane through y across `border`."""
-    offset = border @ y
-    for _ in range(8):
-        r, J = equations(y)
-        if np.max(np.abs(r)) < tolerance:
-            return y, J
-        y = y + np.linalg.lstsq(np.vstack([J, border]), -np.append(r, border @ y - offset), rcond=1e-12)[0]
-    raise NoClosure("no point of the path was reached")

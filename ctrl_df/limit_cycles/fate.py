@@ -223,9 +223,8 @@ class Explorer:
         if change[k] > 0.3:
             return None
         near = laps[max(k - 4, 0) : k + 2]
-        fate = UNDECIDED if len(near) >= 6 else course.fate
         padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near
-        return self.close(x0, Course(padded, fate, 1.0, course.state), False)
+        return self.close(x0, Course(padded, UNDECIDED, 1.0, course.state), False)
 
 
 def _kept(orbits, orbit):

@@ -16,16 +16,18 @@ from ..simulate.loop import answers_at_once
 from ..status import Status
 from .answer import responder
 from .arguments import check_search, checked_guess
-from .closing import Centre, Closing, Merged, NoClosure
+from .closing import Centre, Closing, NoClosure
 from .fate import Explorer
 from .forced_start import harmonic_start
 from .linear import LinearPart
 from .orbit import NoOrbit, Orbit, Try
 from .path import End, Path, corrected_near, follow_path
+from .shrinking import Merged, trace
 from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
 
 # A prediction and an orbit within these factors of frequency and amplitude are taken for one cycle.
 SAME_CYCLE = (1.25, 2.0)
+_SAME_AS_PATH = (1.1, 1.3)  # the same for the end of a path, which lacks the highest harmonics only
 _PIECES = 8  # of multiple shooting
 _NEAR_MISS = 0.3  # mismatch of a lap, relative to the orbit, from which it is worth following
 _ENOUGH = 6  # swings from which an orbit can be judged
@@ -183,7 +185,7 @@ class OrbitFinder:
         return self._simulated(x0, "a simulation from the state given")[0]
 
     def _returns(self, x0, most=4):
-        """Times after which a simulation from a state comes near it again, nearest first."""
+        """Return times after which a simulation from a state comes near it again, nearest first."""
         course = self.swings.follow(x0, 4, until_repeated=False)
         span = course.laps[-1].time if course.laps else self.swings.stride
         times = np.linspace(0.0, span, 4097)
@@ -225,8 +227,8 @@ class OrbitFinder:
             self.merged = True
             a, w = path.solution
             self.tried.append(
-                Try(name, f"it merges with the prediction at {a:.5g} @ {w:.5g} rad/s once {path.share:.0%} of the "
-                    "harmonics are fed back")
+                Try(name, f"it merges with the prediction at {a:.5g} @ {w:.5g} rad/s once {path.share:.0%} "
+                    "of the harmonics are fed back")
             )  # fmt: skip
             return None
         if path.end is not End.REACHED:
@@ -243,12 +245,15 @@ class OrbitFinder:
             ]
             orbit = self._closed(np.array(along), period, "states all along it", self.closing.close_along)
         if orbit is None and self.missed < _NEAR_MISS:
-            orbit = self._closed(start, period, "the mismatch after a lap, let shrink", self.closing.trace)
+            orbit = self._closed(
+                start, period, "the mismatch after a lap, let shrink", lambda *at: trace(self.closing, *at)
+            )
         return orbit
 
     def _belongs(self, orbit, path) -> bool:
         """Whether the orbit closed from the end of a path is the path's own."""
-        return _near(orbit, *path.solution, (1.1, 1.3))
+        amplitude, omega = path.solution
+        return _near(orbit, amplitude, omega, _SAME_AS_PATH)
 
     def _start(self, guess, amplitude, omega):
         wanted = getattr(guess, "output_amplitude", None)

@@ -1,4 +1,4 @@
-"""Starts for the simulations of a loop: displaced by shares of the scale at which its nonlinearity matters."""
+"""Starts for the simulations of a loop, measured by the scale at which its nonlinearity matters."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import control as ct
 import numpy as np
 
 from ..blocks.core import level
+from ..blocks.element import Element
 from ..simulate.sampled import Sampled
 
 FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)  # of the scale, in the order tried
@@ -36,8 +37,8 @@ class Kicks:
     def __init__(self, loop, engine):
         self.loop, self.engine = loop, engine
         self.parts: Any = getattr(loop, "parts", None)
-        self.block = None if self.parts is None else self.parts.block
-        self.core = getattr(self.block, "core", None)
+        self.block: Any = None if self.parts is None else self.parts.block
+        self.core: Any = getattr(self.block, "core", None)
         if self.core is not None:
             self.pace = corner_frequency(self.parts)
             self.scale, self.unit = self._length_scale(), "m"
@@ -78,6 +79,8 @@ class Kicks:
         """States of the linear part as a harmonic output of the block leaves them, its input that large."""
         x = np.zeros(self.engine.nstates)
         a, b, c, dt = self._controller()
+        if not isinstance(self.block, Element):
+            x[self.loop.syslist[0].nstates or 0 :] = size  # nothing is known of the states of a user's system
         if len(a):
             z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
             swing = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
@@ -141,7 +144,7 @@ class Kicks:
         return self._smooth_scale() or 1.0
 
     def _smooth_scale(self):
-        """Where a law that bends smoothly over place or speed has as much to say as the loop's own stiffness."""
+        """Displacement at which a smooth law adds a share of the loop's own stiffness."""
         n, mass = self.block.nstates, sum(self.core.masses)
 
         def force(place, speed):
@@ -159,19 +162,27 @@ class Kicks:
 
 
 def _bend(law, least=0.0):
-    """Smallest argument at which a law leaves the line of its slope at zero, by a share of that or `least`."""
-    sizes = 10.0**_DECADES
-    with np.errstate(all="ignore"):
-        slopes = np.array([(law(u) - law(0.0)) / u for u in sizes])
-    if not np.isfinite(slopes[0]):
+    """Smallest argument at which a law leaves its tangent at zero, by a share of its slope or `least`."""
+
+    def secant(u):
+        try:
+            with np.errstate(all="ignore"):
+                return (law(u) - law(0.0)) / u
+        except Exception:  # a law of the user's may raise beyond its range: there it is not asked
+            return np.nan
+
+    straight = secant(10.0 ** _DECADES[0])
+    if not np.isfinite(straight):
         return None
-    straight = slopes[np.isfinite(slopes)][0]
-    for u, slope in zip(sizes, slopes, strict=True):
+    for u in 10.0**_DECADES:
+        slope = secant(u)
+        if not np.isfinite(slope):
+            return None
         if np.isfinite(slope) and abs(slope - straight) > _BENT * max(abs(straight), least):
             low, high = u / 10.0, u
             for _ in range(60):  # to the argument itself: decades belong to a unit
                 middle = np.sqrt(low * high)
-                now = (law(middle) - law(0.0)) / middle
+                now = secant(middle)
                 if abs(now - straight) > _BENT * max(abs(straight), least):
                     high = middle
                 else:
@@ -199,12 +210,13 @@ def corner_frequency(parts) -> float:
     A loop closed on the velocity has its corner elsewhere, for which this serves as well as a scale.
     """
     mass = sum(parts.block.core.masses)
-    controller = parts.controller
+    controller: Any = parts.controller
     if isinstance(controller, int | float):
         controller = ct.tf([float(controller)], [1.0])
     dt = float(getattr(controller, "dt", 0) or 0)
     if not dt:
-        num, den = (np.asarray(p[0][0], float) for p in (ct.tf(controller).num, ct.tf(controller).den))
+        rational: Any = ct.tf(controller)
+        num, den = (np.asarray(p[0][0], float) for p in (rational.num, rational.den))
         gap = np.polysub(_power(num), mass**2 * np.concatenate([_power(den), [0.0, 0.0, 0.0, 0.0]]))
         roots = np.roots(np.trim_zeros(gap, "f"))
         real = roots[(np.abs(roots.imag) < 1e-6 * np.abs(roots)) & (roots.real > 0)].real

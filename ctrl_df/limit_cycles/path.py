@@ -21,6 +21,8 @@ from enum import Enum
 
 import numpy as np
 
+from .arclength import correction, tangent
+
 _CLOSED = 1e-7  # defect, relative to the fundamental, of a point on the curve
 _NUDGE = 1e-5  # of the difference quotients; all unknowns are relative
 _LONGEST, _SHORTEST, _FIRST = 0.25, 1e-3, 0.1  # steps along the curve
@@ -133,7 +135,7 @@ class _Curve:
         return U, a, float(np.exp(z[1]))
 
     def defect(self, z):
-        """Return what is missing to the balance of each harmonic, and the block's answer; (None, None) if it has none."""
+        """Return what is missing to the balance of each harmonic, and the block's answer or None."""
         U, a, omega = self.waveform(z)
         Y = self.respond(U, omega)
         if Y is None or not np.isfinite(Y).all():
@@ -155,7 +157,7 @@ class _Curve:
         return np.concatenate([[first.real, first.imag], r.real, r.imag[self.kept != 0]])
 
     def jacobian(self, z, r):
-        """Derivatives of the defect by all unknowns, share included; None where the block does not answer."""
+        """Return the derivatives of the defect by all unknowns; None where the block does not answer."""
         columns = []
         for i in range(z.size):
             moved = z.copy()
@@ -190,7 +192,7 @@ class _Curve:
         if found is None:
             return self.path(End.STOPPED, z, 0.0, Y, 0)
         z, Y, J = found
-        border = _tangent(J, border)
+        border = tangent(J, border)
         step, share, folds = _FIRST, 0.0, 0
         reason = End.STOPPED
         for _ in range(_MOST_STEPS):
@@ -209,11 +211,14 @@ class _Curve:
                     return self.path(end, z, max(share, z[-1]), Y, folds)
             else:
                 found = self.corrected(ahead, border, J)
-            turned = None
-            if found is not None and target is None:
-                turned = _tangent(found[2], border)
+            turned = None if found is None or target is not None else tangent(found[2], border)
             # a step that bends the curve sharply, or that went far to find it, is taken shorter
-            if turned is None or turned @ border < 0.8 or np.abs(found[0] - ahead).max() > 0.3 * step:
+            if (
+                found is None
+                or turned is None
+                or turned @ border < 0.8
+                or np.abs(found[0] - ahead).max() > 0.3 * step
+            ):
                 step *= 0.5
                 if step < _SHORTEST:
                     break
@@ -222,7 +227,7 @@ class _Curve:
                 if J is None:
                     reason = End.UNANSWERED
                     break
-                border = _tangent(J, border)
+                border = tangent(J, border)
                 continue
             if turned[-1] * border[-1] < 0.0:
                 folds += 1
@@ -255,9 +260,7 @@ class _Curve:
                 if J is None:
                     return None
             before = size
-            change = np.linalg.lstsq(np.vstack([J, border]), -np.append(r, border @ z - offset), rcond=1e-10)[
-                0
-            ]
+            change = correction(J, border, r, border @ z - offset)
             if np.abs(change).max() > 1.0:
                 return None
             there, Y = self.defect(z + change)
@@ -272,11 +275,3 @@ class _Curve:
         """Return where the curve stands."""
         U, _, omega = self.waveform(z)
         return Path(end, share, omega, U, Y, folds)
-
-
-def _tangent(J, along):
-    """Direction of the curve, the side of `along`."""
-    right = np.zeros(J.shape[1])
-    right[-1] = 1.0
-    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-10)[0]
-    return t / np.linalg.norm(t)

@@ -178,7 +178,7 @@ class Swings:
         return state
 
     def repeats(self, laps) -> bool:
-        """Whether the last two passages met the same state; near enough to be the answer if no Newton follows."""
+        """Whether the last two passages met the same state; closer if no Newton follows."""
         sizes = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
         largest = max(float(np.max(sizes / self.units)), 1e-300)
         bound = (
@@ -193,8 +193,8 @@ class Swings:
         ahead = 4 * (laps[-1].time - laps[-2].time) if len(laps) >= 2 else self.stride
         times = state.time + np.linspace(0.0, ahead, _PEEKS)
         run = self.engine.run(
-            state, min(state.time + ahead, limit), times=times, rtol=1e-8, watch=self._signal, direction=1, log=1,
-            max_steps=400_000,
+            state, min(state.time + ahead, limit), times=times, rtol=1e-8, watch=self._signal, direction=1,
+            log=1, max_steps=400_000,
         )  # fmt: skip
         after = run.state
         if run.reason != driver.SECTION:
@@ -223,7 +223,7 @@ class Swings:
 
 
 def _growth(laps, ago: int = 0) -> float:
-    """Mean size of the swings in the last quarter over that in the quarter before, or so many quarters ago."""
+    """Mean size of the swings in the last quarter over that in the quarter before; or earlier by `ago`."""
     quarter = len(laps) // 4
     if quarter < 2:
         return float("nan")

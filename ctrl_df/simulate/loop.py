@@ -133,7 +133,7 @@ def split_improper(controller) -> tuple[float, ct.StateSpace]:
         return 0.0, controller
     num, den = (np.trim_zeros(np.asarray(p[0][0], float), "f") for p in (controller.num, controller.den))
     if len(num) <= len(den):
-        return 0.0, ct.ss(controller)  # pyright: ignore[reportReturnType]
+        return 0.0, _realized(num, den, controller.dt)
     if len(num) > len(den) + 1 or controller.isdtime(strict=True):
         raise ValueError(
             "a controller may exceed its denominator by one degree (an ideal derivative) in continuous time; "
@@ -142,7 +142,21 @@ def split_improper(controller) -> tuple[float, ct.StateSpace]:
     quotient, rest = np.polydiv(num, den)
     kd, kp = quotient[0], quotient[1] if len(quotient) > 1 else 0.0
     rest = np.atleast_1d(rest)
-    return float(kd), ct.ss(ct.tf(np.polyadd(kp * den, rest), den))  # pyright: ignore[reportReturnType]
+    return float(kd), _realized(np.polyadd(kp * den, rest), den, 0)
+
+
+def _realized(num, den, dt) -> ct.StateSpace:
+    """Return a proper transfer function in controllable canonical form.
+
+    That of SciPy takes small coefficients for zero, which in other units are none.
+    """
+    order = len(den) - 1
+    a = den / den[0]
+    b = np.concatenate([np.zeros(order + 1 - len(num)), num]) / den[0]
+    A = np.vstack([-a[1:], np.eye(order)[:-1]]) if order else np.zeros((0, 0))
+    B = np.eye(order)[:, :1] if order else np.zeros((0, 1))
+    C = (b[1:] - a[1:] * b[0])[None, :]
+    return ct.ss(A, B, C, [[b[0]]], dt)  # pyright: ignore[reportReturnType]
 
 
 def _controller(proper: ct.StateSpace, kd: float, dt, force: str, name: str):

@@ -1,0 +1,18 @@
+"""What every curve followed by its arclength needs: its direction, and the way back onto it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def tangent(J, along):
+    """Direction in which the equations with Jacobian J (n, n + 1) stay fulfilled, the side of `along`."""
+    right = np.zeros(J.shape[0] + 1)
+    right[-1] = 1.0
+    t = np.linalg.lstsq(np.vstack([J, along]), right, rcond=1e-10)[0]
+    return t / np.linalg.norm(t)
+
+
+def correction(J, border, defect, beyond):
+    """Newton step onto the curve within the plane across `border`, `beyond` which the point lies."""
+    return np.linalg.lstsq(np.vstack([J, border]), -np.append(defect, beyond), rcond=1e-10)[0]

@@ -1,0 +1,145 @@
+"""An orbit traced from a state near it by letting the mismatch after a lap shrink little by little.
+
+``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1. At
+share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns back to 1
+first, the orbit and its neighbour have merged (a fold): there is none near.
+
+References
+----------
+Keller (1978), Global homotopies and Newton methods.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arclength import correction, tangent
+from .closing import CLOSED, Closing, NoClosure
+from .orbit import Orbit
+from .symmetry import shift_directions
+
+_MOST_STEPS = 120
+_SHORTEST = 1e-5  # step, relative to the first mismatch, at which the curve is taken to have a corner
+_FAR = 2.0  # change of a state, in sizes of the orbit, beyond which the curve is given up
+
+
+class Merged(NoClosure):
+    """What is missing to a closed lap cannot be made to vanish: the orbit has merged with a neighbour."""
+
+
+def trace(closing: Closing, x0, period: float) -> Orbit:
+    """Follow the curve from a state near an orbit to the orbit.
+
+    Raises
+    ------
+    Merged
+        The curve turns back.
+    NoClosure
+        It could not be followed.
+    """
+    curve = _Curve(closing, np.array(x0, float), period)
+    n, scale = curve.n, curve.scale
+    if scale < CLOSED:
+        return closing.close(x0, period)
+    y = np.zeros(n + 2)
+    y[-1] = 1.0
+    _, J = curve.equations(y)
+    border = tangent(J, -np.eye(n + 2)[-1])
+    step, least = 0.1 * min(1.0, scale), 1.0
+    for _ in range(_MOST_STEPS):
+        met = curve.onto(y + step * border, border)
+        turned = None if met is None else tangent(met[1], border)
+        if met is not None and turned is not None and turned @ border >= 0.8:
+            y, border = met[0], turned
+        else:
+            step *= 0.5
+            if step > _SHORTEST * scale:
+                continue
+            beyond = curve.round_corner(y, border, 1e-3 * scale)
+            if beyond is None:
+                break
+            (y, border), step = beyond, 1e-3 * scale
+        least = min(least, float(y[-1]))
+        if y[-1] <= 0.0:
+            return closing.close(curve.state(y), period * float(np.exp(y[n])))
+        if y[-1] >= 1.0:
+            raise Merged(
+                f"what is missing to a closed lap falls to {least:.0%} of {scale:.1g} and grows again: "
+                "the orbit and its neighbour have merged",
+                least * scale,
+            )
+        if np.max(np.abs(y[: n + 1])) > _FAR:
+            break
+        step = min(1.5 * step, 0.2)
+    raise NoClosure("what is missing to a closed lap could not be followed to zero", least * scale)
+
+
+class _Curve:
+    """Unknowns y = (state moved, in sizes; logarithm of the period's change; share) and their equations."""
+
+    def __init__(self, closing, x0, period):
+        self.closing, self.tracer, self.period = closing, closing.tracer, period
+        start, self.size = closing.free_state(x0, period)
+        self.n, self.origin = self.tracer.n, start.x.copy()
+        phase = self.tracer.rate(start.time, start.x, start.mode) * period / self.size
+        self.phase = phase / max(np.linalg.norm(phase), 1e-300)
+        self.beside = np.eye(self.n)
+        lap = self.tracer.lap(start, period, size=self.size)
+        free = shift_directions(self.tracer, lap.segments, self.size)
+        self.beside = np.eye(self.n) - free @ free.T
+        self.first, _ = self._mismatch(np.zeros(self.n + 1))
+        self.scale = float(np.max(np.abs(self.first)))
+
+    def state(self, y):
+        """Return the state that the unknowns stand for."""
+        return self.origin + y[: self.n] * self.size
+
+    def _mismatch(self, y):
+        n, span = self.n, self.period * np.exp(y[self.n])
+        here = self.closing.rebuilt(self.state(y))
+        lap = self.tracer.lap(here, span, size=self.size)
+        if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
+            raise NoClosure("no lap could be followed")
+        gap = self.beside @ ((lap.end.x - here.x) / self.size)
+        slope = np.zeros((n, n + 1))
+        slope[:, :n] = self.beside @ (lap.monodromy * self.size / self.size[:, None] - np.eye(n))
+        end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
+        slope[:, n] = self.beside @ (end * span / self.size)
+        return gap, slope
+
+    def equations(self, y):
+        """Return their defect and its derivatives by all unknowns."""
+        gap, slope = self._mismatch(y[:-1])
+        held = np.append(self.phase, [0.0, 0.0])
+        J = np.vstack([np.column_stack([slope, -self.first]), held])
+        return np.append(gap - y[-1] * self.first, self.phase @ y[: self.n]), J
+
+    def onto(self, y, border):
+        """Newton onto the curve within the plane through y across `border`; (y, J), or None."""
+        offset = border @ y
+        try:
+            for _ in range(8):
+                r, J = self.equations(y)
+                if np.max(np.abs(r)) < 1e-4 * self.scale:
+                    return y, J
+                y = y + correction(J, border, r, border @ y - offset)
+        except NoClosure:
+            pass
+        return None
+
+    def round_corner(self, y, border, step):
+        """Go on beyond a corner of the curve, where an event begins or ends to take part: the Jacobian jumps.
+
+        The curve beyond is a tangent of the Jacobian there; of its two directions the right one stays there.
+        """
+        try:
+            _, before = self.equations(y - step * border)
+            _, beyond = self.equations(y + step * border)
+        except NoClosure:
+            return None
+        along = tangent(beyond, border)
+        for direction in (along, -along):
+            met = self.onto(y + step * direction, direction)
+            if met is not None and np.abs(met[1] - beyond).max() < 0.5 * np.abs(met[1] - before).max():
+                return met[0], direction
+        return None
