@@ -70,7 +70,8 @@ def judge(loop, tally: Tally, rng, name):
             if not row.in_band:
                 tally.remarks.append(
                     f"{name}: {cycle.grade} {cycle.amplitude:.4g} @ {cycle.omega:.4g}, exact "
-                    f"{truth.amplitude:.4g} @ {truth.omega:.4g}, band {cycle.amplitude_band[0]:.4g}..{cycle.amplitude_band[1]:.4g} @ "
+                    f"{truth.amplitude:.4g} @ {truth.omega:.4g}, band "
+                    f"{cycle.amplitude_band[0]:.4g}..{cycle.amplitude_band[1]:.4g} @ "
                     f"{cycle.omega_band[0]:.4g}..{cycle.omega_band[1]:.4g}"
                 )  # fmt: skip
             continue
@@ -177,7 +178,8 @@ def report(tally: Tally, seconds):
         w, a = (f"{100 * np.median(e[:, k]):.2g} %, {100 * np.quantile(e[:, k], 0.95):.2g} %" for k in (0, 1))
         print(
             f"| {grade} | {c['predicted']} | {100 * c['exists'] / tested:.1f} % | "
-            f"{100 * c['in band'] / tested:.1f} % | {c['no such orbit']} | {c['not found']} | {c['not tested']} | {w} | {a} |"
+            f"{100 * c['in band'] / tested:.1f} % | {c['no such orbit']} | {c['not found']} | "
+            f"{c['not tested']} | {w} | {a} |"
         )
     found = 100 * tally.unstable_found / max(tally.unstable, 1)
     print("\n| what | measured |\n|---|---|")

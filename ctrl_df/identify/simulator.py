@@ -54,7 +54,7 @@ class Simulator:
         record: Measurement,
         *,
         thin: int = 1,
-        rtol: float = 1e-6,
+        rtol: float = 1e-8,
         force: np.ndarray | None = None,
         begins: str = initial_states.FITTED,
     ):
