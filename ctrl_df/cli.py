@@ -90,6 +90,7 @@ def _limit_cycles(options) -> int:
                 "plant": repr(model.plant),
                 "status": response.status,
                 "cycles": [_row(r) for r in check],
+                "fate": [{"size": s.size, "fate": s.fate, "told": s.told} for s in check.fate],
                 "note": check.note,
             }
         )

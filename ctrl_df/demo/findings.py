@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..limit_cycles.predict import DescribingFunctionResponse, describing_function_response
-from ..limit_cycles.verify import NONE, Check, verify
+from ..limit_cycles.verify import NONE, NOT_FOUND, Check, verify
 from ..simulate.loop import closed_loop
 from ..simulate.response import EventResponse, event_response
 from .systems import PaperLoop
@@ -64,8 +64,9 @@ class Finding:
             return "not periodic: the sampler's clock and the motion have no common period"
         lines = []
         for row in self.check.rows:
-            if row.verdict == NONE and row.predicted is not None:
-                lines.append(f"none near {row.predicted.omega:.2f} rad/s")
+            if row.verdict in (NONE, NOT_FOUND) and row.predicted is not None:
+                how = "none" if row.verdict == NONE else "none found"
+                lines.append(f"{how} near {row.predicted.omega:.2f} rad/s")
             elif row.exact is not None and row.exact.status.ok:
                 o = row.exact
                 lines.append(
