@@ -16,7 +16,10 @@ from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded,
 from .path import End, follow_path
 from .scan_grid import FAST, grid_slope, noisy
 
-SAFETY = 1.5  # on the shift that the returned harmonics cause, where they can be computed
+DYNAMIC = ("friction", "backlash", "orbit")
+# On the shift that the returned harmonics cause, by whether the block has dynamics: of an impact's harmonics,
+# which fall slowly, fewer are kept (worst of benchmarks/trust.py: 2.4 for a gap).
+SAFETY = {False: 1.5, True: 2.5}
 # Relative error of N from returned harmonics d where they cannot be carried, c1 d + c2 d^2. A jump or a
 # corner answers its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py:
 # 0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79).
@@ -84,7 +87,7 @@ class Assessor:
             notes = []
             if rivals:
                 notes = [(1, f"under the same force {rivals} attracts too: N jumps from one to the other")]
-            cycle = self._cycle(found.crossing, notes, (y, regime), self.named)
+            cycle = self._cycle(found.crossing, notes, (y, regime))
             return replace(cycle, forced_multiplier=found.multiplier)
         if found.attracts:
             note = (
@@ -100,8 +103,7 @@ class Assessor:
                 f"{found.multiplier:.3g} a period): the block leaves it for a motion whose |1 + N H| is "
                 f"{found.defect:.2g}, so that no cycle stays here",
             )
-        own = [b.crossing for b in self.branched if b.branch is found.branch]
-        cycle = self._cycle(found.crossing, [note], (y, regime), own, found.attracts)
+        cycle = self._cycle(found.crossing, [note], (y, regime), found.attracts)
         state = found.branch.state
         return replace(
             cycle,
@@ -110,7 +112,7 @@ class Assessor:
             motion=None if state is None else ForcedMotion(state(found.s, w), y * a),
         )
 
-    def _cycle(self, crossing: Crossing, notes=(), motion=None, beside=None, attracts=True) -> LimitCycle:
+    def _cycle(self, crossing: Crossing, notes=(), motion=None, attracts=True) -> LimitCycle:
         """Assess a crossing; `motion` (harmonics, regime) where it is not the one of the method."""
         a, w = crossing.amplitude, crossing.omega
         y, regime = self._named_motion(a, w) if motion is None else motion
@@ -127,8 +129,6 @@ class Assessor:
         stable = loeb(crossing.jacobian) if attracts else False
         if self.method.name == "memory":
             notes.append((1, "the block keeps its own memory and could only be sampled"))
-        if self._neighbour(crossing, self.named if beside is None else beside):
-            notes.append((1, "another solution lies close by, where the curves nearly touch"))
         bound, remark = mees_bergen(self.method, self.linear, crossing, self.scan.crossings)
         notes.append((0, remark))
         grade, why = graded(
@@ -169,7 +169,7 @@ class Assessor:
     def _spread(self, crossing, distortion, sense, regime, named):
         """Logarithmic half widths of the bands, the corrected solution where there is one, and notes."""
         a, w = crossing.amplitude, crossing.omega
-        c1, c2 = DYNAMIC_ERROR if self.method.name in ("friction", "backlash", "orbit") else MEMORYLESS_ERROR
+        c1, c2 = DYNAMIC_ERROR if self.method.name in DYNAMIC else MEMORYLESS_ERROR
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
         if self.answer is None or not named or regime.startswith(("aperiodic", "subharmonic")):
@@ -184,22 +184,12 @@ class Assessor:
             )
             return spread, path, [(2, note)]
         if path.end is not End.REACHED:
-            return spread, path, [(2 if path.end is End.LEFT else 1, path.end.value)]
+            unasked = path.end is End.UNANSWERED and path.share == 0.0
+            return spread, path, [(1 if unasked else 2, path.end.value)]
         shift = [abs(math.log(path.solution[0] / a)), abs(math.log(path.solution[1] / w))]
-        notes = [(1, "it passes a fold as its harmonics are fed back")] if path.folds else []
-        return tuple(SAFETY * s + FLOOR for s in shift), path, notes
-
-    def _neighbour(self, crossing, others) -> bool:
-        step_a = np.diff(self.log_a).max(initial=0)
-        step_w = np.diff(self.log_w).max(initial=0)
-        for other in others:
-            if other is crossing:
-                continue
-            near_a = abs(math.log(other.amplitude / crossing.amplitude)) < 3 * step_a
-            near_w = abs(math.log(other.omega / crossing.omega)) < 3 * step_w
-            if near_a and near_w:
-                return True
-        return False
+        notes = [(2, "it passes a fold as its harmonics are fed back")] if path.folds else []
+        safety = SAFETY[self.method.name in DYNAMIC]
+        return tuple(safety * s + FLOOR for s in shift), path, notes
 
 
 def near_folds(cycles):

@@ -11,6 +11,7 @@ from ..df.family import Family
 from ..df.points import points
 from .linear import LinearPart
 
+_AMPLITUDES = {"element": 480, "law": 160}  # at least: steps of a quantizer put two crossings within 4 %
 FAST = ("element", "law", "rate", "linear", "friction")
 _AT_ONCE = 1 << 16  # points of a closed form between two chances to interrupt it
 _NOISE = 1e-6  # spread of an average from which N jumps from point to point
@@ -40,7 +41,7 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
     w = refined_omega(linear, family.omega)
     if method.name in FAST:
         coarse = family.amplitudes
-        a = _refined(coarse, 160 if not method.needs_omega else 60)
+        a = _refined(coarse, _AMPLITUDES.get(method.name, 60))
         if method.needs_omega and a.size * w.size > 60_000:
             a = coarse
         N = _fundamental(method, a, w, family)
