@@ -158,7 +158,7 @@ class Explorer:
         rows = []
         for size, x0 in kicks.all():
             course = courses[size] = self.swings.follow(x0, _SWINGS, longest)
-            orbit = _kept(orbits, self.close(x0, course, True))
+            orbit = kept(orbits, self.close(x0, course, True))
             rows.append(self._row(size, course, orbit, x0))
         rows.sort(key=lambda row: row.size)
         borders = []
@@ -167,7 +167,7 @@ class Explorer:
                 if low.fate != high.fate and UNDECIDED not in (low.fate, high.fate):
                     border = self._border(low, high, longest)
                     borders.append(border)
-                    _kept(orbits, border.orbit)
+                    kept(orbits, border.orbit)
         return Fate(tuple(rows), tuple(borders), kicks.unit, orbits)
 
     def _row(self, size, course, orbit, x0) -> Start:
@@ -227,7 +227,7 @@ class Explorer:
         return self.close(x0, Course(padded, UNDECIDED, 1.0, course.state), False)
 
 
-def _kept(orbits, orbit):
+def kept(orbits, orbit):
     """Return the known orbit that this one is, or the orbit itself, now known."""
     if orbit is None:
         return None

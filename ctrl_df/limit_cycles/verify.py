@@ -12,7 +12,7 @@ from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
 from .arguments import check_search
-from .fate import Fate
+from .fate import Fate, kept
 from .finder import SAME_CYCLE, OrbitFinder
 from .grade import LimitCycle
 from .orbit import NoOrbit, Orbit
@@ -207,21 +207,12 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
 
     orbits: list[Orbit] = []
 
-    def keep(orbit: Orbit | None) -> Orbit | None:
-        if orbit is None:
-            return None
-        for known in orbits:
-            if orbit.same_as(known, 1e-4 if orbit.status.ok else 2e-2):
-                return known
-        orbits.append(orbit)
-        return orbit
-
     led: dict[int, Orbit] = {}
     sought: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
     for cycle in cycles if finder.parts is not None else []:
         found = finder.from_guess(cycle)
-        orbit = keep(found)
+        orbit = kept(orbits, found)
         sought[id(cycle)] = finder.none()
         if found is not None and orbit is not None and not found.note:
             led[id(cycle)] = orbit
@@ -230,7 +221,7 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         fate = finder.explorer.explore(search_time, edges=not finder.by_simulation)
         for orbit in fate.orbits:
             if orbit.status.ok or not orbits:
-                keep(orbit)
+                kept(orbits, orbit)
     partner = _pairs(cycles, orbits, led)
     if finder.engine.delayed:
         return Check(tuple(_by_simulation(cycles, orbits, partner)), [], DELAYED, loop, fate)
