@@ -216,6 +216,6 @@ def near_folds(cycles):
                 f"{other.omega:.4g} rad/s: the two would merge at {margin:.2f} times the harmonics there are"
                 f"{'; there may be neither' if near else ''}. "
             )
-            grade = UNRELIABLE if near or one.grade == UNRELIABLE else DOUBTFUL
+            grade = UNRELIABLE if near or out[i].grade == UNRELIABLE else DOUBTFUL
             out[i] = replace(one, grade=grade, why=text + out[i].why)
     return out

@@ -292,8 +292,7 @@ class OrbitFinder:
         if not np.all(np.isfinite(laps[-1].state)):
             return None
         if self.by_simulation:
-            settled = course.fate == CYCLES or course.fate == UNDECIDED
-            return self._averaged(x0, laps, self.swings.repeats(laps)) if settled else None
+            return self._averaged(x0, laps, self.swings.repeats(laps))
         orbit = self._closed_laps(laps)
         if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= 1000:
             return self._averaged(x0, laps, False)
