@@ -17,8 +17,9 @@ from ..simulate import layout as L
 from ..simulate.compiled import njit
 from ..simulate.driver import run
 from ..simulate.engine import harmonic_drive
-from ..simulate.flow import combine, external, signals
+from ..simulate.flow import combine, refresh
 from ..simulate.modes import settle
+from ..simulate.views import lean
 from .native import call_native, native_address
 
 _CHATTER_ROOM = 60  # runs go on where the event log is full
@@ -103,7 +104,7 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     for j in range(x.shape[0]):
         # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
         shot.space[6][j] = max(abs(x[j]), 0.1 * shot.space[6][j])
-    settle(prog, drive, 0, 0.0, x, mode, work, shot.space[5])
+    settle(lean(prog), lean(drive), 0, 0.0, lean(x), lean(mode), lean(work), lean(shot.space[5]))
     wanted = spectrum.shape[1] > 0
     if wanted:
         spectrum[:] = 0.0
@@ -150,9 +151,8 @@ def _stuck(prog, mode):
 
 @njit(cache=True, error_model="numpy")
 def _outputs(shot, drive, t, x, mode, row):
-    prog, w = shot.prog, shot.space[0][0]
-    external(prog, drive, t, 0, w)
-    signals(prog, t, x, mode, w)
+    prog, w = lean(shot.prog), lean(shot.space[0][0])
+    refresh(prog, lean(drive), 0, t, lean(x), lean(mode), w)
     for i in range(shot.ends.shape[1]):
         shot.ends[row, i] = combine(prog, prog.ints[prog.ints[L.H_OUT] + i], w)
 

@@ -14,8 +14,7 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 from ..simulate import layout as L
 from ..simulate.engine import Engine, constant_drive
-from ..simulate.flow import combine, rates
-from ..simulate.modes import settle
+from ..simulate.look import look
 
 _PROBES = 24
 _TOL = 1e-9
@@ -115,14 +114,12 @@ class Probe:
         mode = engine._modes.copy() if mode is None else mode.copy()
         drive = constant_drive(np.full(engine.ninputs, u))
         work, dx, g = engine._space[0], np.zeros(len(x)), np.full(self.ng + 1, np.inf)
-        settle(prog, drive, 0, t, x, mode, work, dx)
-        rates(prog, drive, 0, t, x, mode, work, dx, g, True)
+        y = np.zeros(engine.noutputs)
+        look(prog, drive, t, x, mode, work, dx, g, y, True, 0.0)
         for node in prog.nodes:
             mine = slice(node[L.G], node[L.G] + node[L.NG])
             # what a quantizer does with its steps shows in the rates, or it does nothing
             g[mine] = np.inf if node[L.KIND] == L.QUANTIZER else np.sort(g[mine])
-        w, rows = work[0], prog.ints[L.H_OUT]
-        y = np.array([combine(prog, prog.ints[rows + i], w) for i in range(engine.noutputs)])
         return dx, g, y
 
     def states(self):

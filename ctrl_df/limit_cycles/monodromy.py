@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..simulate import driver, layout, modes
+from ..simulate import driver, layout
 from ..simulate.engine import Drive, Engine, State, constant_drive
-from ..simulate.flow import rates
+from ..simulate.look import jump, look
 from ..status import Status
 
 RTOL = 1e-11
@@ -57,6 +57,7 @@ class Tracer:
         self._work, *_ = driver.workspace(engine.program)
         self._g = np.zeros(int(engine.program.ints[layout.H_NG]) + 1)
         self._reach = 1e-9  # [s], set by every lap
+        self._none = np.zeros(0)
 
     def settle(self, state: State) -> State:
         """Return the state with its modes in line (no time passes)."""
@@ -65,23 +66,10 @@ class Tracer:
     def rate(self, t, x, mode, margins=False) -> Any:
         """Rates of a state in a mode; with `margins` the event margins too."""
         dx = np.zeros(self.n)
-        rates(self.engine.program, self.drive, 0, t, x, mode, self._work, dx, self._g, margins)
-        if margins and self.engine.program.ints[layout.H_TRACK]:
-            driver.margins(
-                self.engine.program,
-                self.drive,
-                0,
-                t,
-                x,
-                mode,
-                self._work,
-                dx,
-                self._g,
-                self._reach,
-                -1,
-                0.0,
-                1,
-            )
+        look(
+            self.engine.program, self.drive, t, x, mode, self._work, dx, self._g, self._none, False,
+            self._reach if margins else 0.0,
+        )  # fmt: skip
         return (dx, self._g.copy()) if margins else dx
 
     def lap(self, state: State, length: float, differentiate: bool = True, size=None) -> Period:
@@ -212,20 +200,7 @@ class Tracer:
         x = x.copy()
         dx = np.zeros(self.n)
         slot = run.margin - int(program.nodes[node, layout.G])
-        rates(program, self.drive, 0, run.state.time, x, mode, self._work, dx, self._g, False)
-        modes.event(
-            program,
-            self.drive,
-            0,
-            run.state.time,
-            x,
-            mode,
-            self._work,
-            dx,
-            self._g,
-            node,
-            slot,
-            1e-10,
-            self._reach,
+        jump(
+            program, self.drive, run.state.time, x, mode, self._work, dx, self._g, node, slot, self._reach
         )
         return x

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import layout as L
-from .compiled import njit
+from .compiled import part
 from .flow import rates
 from .layout import (
     A_BODIES,
@@ -78,7 +78,7 @@ def memory(prog) -> Memory:
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def recall(prog, store, mode, work, x, dx0, dx, g):
     """Slot of the present mode, learnt if it is new. `x`, `dx0`, `dx`, `g` are scratch."""
     known = int(store.order[0])
@@ -93,7 +93,7 @@ def recall(prog, store, mode, work, x, dx0, dx, g):
     return _learn(prog, store, mode, work, x, dx0, dx, g)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _learn(prog, store, mode, work, x, dx0, dx, g):
     """Learn the present mode in place of the one learnt first; returns its slot."""
     known = int(store.order[0])
@@ -137,7 +137,7 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
     return slot
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part
 def extend(prog, mode, work, g, out):
     """Copy margins to `out`, that of a body at rest as two: its hold ends upward or downward.
 
@@ -171,7 +171,7 @@ def extend(prog, mode, work, g, out):
             out[ng + b] = down + force
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def forced(prog, drive, segment, t, length, rtol, store):
     """Write the external inputs over a step as powers: r(t + theta length) = sum forcing[k] theta^k, k > 0.
 
@@ -209,7 +209,7 @@ def forced(prog, drive, segment, t, length, rtol, store):
     return min(least, TERMS)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def series(store, slot, length, least, k0, size, rtol, atol, poly):
     """Power series of the flow over `length` seconds from a state with rates k0, into poly.
 
@@ -249,7 +249,7 @@ def series(store, slot, length, least, k0, size, rtol, atol, poly):
     return TERMS, min(share, 1.0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def shrink(store, share, terms, poly):
     """Refer a series to a shorter step."""
     factor = 1.0
@@ -261,7 +261,7 @@ def shrink(store, share, terms, poly):
             store.forcing[k + 1, i] *= factor
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def crossing(prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm, g):
     """Fraction of the step at which the first margin crosses zero, and its index (1.0, -1: none).
 
@@ -304,7 +304,7 @@ def crossing(prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm,
     return first, index
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _owner(prog, body):
     """Margin that the second hold margin of a body belongs to."""
     for n in range(prog.nodes.shape[0]):

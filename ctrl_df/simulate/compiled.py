@@ -27,9 +27,11 @@ from numba.core import ccallback, config, sigutils
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
+from .parts import PartCompiler
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(r"^from[ ]+(\.+)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n(]*)", re.MULTILINE)
-_COMPILED = re.compile(r"^@(njit|intrinsic|numba\.njit)\b", re.MULTILINE)
+_COMPILED = re.compile(r"^@(njit|part|intrinsic|numba\.njit)\b", re.MULTILINE)
 
 
 def njit(cache=True, **options) -> Any:
@@ -42,6 +44,20 @@ def njit(cache=True, **options) -> Any:
         return dispatcher
 
     return decorate
+
+
+def part(function=None, *, inline=False) -> Any:
+    """Decorate a function that only compiled functions call; its machine code is a part of theirs.
+
+    Parts take views (`ctrl_df.simulate.views`) or arrays, count no references, and cannot be called from
+    Python. `inline` copies the code to every place that calls it.
+    """
+    if function is None:
+        return functools.partial(part, inline=inline)
+    options = dict(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    if inline:
+        options["forceinline"] = True
+    return numba.njit(pipeline_class=PartCompiler, **options)(function)
 
 
 def cfunc(signature, law) -> Any:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from .compiled import njit
+from .compiled import part
 from .flow import node_input, refresh
 from .layout import (
     A_BODIES,
@@ -38,7 +38,7 @@ from .layout import (
 from .mechanics import accelerate, closed, dry_level, smooth_forces
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def has_dry(prog, node, body):
     """Whether set-valued dry friction acts on a body."""
     ao = prog.nodes[node, AUX]
@@ -47,7 +47,7 @@ def has_dry(prog, node, body):
     return not (prog.ints[ao + A_BRISTLE] >= 0 and body == prog.ints[ao + A_BODIES] - 1)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def tendency(f, up, down, wall):
     """Direction in which a body at rest starts under the force f, or 0 (held by friction or wall)."""
     if f > up and wall != 1:
@@ -57,7 +57,7 @@ def tendency(f, up, down, wall):
     return 0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def body_tendency(prog, node, body, f, wall):
     """Tendency of one body by itself."""
     up = dry_level(prog, node, body, 0.0, 1.0, 0.0)
@@ -65,12 +65,12 @@ def body_tendency(prog, node, body, f, wall):
     return tendency(f, up, down, wall)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _direction(prog, node, body, d):
     return d if has_dry(prog, node, body) else FREE
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def resolve(prog, node, t, x, mode, force, f, dx):
     """Bring a mechanism's modes in line with its velocities and forces; returns whether any changed."""
     nodes, aux = prog.nodes, prog.ints
@@ -107,7 +107,7 @@ def resolve(prog, node, t, x, mode, force, f, dx):
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _elastic_region(prog, node, x, mode):
     """Region of an elastic joint: in the gap, or on one of its faces."""
     xo, gap = prog.nodes[node, X], prog.par[prog.nodes[node, PAR] + P_GAP]
@@ -123,7 +123,7 @@ def _elastic_region(prog, node, x, mode):
         mode[at] = 0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _resolve_joined(prog, node, x, mode, f):
     """Two bodies in contact: move together, stay stuck, or separate."""
     par = prog.par
@@ -168,14 +168,14 @@ def _resolve_joined(prog, node, x, mode, f):
         mode[mo + DIR1] = _direction(prog, node, 1, d)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _separate(prog, node, body, d, wall):
     if d == 0:
         return STUCK if wall != 0 or has_dry(prog, node, body) else FREE
     return _direction(prog, node, body, d)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     """Newton's impact in the joint; the end of chatter becomes sustained contact.
 
@@ -214,7 +214,7 @@ def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     return E_IMPACT
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def stop(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     """Newton's impact on an end stop; the end of chatter becomes rest at the stop."""
     w, f, trial = work

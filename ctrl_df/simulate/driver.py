@@ -10,13 +10,14 @@ import numpy as np
 
 from . import history
 from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
-from .compiled import njit
+from .compiled import njit, part
 from .flow import rates
 from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
 from .stepper import grains, inside, prepare, prepare8, roughness, step
+from .views import lean
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
@@ -50,15 +51,30 @@ def workspace(prog, delays: bool = False):
     return (work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), memory(prog))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def copy(source, target):
     """Copy a vector in place."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@njit(error_model="numpy")
 def run(
+    prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
+    watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
+    spectrum, omega,
+):  # fmt: skip
+    """Run from clock[0] to t_end: `advance` on views of the arrays."""
+    return advance(
+        lean(prog), lean(drive), lean(clock), lean(x), lean(mode), t_end, lean(tout), lean(xout), lean(yout),
+        order, rtol, atol, hmax, locate, stop_at_event, watch, watch_level, watch_sign, height, max_steps,
+        lean(log_t), lean(log_n), lean(log_k), lean(before), lean(scale), fresh, lean(space), lean(spectrum),
+        omega,
+    )  # fmt: skip
+
+
+@part
+def advance(
     prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
     watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
     spectrum, omega,
@@ -406,7 +422,7 @@ def run(
     return reason
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _signature(mode):
     """One number that tells mode vectors apart."""
     value = 0
@@ -415,7 +431,7 @@ def _signature(mode):
     return value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _same(a, b):
     """Whether two vectors are equal."""
     for i in range(a.shape[0]):
@@ -424,7 +440,7 @@ def _same(a, b):
     return True
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _first_step(x, dx, room, hmax):
     """Estimate a first step: the time in which some state changes by a hundredth of itself.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from .compiled import njit
+from .compiled import part
 from .history import delayed
 from .layout import (
     A_MEASURED,
@@ -45,12 +45,12 @@ from .mechanics import mechanism_rates
 from .pointers import call_input, call_smooth, call_system
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def external(prog, drive, t, segment, w):
     """Fill the external inputs at time `t`, the samples taken from `segment`."""
     at = prog.ints[H_NS]
     if drive.address != 0:
-        call_input(drive.address, t, w.ctypes.data + 8 * at)
+        call_input(drive.address, t, w.address + 8 * at)
         return
     nt = drive.time.shape[0]
     nh = drive.harmonics.shape[1]
@@ -69,7 +69,7 @@ def external(prog, drive, t, segment, w):
         w[at + i] = value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def combine(prog, row, w):
     """Value of one linear combination of signals and external inputs."""
     value = 0.0
@@ -78,13 +78,13 @@ def combine(prog, row, w):
     return value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def node_input(prog, node, k, w):
     """Input k of a node."""
     return combine(prog, prog.ints[prog.nodes[node, IN] + k], w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def product(par, row, count, vector, first):
     """One row of a matrix kept in ``par`` times ``vector[first : first + count]``."""
     value = 0.0
@@ -93,7 +93,7 @@ def product(par, row, count, vector, first):
     return value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part
 def signals(prog, t, x, mode, w):
     """Fill the work vector with the outputs of all nodes."""
     nodes, par, ou = prog.nodes, prog.par, prog.ints[H_U]
@@ -123,7 +123,7 @@ def signals(prog, t, x, mode, w):
         elif kind == QUANTIZER:
             w[so] = par[po] * mode[nodes[n, MODE]]
         elif kind == SMOOTH:
-            w[so] = call_smooth(prog.ints[nodes[n, AUX]], w[ou], par.ctypes.data + 8 * po)
+            w[so] = call_smooth(prog.ints[nodes[n, AUX]], w[ou], par.address + 8 * po)
         elif kind == RAMP:
             w[so] = w[ou] + par[po] + par[po + 1] * t
         elif kind == SAMPLED:
@@ -139,24 +139,24 @@ def signals(prog, t, x, mode, w):
             call_system(
                 prog.ints[nodes[n, AUX]],
                 t,
-                x.ctypes.data + 8 * xo,
-                w.ctypes.data + 8 * ou,
-                w.ctypes.data + 8 * prog.ints[H_SCRATCH],
-                w.ctypes.data + 8 * so,
+                x.address + 8 * xo,
+                w.address + 8 * ou,
+                w.address + 8 * prog.ints[H_SCRATCH],
+                w.address + 8 * so,
                 0,
             )
         elif kind == DELAY:
             w[so] = delayed(prog, n, t, w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def refresh(prog, drive, segment, t, x, mode, w):
     """Fill external inputs and signals; one copy of the code for all who are not in a hurry."""
     external(prog, drive, t, segment, w)
     signals(prog, t, x, mode, w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part
 def rates(prog, drive, segment, t, x, mode, work, dx, g, want_g):
     """Rates of all states at (t, x) in the given mode; with `want_g` the event margins too."""
     w, f, _ = work
@@ -213,17 +213,17 @@ def rates(prog, drive, segment, t, x, mode, work, dx, g, want_g):
             call_system(
                 prog.ints[nodes[n, AUX]],
                 t,
-                x.ctypes.data + 8 * xo,
-                w.ctypes.data + 8 * ou,
-                dx.ctypes.data + 8 * xo,
-                w.ctypes.data + 8 * prog.ints[H_SCRATCH],
+                x.address + 8 * xo,
+                w.address + 8 * ou,
+                dx.address + 8 * xo,
+                w.address + 8 * prog.ints[H_SCRATCH],
                 1,
             )
         elif kind == DELAY:
             dx[xo] = 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g):
     """Margins that need the rate of an input: a play lets go when it turns, a limiter limits when it is fast.
 

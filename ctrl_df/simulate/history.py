@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from .compiled import njit
+from .compiled import part
 from .layout import AUX, DELAY, H_DELAYS, H_HISTORY, KIND, PAR
 
 RING = 4096
@@ -33,12 +33,12 @@ WEIGHTS = (-1.0) ** np.arange(POINTS)
 WEIGHTS[0], WEIGHTS[-1] = 0.5 * WEIGHTS[0], 0.5 * WEIGHTS[-1]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _record(base, serial):
     return base + RECORDS + (serial % RING) * RECORD
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def delayed(prog, node, t, w):
     """Input of a delay node one delay before `t`, read from that side of a jump the present step lies on."""
     base = prog.ints[prog.nodes[node, AUX]]
@@ -61,7 +61,7 @@ def delayed(prog, node, t, w):
     return above / below
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def begin(prog, node, t, value, w):
     """Start the history of a delay: its input was `value` at all times before `t`."""
     base, delay = prog.ints[prog.nodes[node, AUX]], prog.par[prog.nodes[node, PAR]]
@@ -73,7 +73,7 @@ def begin(prog, node, t, value, w):
         w[at + VALUES + q] = value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def advance(prog, t, h, limit, w):
     """Move every delay on to the record that leaves it at `t`.
 
@@ -112,7 +112,7 @@ def advance(prog, t, h, limit, w):
     return limit_here, arrived
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def room(prog, node, w):
     """Place in the work vector for the values of a delay's next record; -1 where the ring is full."""
     base = prog.ints[prog.nodes[node, AUX]]
@@ -123,7 +123,7 @@ def room(prog, node, w):
     return _record(base, int(w[base + NEXT])) + VALUES
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def keep(prog, node, start, length, generation, w):
     """Close a delay's next record, whose values stand in its `room` already."""
     base = prog.ints[prog.nodes[node, AUX]]
@@ -133,7 +133,7 @@ def keep(prog, node, start, length, generation, w):
     w[base + NEXT] += 1.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def shortest(prog):
     """Shortest delay of a program [s]; inf without delays."""
     value = math.inf

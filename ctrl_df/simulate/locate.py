@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from .compiled import njit
+from .compiled import part
 from .flow import input_rates, rates
 from .layout import (
     A_BODIES,
@@ -46,14 +46,14 @@ GRAIN = 4.0 * np.finfo(float).eps
 NOW, FIRST, SECOND, QUANTITY = range(4)  # rows of the scales of margins, see `renewed`
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def margins(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
     """Rates and all margins at one point, those of input rates and of the section included."""
     rates(prog, drive, segment, t, x, mode, work, dx, g, True)
     complete(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def complete(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_level, watch_sign):
     """Add to the margins that go with rates those of input rates and of the section."""
     last = g.shape[0] - 1
@@ -63,7 +63,7 @@ def complete(prog, drive, segment, t, x, mode, work, dx, g, reach, watch, watch_
         input_rates(prog, drive, segment, t, x, mode, work, dx, reach, g)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def worst(g, gtol, scale, blocked):
     """Smallest margin, relative to its scale, and its index."""
     value, index = 1.0, -1
@@ -75,7 +75,7 @@ def worst(g, gtol, scale, blocked):
     return value, index
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def tolerances(prog, x, mode, scale, gtol):
     """Write how far below zero each margin may be before it counts as crossed.
 
@@ -104,7 +104,7 @@ def tolerances(prog, x, mode, scale, gtol):
                     gtol[go + side] += GRAIN * abs(prog.par[row + side])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def renewed(prog, mode, scale, node):
     """Begin the scales of margins anew after an event of `node` (-1: of those alone whose quantity changed).
 
@@ -138,7 +138,7 @@ def renewed(prog, mode, scale, node):
         scale[QUANTITY, scale.shape[1] - 1] = FIRST
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def bump_share(prog, x, x1):
     """Share of the way from x to x1 that a step may take near a narrow feature of friction over speed.
 
@@ -159,7 +159,7 @@ def bump_share(prog, x, x1):
     return share
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def may_touch(prog, x, x1, mode, length):
     """Whether a gap or a stop may be touched inside a step at whose ends it is open.
 
@@ -188,12 +188,12 @@ def may_touch(prog, x, x1, mode, length):
     return False
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _tangents_meet_below(g0, s0, g1, s1):
     return s0 < 0.0 < s1 and g0 + s0 * (g1 - s1 - g0) / (s0 - s1) < 0.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def locate_event(
     prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, scale, blocked, watch,
     watch_level, watch_sign,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from .compiled import njit
+from .compiled import part
 from .layout import (
     A_BODIES,
     A_BRISTLE,
@@ -53,18 +53,18 @@ from .layout import (
 from .pointers import call_force, call_friction
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def level(prog, first, count, moving, direction, speed):
     """Dry friction level of a chain of laws [N]."""
     value = 0.0
-    base = prog.par.ctypes.data
+    base = prog.par.address
     for i in range(first, first + count * R_SIZE, R_SIZE):
         at = base + 8 * prog.ints[i + R_PAR]
         value = call_friction(prog.ints[i + R_ADDRESS], moving, direction, speed, value, at)
     return value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def smooth_forces(prog, node, t, x, mode, force, f, dx):
     """Fill f[0:2] with the forces on the bodies but dry friction and contact; writes internal rates to dx."""
     nodes, par, aux = prog.nodes, prog.par, prog.ints
@@ -73,7 +73,7 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
     f[0] = f[1] = 0.0
     f[driven] = force
     first = aux[ao + A_LAWS]
-    base_p, base_x, base_dx = par.ctypes.data, x.ctypes.data, dx.ctypes.data
+    base_p, base_x, base_dx = par.address, x.address, dx.address
     for i in range(first, first + aux[ao + A_NFORCE] * R_SIZE, R_SIZE):
         b = aux[i + R_BODY]
         z = 8 * (xo + aux[i + R_STATE])
@@ -106,7 +106,7 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
             f[1] -= pull
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def friction_start(prog, node, body):
     """Index of the first friction law of a body."""
     ao = prog.nodes[node, AUX]
@@ -114,7 +114,7 @@ def friction_start(prog, node, body):
     return start if body == 0 else start + R_SIZE * prog.ints[ao + A_NFRIC0]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def dry_level(prog, node, body, moving, direction, speed):
     """Dry friction level of a body that is not carried by a bristle [N]."""
     ao = prog.nodes[node, AUX]
@@ -124,14 +124,14 @@ def dry_level(prog, node, body, moving, direction, speed):
     return level(prog, friction_start(prog, node, body), count, moving, direction, speed)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def closed(prog, node, mode):
     """Whether the two bodies move as one (rigid joint, or impact joint in contact)."""
     joint = prog.ints[prog.nodes[node, AUX] + A_JOINT]
     return joint == J_RIGID or (joint == J_IMPACT and mode[prog.nodes[node, MODE] + JOINT] != 0)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def hold_margin(prog, node, body, f, wall):
     """How far a stuck body is from breaking away [N]; at a wall only away from it."""
     up = dry_level(prog, node, body, 0.0, 1.0, 0.0) - f
@@ -143,7 +143,7 @@ def hold_margin(prog, node, body, f, wall):
     return min(up, down)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
     """Accelerations of a mechanism in its mode, and its event margins."""
     nodes, par, aux = prog.nodes, prog.par, prog.ints
@@ -207,7 +207,7 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
         g[go + G_WALL_HIGH] = par[po + P_HIGH] - position
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _joined_margins(prog, node, x, mode, f, f0, a, g):
     """Margins of two bodies in contact: common reversal or breakaway, and release of the contact."""
     nodes, par, aux = prog.nodes, prog.par, prog.ints
@@ -238,7 +238,7 @@ def _joined_margins(prog, node, x, mode, f, f0, a, g):
         g[go + G_JOINT_HIGH] = dry_level(prog, node, 0, 0.0, float(side), 0.0) - side * f[0]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def accelerate(prog, node, t, x, mode, force, f, dx, g):
     """Write the accelerations of a mechanism to dx; one copy of the code for all who are not in a hurry."""
     mechanism_rates(prog, node, t, x, mode, force, f, dx, g, False)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from .compiled import njit
+from .compiled import part
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .layout import (
@@ -46,7 +46,7 @@ from .layout import (
 from .mechanics import closed
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def settle(prog, drive, segment, t, x, mode, work, dx):
     """Bring all modes in line with the state; returns False if they keep changing (a sliding mode)."""
     w, f, trial = work
@@ -103,7 +103,7 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
     return False
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def track(prog, drive, segment, t, x, mode, work):
     """Write the outputs of engaged plays and tracking rate limiters into their states (end of a step)."""
     w, _, _ = work
@@ -114,7 +114,7 @@ def track(prog, drive, segment, t, x, mode, work):
             x[nodes[n, X]] = w[nodes[n, OUT]]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def answers_at_once(prog, node):
     """Whether a sampled controller has a direct path: its new output depends on what it reads (D != 0)."""
     nodes = prog.nodes
@@ -127,7 +127,7 @@ def answers_at_once(prog, node):
     return False
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def hold(prog, node, x, w):
     """Put out the new output of a sampled controller and hold it."""
     nodes, par, ou = prog.nodes, prog.par, prog.ints[H_U]
@@ -140,7 +140,7 @@ def hold(prog, node, x, w):
         x[xo + nd + i] = from_state + product(par, po + nd * (nd + ni + no) + i * ni, ni, w, ou)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def advance_state(prog, node, x, w):
     """Take the state of a sampled controller to the next sample, by what it reads now."""
     nodes, par = prog.nodes, prog.par
@@ -156,7 +156,7 @@ def advance_state(prog, node, x, w):
         x[xo + i] = w[scratch + i]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, reach):
     """Apply the event whose margin `slot` of `node` was crossed; returns its kind.
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from . import history
-from .compiled import njit
+from .compiled import part
 from .flow import combine, external, node_input, refresh, signals
 from .layout import DELAY, H_DELAYS, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
 from .modes import advance_state, answers_at_once, hold, settle
@@ -19,7 +19,7 @@ NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
 NODES = NODES + 0.5
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def next_sample(prog, t):
     """Time of the next tick of any sampled controller."""
     nearest = math.inf
@@ -30,7 +30,7 @@ def next_sample(prog, t):
     return nearest
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _sampled_size(prog, n):
     """Floats of a sampled node's matrices; its period follows them."""
     no = prog.nodes[n, NOUT]
@@ -38,7 +38,7 @@ def _sampled_size(prog, n):
     return nd * nd + nd * ni + no * nd + no * ni
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def tick(prog, drive, segment, t, x, mode, work, dx):
     """Run the sampled controllers whose tick falls on `t`.
 
@@ -67,14 +67,14 @@ def tick(prog, drive, segment, t, x, mode, work, dx):
                 advance_state(prog, n, x, w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _ticks(prog, n, t):
     """Whether a tick of this sampled node falls on `t`."""
     dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
     return abs(t / dt - round(t / dt)) < 1e-6
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part
 def record(prog, drive, segment, t, x, mode, work, y):
     """System outputs at one point."""
     w = work[0]
@@ -84,14 +84,14 @@ def record(prog, drive, segment, t, x, mode, work, y):
         y[i] = combine(prog, prog.ints[prog.ints[H_OUT] + i], w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, poly, xout, yout):
     """States and outputs at a fraction of a step."""
     inside(terms, theta, x, poly, xout)
     record(prog, drive, segment, t + theta * length, xout, mode, work, yout)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, poly, xi, spectrum, omega):
     """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss' quadrature."""
     w = work[0]
@@ -110,7 +110,7 @@ def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, pol
                 rotation *= turn
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def start_delays(prog, drive, segment, t, x, mode, work):
     """Begin the history of every delay: its input has always been what it is now."""
     w = work[0]
@@ -125,7 +125,7 @@ def start_delays(prog, drive, segment, t, x, mode, work):
                 history.begin(prog, n, t, node_input(prog, n, 0, w), w)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def remember(prog, drive, segment, t, length, theta, generation, x, mode, work, terms, poly, xi):
     """Keep the inputs of all delays over the fraction `theta` of a step; False if there is no room."""
     w = work[0]

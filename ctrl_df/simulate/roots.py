@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import math
 
-from .compiled import njit
+from .compiled import part
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def value_slope(curve, terms, theta):
     """Value and slope of a power series."""
     value, slope = curve[terms], 0.0
@@ -19,7 +19,7 @@ def value_slope(curve, terms, theta):
     return value, slope
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def first_root(curve, terms, upto, scale):
     """First passage of a power series below zero within [0, upto]; 2.0 where there is none."""
     pieces = 8
@@ -52,7 +52,7 @@ def first_root(curve, terms, upto, scale):
     return 2.0
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _bottom(curve, terms, left, right):
     """Lowest point of a series between a falling and a rising end, by bisection of its slope."""
     best, lowest = left, math.inf
@@ -70,7 +70,7 @@ def _bottom(curve, terms, left, right):
     return best, lowest
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def _refine(curve, terms, left, value, right, value_right, scale):
     """Right end of the root between a value >= 0 on the left and one < 0 on the right: Newton kept inside."""
     theta = left + (right - left) * value / (value - value_right)

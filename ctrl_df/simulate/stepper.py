@@ -14,10 +14,11 @@ import math
 import numpy as np
 from scipy.integrate import DOP853, RK23, RK45
 
-from .compiled import njit
+from .compiled import part
 from .flow import node_input, rates
 from .layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
 from .mechanics import dry_level
+from .views import lean
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
 E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
@@ -35,7 +36,7 @@ GRAIN = 32.0 * np.finfo(float).eps  # the weights of error estimates add up to s
 NUDGE = 1e-4  # of the difference quotients of `grains`, relative to the size of a state
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, a, c, first, last, track, end):
     """Fill the rates k[first:last] of a step from x, each at x + h a[i] k; x1 is left at the last of them.
 
@@ -55,7 +56,7 @@ def stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, a, c, fi
                 lowest[m] = min(lowest[m], g[m])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part(inline=True)
 def measure(j, count, h, k, x1, size):
     """Size that the relative tolerance of state j refers to; of one near zero, what the step moves it by."""
     moved = 0.0
@@ -64,7 +65,7 @@ def measure(j, count, h, k, x1, size):
     return max(size[j], min(abs(x1[j]), max(2.0 * size[j], moved)))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def grains(prog, drive, segment, t, x, mode, work, k0, size, trial, dx, g, grain):
     """Write what rounding leaves of each rate: the last digits of all the terms it is the sum of.
 
@@ -101,7 +102,7 @@ def grains(prog, drive, segment, t, x, mode, work, k0, size, trial, dx, g, grain
                 grain[i] += GRAIN * term
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part
 def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, size, grain, rtol, atol, want_g):
     """One step from x to x1 with k[0] known; fills the other rates, g (at the end); returns the scaled error.
 
@@ -112,7 +113,7 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
     n = x.shape[0]
     error = 0.0
     if order == 8:
-        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, A8, C8, 1, 13, want_g, want_g)
+        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A8), lean(C8), 1, 13, want_g, want_g)
         e3 = e5 = 0.0
         for j in range(n):
             scale = atol + h * grain[j] + rtol * measure(j, 13, h, k, x1, size)
@@ -130,9 +131,9 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
             return 0.0
         return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * n)
     if order == 5:
-        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, A5, C5, 1, 7, False, want_g)
+        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A5), lean(C5), 1, 7, False, want_g)
     else:
-        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, A3, C3, 1, 4, False, want_g)
+        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A3), lean(C3), 1, 4, False, want_g)
     for j in range(n):
         scale = atol + h * grain[j] + rtol * measure(j, 7 if order == 5 else 4, h, k, x1, size)
         value = 0.0
@@ -147,11 +148,11 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
     return np.sqrt(error / n)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
     """Coefficients of the 7th-order interpolant of a finished DOP853 step, into poly[0:7]."""
     n = x.shape[0]
-    stages(prog, drive, segment, t, h, x, mode, work, k, g, g, poly[7], A8X, C8X, 13, 16, False, False)
+    stages(prog, drive, segment, t, h, x, mode, work, k, g, g, poly[7], lean(A8X), lean(C8X), 13, 16, False, False)
     for j in range(n):
         delta = x1[j] - x[j]
         poly[0, j] = delta
@@ -164,7 +165,7 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
             poly[3 + i, j] = h * value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def roughness(size, grain, h, rtol, atol, poly):
     """Error of the 7th-order interpolant relative to tolerance, judged by its last term.
 
@@ -179,7 +180,7 @@ def roughness(size, grain, h, rtol, atol, poly):
     return ROUGH * worst
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@part
 def prepare(order, h, k, poly):
     """Power series of a finished step of order 5 or 3, into poly; returns the number of its terms."""
     n = k.shape[1]
@@ -197,7 +198,7 @@ def prepare(order, h, k, poly):
     return terms
 
 
-@njit(cache=True, error_model="numpy", _nrt=False, forceinline=True)
+@part
 def inside(terms, theta, x, poly, out):
     """State at the fraction `theta` of a step: a power series of so many terms, or DOP853's form (0)."""
     n = x.shape[0]
