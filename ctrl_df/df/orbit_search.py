@@ -15,7 +15,7 @@ from ..status import Status
 from . import shooting
 from .linear_orbit import linear_orbit
 from .shooting import CLOSED, SPENT, close_orbit
-from .shot import make_shot, place, shoot
+from .shot import make_shot, set_state, shoot
 from .symmetries import Probe, Sizes, find_symmetries
 
 RTOL = 5e-10
@@ -199,7 +199,7 @@ class OrbitSearch:
     def _state(self, y, mode=None):
         """State at coordinates y."""
         x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
-        place(self.shot, np.array(y, float), x, mode)
+        set_state(self.shot, np.array(y, float), x, mode)
         return State(0.0, x, mode)
 
     def _nudged(self, state):

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..simulate import driver
-from ..simulate.compiled import njit
+from ..simulate.compiled import njit, part
 from ..simulate.driver import copy
-from .native import call_native
+from ..simulate.native import call_native
+from ..simulate.views import lean
 from .shot import coordinates, place
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
@@ -25,8 +24,17 @@ CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 TOLERANCE = 3e-10  # error of an orbit's state, relative to its size
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
+    """`close`, from Python."""
+    return close(
+        lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum), budget,
+        shots, eager,
+    )  # fmt: skip
+
+
+@part
+def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
     """Close an orbit from (x, mode), in place, by chord and Broyden steps.
 
     The integrals of the closed shot go to `spectrum`. `shots` bounds the shots, `budget` the integration
@@ -35,8 +43,9 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
     n, nf = x.shape[0], shot.free.shape[0]
     y0, y1, change, x0 = shot.trial[0], shot.trial[1], shot.trial[2], shot.trial[3]
     last, end = shot.trial[7], shot.trial[6]
-    jacobian, m0 = shot.jacobian, mode.copy()
-    shot.size[:] = 0.0
+    jacobian, m0 = shot.jacobian, shot.trial_mode[0]
+    for i in range(n):
+        shot.size[i] = 0.0
     fresh_jacobian = False
     moved = False  # `change` is the step that led to the present point, `last` the closing error before it
     previous, best = math.inf, math.inf
@@ -45,12 +54,12 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
     expected = 1e-2  # closing error of the shot to come
     for _ in range(shots):
         copy(x, x0)
-        m0[:] = mode
+        copy(mode, m0)
         coordinates(shot, x, y0)
         # far from the orbit coarse shots do
         loose = 1.0 if take else max(1.0, min(1e-3 * expected, 1e-7) / rtol)
         reason = call_native(
-            shot.shoot,
+            shot.take,
             (
                 shot, drive, time, x, mode, mirrored, loose * rtol, atol, hmax,
                 spectrum if take else shot.no_spectrum, budget,
@@ -85,7 +94,7 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
             error < TOLERANCE or (jacobians > 1 and stale and miss < 100 * rtol and error < 1e3 * rtol)
         ):
             copy(x0, x)
-            mode[:] = m0
+            copy(m0, mode)
             far_off = mirrored and not centered and _center(shot, y1, x)
             if not take or far_off:
                 # tolerances are relative to the state: a small motion far from its centre is not yet exact
@@ -122,7 +131,9 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
             # far from an orbit the motion itself is the better guide: x holds the end of the shot
             moved = False
             previous = math.inf
-            jacobian[:] = math.nan
+            for r in range(nf):
+                for c in range(nf):
+                    jacobian[r, c] = math.nan
             continue
         for i in range(n):
             last[i] = y1[i]
@@ -132,7 +143,7 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
                 change[f] = -y0[i]
             y0[i] += change[f]
         copy(y0, y1)
-        mode[:] = m0
+        copy(m0, mode)
         place(shot, y0, x, mode)
         if mirrored:
             _center(shot, last, x)
@@ -148,7 +159,7 @@ def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum
     return OPEN, best
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _center(shot, step, x):
     """Move free positions to where half a period mirrors them onto themselves; tell whether that was far.
 
@@ -167,7 +178,7 @@ def _center(shot, step, x):
     return far
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _broyden(shot, jacobian, change, before, after):
     """Correct the Jacobian of the shot by what the last step did to the closing error (before, after)."""
     nf = shot.free.shape[0]
@@ -188,13 +199,12 @@ def _broyden(shot, jacobian, change, before, after):
             jacobian[r, c] += value * change[c] / (size * size) / total
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget):
     """Difference the shot over its free coordinates; `step` is the closing error at x0."""
-    y, end, x = np.empty(x0.shape[0]), np.empty(x0.shape[0]), np.empty(x0.shape[0])
-    mode = m0.copy()
+    y, end, x, base = shot.trial[8], shot.trial[9], shot.trial[10], shot.trial[11]
+    mode = shot.trial_mode[1]
     kinds = shot.tally[2]
-    base = np.empty(x0.shape[0])
     coordinates(shot, x0, base)
     for c in range(shot.free.shape[0]):
         i = shot.free[c]
@@ -206,11 +216,11 @@ def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, 
             h = -h
         y[i] += h
         h = y[i] - base[i]
-        mode[:] = m0
+        copy(m0, mode)
         if h != 0.0:
             place(shot, y, x, mode)
             reason = call_native(
-                shot.shoot, (shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget)
+                shot.take, (shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget)
             )
             if reason != driver.DONE:
                 return False
@@ -229,7 +239,7 @@ def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, 
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _newton_step(shot, jacobian, step, change):
     """Solve (1 - J) change = step by elimination with pivots; False where the matrix is singular."""
     nf = shot.free.shape[0]
@@ -270,7 +280,7 @@ def _newton_step(shot, jacobian, step, change):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def spectral_radius(shot, jacobian):
     """Largest multiplier of a shot, from the growth of the Jacobian's powers."""
     nf = jacobian.shape[0]
@@ -306,12 +316,12 @@ def spectral_radius(shot, jacobian):
     return math.exp(log_size)
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _attracts(shot, jacobian):
     return spectral_radius(shot, jacobian) < 1.0 + 1e-3  # neutral directions, differenced, come out near 1
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _mismatch(shot, y0, y1):
     """Return the closing error relative to the sizes of the coordinates; leave the step itself in y1."""
     n = y0.shape[0]

@@ -14,13 +14,12 @@ import numpy as np
 
 from ..simulate import driver
 from ..simulate import layout as L
-from ..simulate.compiled import njit
-from ..simulate.driver import run
+from ..simulate.compiled import apart, njit, part
 from ..simulate.engine import harmonic_drive
 from ..simulate.flow import combine, refresh
 from ..simulate.modes import settle
+from ..simulate.native import call_native, native_address
 from ..simulate.views import lean
-from .native import call_native, native_address
 
 _CHATTER_ROOM = 60  # runs go on where the event log is full
 
@@ -28,8 +27,8 @@ _CHATTER_ROOM = 60  # runs go on where the event log is full
 class Shot(NamedTuple):
     """Everything a shot needs that stays the same from shot to shot; see `make_shot`."""
 
-    run: int  # addresses of the engine and of `shoot`
-    shoot: int
+    run: int  # addresses of the engine and of `take`
+    take: int
     prog: L.Program
     space: tuple
     scale: np.ndarray  # (4, ng) scales of margins
@@ -55,6 +54,7 @@ class Shot(NamedTuple):
     size: np.ndarray  # sizes of the coordinates
     jacobian: np.ndarray  # (nf, nf), kept from point to point
     trial: np.ndarray  # rows of scratch, states
+    trial_mode: np.ndarray  # rows of scratch, modes
     matrix: np.ndarray  # (3, nf, nf) scratch
     shifts: np.ndarray  # (ns, n) directions of free position
     ends: np.ndarray  # (2, ny) outputs at the start and at the end of the last shot with a spectrum
@@ -70,28 +70,35 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
     no_spectrum = np.zeros((rows, 0), complex)
     log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
-    arguments = (
-        engine.program, drive, np.zeros(9), vector, modes, 1.0, none, rows_x, rows_y, 8, 1e-9, 0.0, 1.0,
-        True, False, -1, 0.0, -1, 1e-11, 1, log_t, log_n, log_k, vector, np.zeros((4, ng)), 0, engine._space,
-        no_spectrum, 1.0,
-    )  # fmt: skip
     shot = Shot(
-        native_address(run, arguments), 0, engine.program, engine._space, np.zeros((4, ng)), np.zeros(9),
+        driver.address(), 0, engine.program, engine._space, np.zeros((4, ng)), np.zeros(9),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
-        np.full((nf, nf), np.nan), np.zeros((8, max(n, 1))), np.zeros((3, nf, nf)),
+        np.full((nf, nf), np.nan), np.zeros((14, max(n, 1))), np.zeros((4, len(modes)), np.int64), np.zeros((3, nf, nf)),
         np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(6, np.int64),
     )  # fmt: skip
     return shot._replace(
-        shoot=native_address(shoot, (shot, drive, 1.0, vector, modes, True, 1e-9, 1e-12, 1.0, no_spectrum, 1))
+        take=native_address(take, (shot, drive, 1.0, vector, modes, True, 1e-9, 1e-12, 1.0, no_spectrum, 1))
     )
 
 
 # --- one shot ---------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
+    """`take` one shot, from Python."""
+    return call_native(
+        shot.take,
+        (
+            lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
+            budget,
+        ),
+    )  # fmt: skip
+
+
+@apart
+def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
     """Run (x, mode), in place, from t = 0 over `time`, mirrored afterwards if asked; return why it ended.
 
     With columns in `spectrum` the integrals of the outputs against exp(-j k omega t) are written to it, and
@@ -104,10 +111,12 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     for j in range(x.shape[0]):
         # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
         shot.space[6][j] = max(abs(x[j]), 0.1 * shot.space[6][j])
-    settle(lean(prog), lean(drive), 0, 0.0, lean(x), lean(mode), lean(work), lean(shot.space[5]))
+    settle(prog, drive, 0, 0.0, x, mode, work, shot.space[5])
     wanted = spectrum.shape[1] > 0
     if wanted:
-        spectrum[:] = 0.0
+        for i in range(spectrum.shape[0]):
+            for k in range(spectrum.shape[1]):
+                spectrum[i, k] = 0.0
         _outputs(shot, drive, 0.0, x, mode, 0)
     reason = driver.DONE
     kinds = 0
@@ -136,7 +145,7 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     return reason
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _stuck(prog, mode):
     """1 where every body is held by friction or at a stop."""
     bodies = 0
@@ -149,15 +158,15 @@ def _stuck(prog, mode):
     return 1 if bodies > 0 else 0
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _outputs(shot, drive, t, x, mode, row):
-    prog, w = lean(shot.prog), lean(shot.space[0][0])
-    refresh(prog, lean(drive), 0, t, lean(x), lean(mode), w)
+    prog, w = shot.prog, shot.space[0][0]
+    refresh(prog, drive, 0, t, x, mode, w)
     for i in range(shot.ends.shape[1]):
         shot.ends[row, i] = combine(prog, prog.ints[prog.ints[L.H_OUT] + i], w)
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def mirror(shot, x, mode):
     """Mirror the state of an odd system: what follows is the mirror image of what would have followed."""
     prog = shot.prog
@@ -182,7 +191,7 @@ def mirror(shot, x, mode):
 # --- coordinates ------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def coordinates(shot, x, y):
     """Y = T x."""
     for i in range(x.shape[0]):
@@ -192,7 +201,13 @@ def coordinates(shot, x, y):
         y[i] = value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
+def set_state(shot, y, x, mode):
+    """`place`, from Python."""
+    place(lean(shot), lean(y), lean(x), lean(mode))
+
+
+@part
 def place(shot, y, x, mode):
     """Set the state at coordinates y (clipped to gaps and stops); contacts survive if untouched."""
     prog, n = shot.prog, x.shape[0]

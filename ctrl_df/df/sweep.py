@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..simulate import layout as L
-from ..simulate.compiled import njit
+from ..simulate.compiled import njit, part
+from ..simulate.driver import copy
 from ..simulate.layout import Drive
-from .shooting import CLOSED, close_orbit
+from ..simulate.views import lean
+from .shooting import CLOSED, close
 from .shot import coordinates, place
 
 
@@ -24,8 +24,12 @@ def sweep(
     relative to the period in ``past[3, 0]``; `past_mode` the newest modes. `coefficients`: (1, nh) scratch
     of the drive. Returns points done, outcome of the last, points known.
     """
+    shot, samples, coefficients, amplitudes, omegas = (
+        lean(shot), lean(samples), lean(coefficients), lean(amplitudes), lean(omegas),
+    )  # fmt: skip
+    power, past, past_mode, out, ends = lean(power), lean(past), lean(past_mode), lean(out), lean(ends)
     n = power.shape[0]
-    x, mode, y = np.zeros(n), past_mode.copy(), np.zeros(n)
+    x, mode, y = shot.trial[12], shot.trial_mode[2], shot.trial[13]
     eager = False
     before = -1
     for p in range(amplitudes.shape[0]):
@@ -40,14 +44,14 @@ def sweep(
             elif known >= 3:
                 value = 3.0 * (past[0, j] - past[1, j]) + past[2, j]
             x[j] = value * unit(power[j], A, omega)
-        mode[:] = past_mode
+        copy(past_mode, mode)
         coordinates(shot, x, y)
         _snap(shot, y, mode)
         place(shot, y, x, mode)
         period = 2.0 * math.pi / omega
         shot.clock[2] = past[3, 0] * period
         shot.tally[0] = 0
-        outcome, miss[p] = close_orbit(
+        outcome, miss[p] = close(
             shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol, 0.0,
             hmax * period, out[p], budget, 12, eager,
         )  # fmt: skip
@@ -57,12 +61,13 @@ def sweep(
         eager = shot.tally[0] <= 2
         kinds[p] = shot.tally[2]
         still[p] = shot.tally[5]
-        ends[p] = shot.ends
+        for i in range(2):
+            copy(shot.ends[i], ends[p, i])
         for j in range(n):
             past[2, j] = past[1, j]
             past[1, j] = past[0, j]
             past[0, j] = x[j] / unit(power[j], A, omega)
-        past_mode[:] = mode
+        copy(mode, past_mode)
         known = min(known + 1, 3)
         if kinds[p] != before:
             known = 1
@@ -70,13 +75,13 @@ def sweep(
     return amplitudes.shape[0], CLOSED, known
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def unit(power, A, omega):
     """Return what a state is measured in on a sweep: the motion of a free inertia under the force."""
     return A / omega**power
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _snap(shot, y, mode):
     """Contacts stay contacts when a state is scaled."""
     prog = shot.prog

@@ -31,7 +31,7 @@ from .parts import PartCompiler
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _IMPORT = re.compile(r"^from[ ]+(\.+)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n(]*)", re.MULTILINE)
-_COMPILED = re.compile(r"^@(njit|part|intrinsic|numba\.njit)\b", re.MULTILINE)
+_COMPILED = re.compile(r"^@(njit|part|apart|intrinsic|numba\.njit)\b", re.MULTILINE)
 
 
 def njit(cache=True, **options) -> Any:
@@ -44,6 +44,11 @@ def njit(cache=True, **options) -> Any:
         return dispatcher
 
     return decorate
+
+
+def apart(function) -> Any:
+    """Decorate a function that is called by its address alone (`ctrl_df.simulate.native`), on views."""
+    return njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
 def part(function=None, *, inline=False) -> Any:

@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 
 from . import history
 from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
-from .compiled import njit, part
+from .compiled import apart, njit, part
 from .flow import rates
-from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, G
+from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, Drive, G, Program
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
+from .native import call_native, native_address
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
 from .stepper import grains, inside, prepare, prepare8, roughness, step
 from .views import lean
@@ -58,22 +60,35 @@ def copy(source, target):
         target[i] = source[i]
 
 
+@functools.cache
+def address() -> int:
+    """Return the address of `advance`, compiled now if need be."""
+    none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
+    prog = Program(np.zeros((0, 13), np.int64), np.zeros(H_HISTORY + 1, np.int64), none)
+    drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
+    arguments = (
+        prog, drive, none, none, counts, 0.0, none, rows, rows, 8, 0.0, 0.0, 0.0, True, True, -1, 0.0, 1, 0.0,
+        0, none, counts, counts, none, rows, 0, workspace(prog), np.zeros((0, 0), complex), 0.0,
+    )  # fmt: skip
+    return native_address(advance, arguments)
+
+
 @njit(error_model="numpy")
 def run(
-    prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
+    engine, prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
     watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
     spectrum, omega,
 ):  # fmt: skip
-    """Run from clock[0] to t_end: `advance` on views of the arrays."""
-    return advance(
+    """Run from clock[0] to t_end: `advance`, at its address `engine`, on views of the arrays."""
+    return call_native(engine, (
         lean(prog), lean(drive), lean(clock), lean(x), lean(mode), t_end, lean(tout), lean(xout), lean(yout),
         order, rtol, atol, hmax, locate, stop_at_event, watch, watch_level, watch_sign, height, max_steps,
         lean(log_t), lean(log_n), lean(log_k), lean(before), lean(scale), fresh, lean(space), lean(spectrum),
         omega,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
-@part
+@apart
 def advance(
     prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
     watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,

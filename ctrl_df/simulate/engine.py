@@ -220,7 +220,7 @@ class Engine:
         spectrum = np.zeros((self.noutputs, 0), complex) if spectrum is None else spectrum
         times = np.zeros(0) if times is None else np.ascontiguousarray(times, dtype=float)
         now = state.copy()
-        ng = int(self.program.ints[layout.H_NG]) + 1
+        ng, address = int(self.program.ints[layout.H_NG]) + 1, driver.address()
         scale = now.scale if now.scale is not None else np.zeros((4, ng))
         xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
         clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1])
@@ -253,7 +253,7 @@ class Engine:
                 until = min(t_end, times[int(clock[1]) + _MOST_OUTPUTS])
             with pointers.interruptible():
                 reason = driver.run(
-                    self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order, rtol, atol,
+                    address, self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order, rtol, atol,
                     max_step, locate, stop_at_event, watch, level, -direction, height,
                     min(max_steps - int(clock[3]), chunk), log_t, log_n, log_k, before, scale, fresh,
                     self._space, spectrum, omega,

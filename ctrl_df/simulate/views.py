@@ -137,18 +137,19 @@ def _setitem(context, builder, sig, args):
     return context.get_dummy_value()
 
 
-def _lean_type(kind):
+def lean_type(kind):
+    """Type of a value once it is lean."""
     if isinstance(kind, types.Array):
         return View(kind.dtype, kind.ndim)
     if isinstance(kind, types.NamedTuple):
-        return types.NamedTuple([_lean_type(k) for k in kind.types], kind.instance_class)
+        return types.NamedTuple([lean_type(k) for k in kind.types], kind.instance_class)
     if isinstance(kind, types.BaseTuple):
-        return types.Tuple([_lean_type(k) for k in kind.types])
+        return types.Tuple([lean_type(k) for k in kind.types])
     return types.unliteral(kind)
 
 
 def _lean_value(context, builder, kind, value):
-    target = _lean_type(kind)
+    target = lean_type(kind)
     if isinstance(kind, types.Array):
         array = cgutils.create_struct_proxy(kind)(context, builder, value)
         made = cgutils.create_struct_proxy(target)(context, builder)
@@ -171,4 +172,4 @@ def lean(typingctx, value):
     def codegen(context, builder, sig, args):
         return _lean_value(context, builder, sig.args[0], args[0])
 
-    return _lean_type(value)(value), codegen
+    return lean_type(value)(value), codegen

@@ -2,7 +2,7 @@
 
 numba links what a function calls into it and optimises the whole again; with an engine inside, every caller
 would take half a minute to compile. Called through its address, the engine is compiled once and its callers
-in seconds.
+in seconds. What is passed are views (`ctrl_df.simulate.views`): few values, and one form of each function.
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ import numba
 from numba import types
 from numba.extending import intrinsic
 
+from .views import lean_type
+
 
 def native_address(function, arguments) -> int:
-    """Return the address of a dispatcher's code for such arguments, compiled now if need be."""
-    signature = tuple(numba.typeof(a) for a in arguments)
+    """Return the address of an `apart` function's code for such arguments, compiled now if need be."""
+    signature = tuple(lean_type(numba.typeof(a)) for a in arguments)
     function.compile(signature)
     result = function.overloads[signature]
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
