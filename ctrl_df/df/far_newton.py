@@ -144,7 +144,7 @@ class _Map:
     def mismatch(self, y):
         """Return end less start of the free coordinates; takes note of sizes."""
         begin, end = self.shot(y)
-        inside, omega = self.search.shot.space[6], self.search.omega
+        inside, omega = self.search.shot.space.size, self.search.omega
         size = np.maximum(np.abs(begin), np.abs(end))
         mixed = np.count_nonzero(self.s.transform, axis=1) > 1
         # a coordinate may be near zero at both ends and swing in between

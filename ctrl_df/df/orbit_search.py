@@ -97,7 +97,7 @@ class OrbitSearch:
         run = self.engine.run(
             self.engine.start(), 6 * np.pi / omega, harmonic_drive([[0.0, A]], omega), max_steps=20_000
         )
-        seen = np.maximum(np.abs(run.state.x), self.shot.space[6])
+        seen = np.maximum(np.abs(run.state.x), self.shot.space.size)
         pointers.raised.clear()
         if np.all(np.isfinite(seen)):
             states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
@@ -189,7 +189,7 @@ class OrbitSearch:
 
     def _resize(self, A):
         n = self.engine.nstates
-        self.shot.space[6][:] = (
+        self.shot.space.size[:] = (
             1e-3 * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
         )
         self.shot.size[:n] = 0.0

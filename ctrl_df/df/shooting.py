@@ -325,7 +325,7 @@ def _attracts(shot, jacobian):
 def _mismatch(shot, y0, y1):
     """Return the closing error relative to the sizes of the coordinates; leave the step itself in y1."""
     n = y0.shape[0]
-    seen = shot.space[6]
+    seen = shot.space.size
     for i in range(n):
         size = max(abs(y0[i]), abs(y1[i]))
         if shot.lower[i] > -math.inf:

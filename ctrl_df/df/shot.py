@@ -30,7 +30,7 @@ class Shot(NamedTuple):
     run: int  # addresses of the engine and of `take`
     take: int
     prog: L.Program
-    space: tuple
+    space: driver.Space
     scale: np.ndarray  # (4, ng) scales of margins
     clock: np.ndarray
     before: np.ndarray
@@ -105,13 +105,13 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
     the outputs at both ends to ``shot.ends``.
     """
     prog, clock = shot.prog, shot.clock
-    work = shot.space[0]
+    work = shot.space.work
     clock[0] = clock[1] = clock[3] = clock[4] = clock[5] = clock[6] = clock[7] = 0.0
     clock[8] = -1.0
     for j in range(x.shape[0]):
         # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
-        shot.space[6][j] = max(abs(x[j]), 0.1 * shot.space[6][j])
-    settle(prog, drive, 0, 0.0, x, mode, work, shot.space[5])
+        shot.space.size[j] = max(abs(x[j]), 0.1 * shot.space.size[j])
+    settle(prog, drive, 0, 0.0, x, mode, work, shot.space.dx)
     wanted = spectrum.shape[1] > 0
     if wanted:
         for i in range(spectrum.shape[0]):
@@ -160,7 +160,7 @@ def _stuck(prog, mode):
 
 @part
 def _outputs(shot, drive, t, x, mode, row):
-    prog, w = shot.prog, shot.space[0][0]
+    prog, w = shot.prog, shot.space.work[0]
     refresh(prog, drive, 0, t, x, mode, w)
     for i in range(shot.ends.shape[1]):
         shot.ends[row, i] = combine(prog, prog.ints[prog.ints[L.H_OUT] + i], w)

@@ -113,7 +113,7 @@ class Probe:
         x = x.copy()
         mode = engine._modes.copy() if mode is None else mode.copy()
         drive = constant_drive(np.full(engine.ninputs, u))
-        work, dx, g = engine._space[0], np.zeros(len(x)), np.full(self.ng + 1, np.inf)
+        work, dx, g = engine._space.work, np.zeros(len(x)), np.full(self.ng + 1, np.inf)
         y = np.zeros(engine.noutputs)
         look(prog, drive, t, x, mode, work, dx, g, y, True, 0.0)
         for node in prog.nodes:

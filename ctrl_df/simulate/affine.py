@@ -19,7 +19,7 @@ import numpy as np
 
 from . import layout as L
 from .compiled import part
-from .flow import rates
+from .flow import combine, rates
 from .layout import (
     A_BODIES,
     AUX,
@@ -57,7 +57,11 @@ class Memory(NamedTuple):
     a: np.ndarray  # (SLOTS, n, n)
     b: np.ndarray  # (SLOTS, n, nr)
     d: np.ndarray  # (SLOTS, n)
+    c: np.ndarray  # (SLOTS, n): rates at zero
     rows: np.ndarray  # (SLOTS, ng + 2, n + nr + 1): a margin's slopes over x, r, t
+    bases: np.ndarray  # (SLOTS, ng + 2): margins at zero, inf where the mode has none
+    outs: np.ndarray  # (SLOTS, ny, n + nr + 2): an output's slopes over x, r, t, and its value at zero
+    owners: np.ndarray  # (ng + 2,): margin that each row belongs to
     base: np.ndarray  # scratch: rates and margins (ng + 3) at zero
     ahead: np.ndarray  # scratch: margins at a unit state, extended
     forcing: np.ndarray  # (TERMS + 1, nr): powers of the external inputs over a step
@@ -68,11 +72,13 @@ class Memory(NamedTuple):
 def memory(prog) -> Memory:
     """Allocate the memory of a program; small where its modes are not affine."""
     used = SLOTS if prog.ints[L.H_AFFINE] else 1
-    n, nr, ng, nm = (int(prog.ints[i]) for i in (H_NX, H_NR, H_NG, L.H_NM))
+    n, nr, ny, ng, nm = (int(prog.ints[i]) for i in (H_NX, H_NR, L.H_NY, H_NG, L.H_NM))
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
         probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros((used, n, n)),
-        np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, ng + 2, n + nr + 1)),
+        np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
+        np.zeros((used, ng + 2, n + nr + 1)), np.zeros((used, ng + 2)), np.zeros((used, ny, n + nr + 2)),
+        np.zeros(ng + 2, np.int64),
         np.zeros(ng + 3), np.zeros(ng + 3), np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
         np.zeros(n),
     )  # fmt: skip
@@ -130,10 +136,24 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
         elif column == n + nr:
             for j in range(n):
                 store.d[slot, j] = (dx[j] - dx0[j]) / UNIT
+        else:
+            for j in range(n):
+                store.c[slot, j] = dx0[j]
+        # the signals stand in the work vector since the rates were taken
+        for i in range(store.outs.shape[1]):
+            value = combine(prog, prog.ints[prog.ints[L.H_OUT] + i], work[0])
+            if column < 0:
+                store.outs[slot, i, n + nr + 1] = value
+            else:
+                store.outs[slot, i, column] = (value - store.outs[slot, i, n + nr + 1]) / UNIT
         if column >= 0:
             for i in range(store.rows.shape[1]):
                 known_margin = store.base[i] < math.inf
                 store.rows[slot, i, column] = (margin[i] - store.base[i]) / UNIT if known_margin else 0.0
+    for i in range(store.bases.shape[1]):
+        owner = i if i < prog.ints[H_NG] else _owner(prog, i - prog.ints[H_NG])
+        store.owners[i] = owner
+        store.bases[slot, i] = store.base[i] if owner >= 0 else math.inf
     return slot
 
 

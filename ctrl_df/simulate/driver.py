@@ -6,14 +6,16 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from . import history
-from .affine import HARMONICS, crossing, forced, memory, recall, series, shrink
+from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
 from .compiled import apart, njit, part
 from .flow import rates
-from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_TRACK, NG, Drive, G, Program
+from .glide import Glide, glide, glide_memory
+from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_NY, H_TRACK, NG, Drive, G, Program
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .native import call_native, native_address
@@ -29,6 +31,28 @@ PATIENCE = 40  # steps of order 5 after one of order 3 that failed
 GRAINS = 200  # steps after which rounding is asked anew
 REACH = 1e-4  # of a step: the time over which rates of inputs are taken
 SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
+
+
+class Space(NamedTuple):
+    """Scratch arrays of a run; see `workspace`."""
+
+    work: tuple  # signals, inputs and the history of delays; forces; a state
+    k: np.ndarray  # rates of the stages of a step
+    poly: np.ndarray  # interpolant
+    x1: np.ndarray  # states
+    xi: np.ndarray
+    dx: np.ndarray
+    size: np.ndarray  # running size of each state
+    grain: np.ndarray  # see `grains`
+    g: np.ndarray  # margins
+    g0: np.ndarray
+    gtol: np.ndarray
+    lowest: np.ndarray
+    norm: np.ndarray
+    owner: np.ndarray  # node of each margin
+    memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
+    store: Memory
+    tracks: Glide
 
 
 def workspace(prog, delays: bool = False):
@@ -50,7 +74,9 @@ def workspace(prog, delays: bool = False):
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
     vectors = [np.zeros(n) for _ in range(5)] + [np.zeros(ng + 1) for _ in range(5)]
-    return (work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), memory(prog))
+    store = memory(prog)
+    tracks = glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY]))
+    return Space(work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), store, tracks)
 
 
 @part(inline=True)
@@ -103,7 +129,7 @@ def advance(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store = space
+    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks = space
     n, ng = x.shape[0], scale.shape[1]
     t, index, h = clock[0], int(clock[1]), clock[2]
     segment = int(clock[6])
@@ -112,6 +138,7 @@ def advance(
     held = nt > 0 and drive.linear == 0
     has_tracked, bumpy, delays = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1, prog.ints[H_DELAYS] > 0
     affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
+    gliding = affine and locate and watch < 0 and nh == 0 and nt > 2 and spectrum.shape[1] == 0
     if affine and nh > 1 and drive.omega > 0.0:
         # the series of the forcing has to converge as well
         hmax = min(hmax, 2.5 / ((nh - 1) * drive.omega))
@@ -177,6 +204,18 @@ def advance(
             jumped = False
         if affine:
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
+            if gliding and segment + 1 < nt and t == drive.time[segment]:
+                gone, index, next_tick, ticked = glide(
+                    prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x, mode, tout, xout,
+                    yout, size, scale, max_steps - steps, rtol, next_tick, x1, xi, dx, g,
+                )  # fmt: skip
+                if gone > 0:
+                    steps += gone
+                    segment += gone - 1
+                    h = max(h, drive.time[segment + 1] - t)
+                    t = drive.time[segment + 1]
+                    known, jumped = False, ticked
+                    continue
         if jumped or not known:
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
             if locate and (has_tracked or watch >= 0):

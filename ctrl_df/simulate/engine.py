@@ -234,10 +234,10 @@ class Engine:
         fresh = int(now.fresh)
         pointers.raised.clear()
         pointers.gave_nan.clear()
-        memo = self._space[-2]
+        memo = self._space.memo
         memo[2] = 0.0
         chunk = max(int(_FIRST_CHUNK / (1 + (self.nstates / 6) ** 2)), 10)
-        past = history.stored(self.program, self._space[0][0])
+        past = history.stored(self.program, self._space.work[0])
         if self.delayed and not fresh:
             if now.history is None:
                 raise ValueError(
