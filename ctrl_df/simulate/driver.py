@@ -27,7 +27,8 @@ DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
 sliding, step below the resolution of time, more steps within a delay than its history holds."""
 
-PATIENCE = 40  # steps of order 5 after one of order 3 that failed
+PATIENCE = 40  # steps before a lower order that failed is tried again
+DENSE = 1e-3  # error of a step, times its tolerance, below which a lower order is tried
 GRAINS = 200  # steps after which rounding is asked anew
 REACH = 1e-4  # of a step: the time over which rates of inputs are taken
 SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
@@ -154,6 +155,7 @@ def advance(
     jumped = False  # something outside the states jumped just now: modes may be out of line
     generation = 1.0  # of the record that a delay opens next
     patience = slot = 0
+    level = order  # of steps that samples cut short
     stale = 0  # steps until rounding is asked anew
     blocked = ng - 1 if clock[7] > 0.5 else -1
     reason = DONE
@@ -288,9 +290,7 @@ def advance(
                     stale = GRAINS
                 stale -= 1
                 # samples much denser than the motion: a cheaper pair does
-                rank = order
-                if order == 5 and truncated and patience == 0 and h >= 2.0 * length:
-                    rank = 3
+                rank = level if truncated and h >= 2.0 * length else order
                 error = step(
                     rank,
                     prog,
@@ -311,10 +311,13 @@ def advance(
                     atol,
                     locate,
                 )
-                if not error <= 1.0 and rank == 3:
+                if not error <= 1.0 and rank < order:
+                    level = 8 if rank == 5 else min(order, 5)
                     patience = PATIENCE
                     continue
                 patience = max(patience - 1, 0)
+                if truncated and rank == level and patience == 0 and error < DENSE:
+                    level = 5 if level == 8 else 3
                 if not error < math.inf:
                     h = 0.2 * length
                     if not h >= 0.1 * max(1e-12 * abs(t), shortest):
@@ -331,7 +334,7 @@ def advance(
                         h = 0.9 * share * length
                         continue
                 h_next = h
-                if rank != 3:
+                if rank == order:
                     grow = 5.0
                     if error > (1e-6 if order == 8 else 1e-4):
                         grow = min(5.0, 0.9 * error ** (-1.0 / order))
