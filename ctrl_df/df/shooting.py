@@ -16,7 +16,7 @@ import numpy as np
 from ..simulate import driver
 from ..simulate.compiled import njit
 from ..simulate.driver import copy
-from .native import call_native
+from ..simulate.native import call_native
 from .shot import coordinates, place
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)

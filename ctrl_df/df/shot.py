@@ -19,7 +19,7 @@ from ..simulate.driver import run
 from ..simulate.engine import harmonic_drive
 from ..simulate.flow import combine, external, signals
 from ..simulate.modes import settle
-from .native import call_native, native_address
+from ..simulate.native import call_native, native_address
 
 _CHATTER_ROOM = 60  # runs go on where the event log is full
 
