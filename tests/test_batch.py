@@ -19,7 +19,7 @@ import ctrl_df as cdf
 from ctrl_df.column import Column, Differs
 from ctrl_df.simulate.batch import _require_room
 from ctrl_df.simulate.engine import Engine, sampled_drive
-from ctrl_df.simulate.groups import Group, groups_of
+from ctrl_df.simulate.groups import Group, assigned, groups_of
 from ctrl_df.simulate.runs import harmonic_drives, run_many, sampled_drives
 
 T = np.linspace(0, 0.8, 401)
@@ -371,6 +371,25 @@ def test_run_many_has_a_time_span_a_start_and_outputs_for_each_run():
         np.testing.assert_allclose(runs.states[mine], single.states, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(runs.x[i], single.state.x, rtol=1e-9, atol=1e-12)
     assert [s.ok for s in runs.status] == [True, True, True, False]
+
+
+def test_runs_take_their_systems_in_any_order():
+    block = PLAIN.with_effect(cdf.InputDelay(0.0))
+    delays, windows = np.array([0.0, 2e-3, 0, 5e-3]), np.array([[0, 100], [100, 250]])
+    system, window = np.repeat(np.arange(4), 2), np.tile(np.arange(2), 4)
+    groups = assigned(groups_of("a test", block, {"input_delay.delay": delays}, 4), system)
+    first, last = windows[window].T
+    runs = run_many(
+        groups, np.zeros((1, 3)), T[first], T[last - 1], T, sampled_drives(T, U[None, None], "zoh"),
+        first=first, count=last - first,
+    )  # fmt: skip
+    for i in range(8):
+        t, u = T[first[i] : last[i]], U[first[i] : last[i]]
+        single = cdf.event_response(
+            block, t, u, input_hold="zoh", params={"input_delay.delay": delays[system[i]]}
+        )
+        mine = runs.outputs[runs.at[i] : runs.at[i] + runs.count[i]]
+        np.testing.assert_allclose(mine, single.outputs.T, rtol=1e-9, atol=1e-12)
 
 
 def test_run_many_under_waves():

@@ -67,6 +67,26 @@ def grouped(parts: Iterable[tuple[Engine, np.ndarray]]) -> list[Group]:
     return groups
 
 
+def assigned(groups: Iterable[Group], system) -> list[Group]:
+    """Let every run take one of the systems that are grouped: windows of a record, each with many parameters.
+
+    Parameters
+    ----------
+    groups : iterable of Group
+        Of k systems, in the place of runs.
+    system : (runs,) int array
+        The system of each run, 0 to k - 1.
+    """
+    system, found = np.asarray(system), []
+    for group in groups:
+        row = np.full(max(int(system.max(initial=-1)), int(group.runs.max(initial=-1))) + 1, -1)
+        row[group.runs] = group.row
+        runs = np.flatnonzero(row[system] >= 0)
+        if runs.size:
+            found.append(Group(group.engine, group.par, runs, row[system[runs]]))
+    return found
+
+
 def groups_of(owner: str, system, values: Mapping[str, np.ndarray], runs: int) -> list[Group]:
     """Pack a system for many runs whose parameters differ.
 
