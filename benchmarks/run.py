@@ -24,6 +24,7 @@ import numpy as np  # noqa: E402
 import ctrl_df as cdf  # noqa: E402
 from ctrl_df.identify.simulator import Simulator  # noqa: E402
 from ctrl_df.identify.windows import make_windows  # noqa: E402
+from ctrl_df.simulate.runs import processors  # noqa: E402
 
 ROWS: list[tuple[str, str, str, bool]] = []
 
@@ -273,6 +274,44 @@ def records() -> None:
     row("10,000 samples with five effects", f"{1e3 * worst:.1f} ms", "10 ms", worst <= 0.010)
 
 
+def batches() -> None:
+    """Time 1,000 runs in one call over one run by `event_response`; starts, parameters, inputs differ."""
+    rng, runs, t = np.random.default_rng(2), 1_000, 1e-3 * np.arange(2_500)
+    block = cdf.friction_mass(9, 5, 0.5, 5.5)
+    u = 15 * np.sin(7 * t) + np.outer(rng.uniform(4, 12, runs), np.sin(31 * t))
+    starts = rng.normal(size=(runs, 2)) * [1e-3, 0.1]
+    params = {"mass": rng.uniform(7, 11, runs), "coulomb.level": rng.uniform(2, 5, runs)}
+
+    def batch(threads):
+        cdf.batch_response(block, t, u, starts, params, threads=threads, input_hold="zoh")
+
+    def singles(clock):
+        times = []
+        for i in range(40):
+            mine, begin = {name: v[i] for name, v in params.items()}, clock()
+            cdf.event_response(block, t, u[i], starts[i], params=mine, input_hold="zoh")
+            times.append(clock() - begin)
+        return statistics.median(times)
+
+    singles(time.process_time), batch(1)
+    ratios, spread = [], []
+    for _ in range(5):
+        # beside each other, as the machine is now
+        single, begin = singles(time.process_time), time.process_time()
+        batch(1)
+        ratios.append((time.process_time() - begin) / runs / single)
+        single, begin = singles(time.perf_counter), time.perf_counter()
+        batch(2)
+        spread.append((time.perf_counter() - begin) / runs / single)
+    ratio, two = statistics.median(ratios), statistics.median(spread)
+    what = "batch_response, 1,000 runs of 2,500 samples, over event_response"
+    row(what, f"{ratio:.2f} x", "0.8 x", ratio <= 0.8)
+    if processors() < 2:
+        row(f"{what}, two cores", "this machine has one core", "0.4 x", False)
+    else:
+        row(f"{what}, two cores, wall", f"{two:.2f} x", "0.4 x", two <= 0.4)
+
+
 def imports() -> None:
     """Import time beyond python-control's, and the first family of a fresh process."""
     timed = "import time, control; t = time.perf_counter(); import ctrl_df; print(time.perf_counter() - t)"
@@ -298,7 +337,16 @@ def imports() -> None:
 
 def main() -> int:
     """Measure everything, print the table; exit code 1 if a row fails."""
-    parts = [accuracy_closed, accuracy_engine, exact_orbits, family_times, simulation, records, imports]
+    parts = [
+        accuracy_closed,
+        accuracy_engine,
+        exact_orbits,
+        family_times,
+        simulation,
+        records,
+        batches,
+        imports,
+    ]
     chosen = [p for p in parts if not sys.argv[1:] or p.__name__ in sys.argv[1:]]
     for part in chosen:
         try:

@@ -49,6 +49,7 @@ _LAZY = {
     "closed_loop": "simulate.loop",
     "sampled": "simulate.sampled",
     "event_response": "simulate.response",
+    "batch_response": "simulate.batch",
     "DescribingFunctionResponse": "limit_cycles.predict",
     "describing_function_response": "limit_cycles.predict",
     "LimitCycle": "limit_cycles.grade",

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from .column import Column
+
 CHECK_VALUE = "Check the value and its unit (SI)."
 _SHOWN = 60  # characters of a value that an error repeats
 
@@ -35,7 +37,9 @@ def is_number(value) -> bool:
         return False
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and value.dtype.kind in "iuf"
-    return isinstance(value, int | float | np.number) or (hasattr(value, "__float__") and np.ndim(value) == 0)
+    return isinstance(value, int | float | np.number | Column) or (
+        hasattr(value, "__float__") and np.ndim(value) == 0
+    )
 
 
 def number(
@@ -51,14 +55,17 @@ def number(
     remedy: str = CHECK_VALUE,
     infinite: bool = False,
 ) -> float:
-    """Return one real number within its bounds; `lower` itself is excluded if `strict`."""
+    """Return one real number within its bounds; `lower` itself is excluded if `strict`.
+
+    A `Column` (one number for each of many runs) is one as well, and stays what it is.
+    """
     if not is_number(value):
         kind = f"one real number [{unit}]" if unit else "one real number"
         tail = "Convert text with float()." if isinstance(value, str | bytes) else remedy
         raise TypeError(f"{owner} needs {name} as {kind}; got {shown(value)}. {tail}")
     given = _as_float(value)
     enough = given > lower if strict else given >= lower
-    finite = infinite or not math.isinf(given)
+    finite = infinite or abs(given) < math.inf
     if not (enough and given <= upper and finite):  # NaN fails every comparison
         described = f" ({meaning}, unit {unit or 1})" if meaning else (f" [{unit}]" if unit else "")
         rule = _rule(name, lower, upper, strict, infinite)
@@ -66,7 +73,9 @@ def number(
     return given
 
 
-def _as_float(value) -> float:
+def _as_float(value) -> Any:
+    if isinstance(value, Column):
+        return value
     try:
         return float(value)
     except OverflowError:  # an integer beyond the range of floats

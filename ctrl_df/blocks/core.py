@@ -98,7 +98,7 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
                 if has_state:
                     names.append(effect.id)
     return Core(
-        masses=tuple(map(float, masses)),
+        masses=tuple(masses),
         joint=joint,
         forces=tuple(forces),
         friction=tuple(tuple(sorted(group, key=lambda e: e.rank)) for group in friction),

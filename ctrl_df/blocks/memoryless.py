@@ -274,7 +274,7 @@ def piecewise_linear(x, y, *, name=None) -> Element:
         )
     slopes = np.diff(ys) / np.diff(xs)
     intercepts = ys[:-1] - slopes * xs[:-1]
-    line = PiecewiseAffine.from_corners(xs[1:-1], slopes, intercepts)
+    line = PiecewiseAffine.from_corners(xs[1:-1].tolist(), slopes.tolist(), intercepts.tolist())
     values = dict(x=tuple(xs.tolist()), y=tuple(ys.tolist()))
     return Element("piecewise_linear", values, line, name=name)
 

@@ -38,8 +38,8 @@ class PiecewiseAffine:
     @classmethod
     def from_corners(cls, corners, slopes, intercepts) -> PiecewiseAffine:
         """Build adjoining regions between ascending `corners` (n corners, n + 1 lines)."""
-        edges = (-math.inf, *map(float, corners), math.inf)
-        return cls(edges[:-1], edges[1:], tuple(map(float, slopes)), tuple(map(float, intercepts)))
+        inner, slopes, intercepts = (tuple(1.0 * v for v in line) for line in (corners, slopes, intercepts))
+        return cls((-math.inf, *inner), (*inner, math.inf), slopes, intercepts)
 
     @property
     def hysteretic(self) -> bool:

@@ -200,7 +200,5 @@ class Tracer:
         x = x.copy()
         dx = np.zeros(self.n)
         slot = run.margin - int(program.nodes[node, layout.G])
-        jump(
-            program, self.drive, run.state.time, x, mode, self._work, dx, self._g, node, slot, self._reach
-        )
+        jump(program, self.drive, run.state.time, x, mode, self._work, dx, self._g, node, slot, self._reach)
         return x

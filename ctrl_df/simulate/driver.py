@@ -290,7 +290,7 @@ def advance(
                     stale = GRAINS
                 stale -= 1
                 # samples much denser than the motion: a cheaper pair does
-                rank = level if truncated and h >= 2.0 * length else order
+                rank = level if nt > 0 and not delays and truncated and h >= 2.0 * length else order
                 error = step(
                     rank,
                     prog,

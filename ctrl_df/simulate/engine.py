@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -21,10 +22,10 @@ RTOL = 1e-9
 _CHUNK_TIME = 0.2
 """Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed."""
 _FIRST_CHUNK = 10_000  # steps of a small system until the pace is known
-_FAR = 1e50  # a state beyond has run away: NaN is then no mistake of a law
+FAR = 1e50  # a state beyond has run away: NaN is then no mistake of a law
 _MOST_OUTPUTS = 100_000  # recorded in one go
 
-_STATUS = {
+STATUS = {
     driver.DONE: Status.CONVERGED,
     driver.EVENT: Status.CONVERGED,
     driver.SECTION: Status.CONVERGED,
@@ -123,15 +124,19 @@ class Engine:
     ----------
     system : block, LTI system or interconnection
         What to run; see `ctrl_df.simulate.flatten`.
+    values : mapping
+        Parameters that differ from those of its blocks, checked already. With columns of numbers in it (see
+        `ctrl_df.column`) the engine runs the first of these systems, and ``par`` has the packed parameters of
+        all, for `ctrl_df.simulate.runs`.
     """
 
-    def __init__(self, system):
+    def __init__(self, system, values: Mapping[str, Any] | None = None):
         if isinstance(system, ct.TransferFunction):
             system = ct.ss(system)  # a transfer function has no state to integrate
         self.system = system
-        self._flat = flatten(system)
+        self._flat = flatten(system, values)
         self.nstates = system.nstates or 0
-        self.program, self._initial, self.node_names = pack(self._flat, self.nstates)
+        self.program, self.par, self._initial, self.node_names = pack(self._flat, self.nstates)
         self._space = driver.workspace(self.program, delays=True)
         self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
 
@@ -139,6 +144,14 @@ class Engine:
     def delayed(self) -> bool:
         """Whether a pure delay stands inside, whose state is a history."""
         return bool(self.program.ints[layout.H_DELAYS])
+
+    @property
+    def calls_python(self) -> bool:
+        """Whether a run calls functions back in Python (a user's system, a law that numba cannot compile)."""
+        return any(
+            node.kind == layout.SYSTEM or any(pointers.calls_python(law[0]) for law in node.laws)
+            for node in self._flat.nodes
+        )
 
     @property
     def _modes(self) -> np.ndarray:
@@ -273,8 +286,8 @@ class Engine:
                 memo[2] = 1.0  # the same run goes on: so does its count of events without progress
                 continue
             break
-        status = _STATUS[reason]
-        if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < _FAR:
+        status = STATUS[reason]
+        if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < FAR:
             raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
         events: Any = (
             tuple(np.concatenate(c) for c in zip(*kept, strict=True))

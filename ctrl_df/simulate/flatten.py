@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.linalg import block_diag
 from ..blocks.mechanism import Mechanism
 from . import layout as L
 from .nodes import Node, core_node, lti_node, primitive_node, sampled_node, user_node
+from .parameters import own_parameters, with_values
 
 
 @dataclass
@@ -27,27 +29,37 @@ class Flat:
     keep: list = field(default_factory=list)
 
 
-def flatten(system) -> Flat:
-    """Turn a system (a block, an LTI system, or any interconnection of them) into nodes."""
-    return _fold_gains(_flatten(system, 0))
+def flatten(system, values: Mapping[str, Any] | None = None) -> Flat:
+    """Turn a system (a block, an LTI system, or any interconnection of them) into nodes.
+
+    Parameters
+    ----------
+    system : block, LTI system or interconnection
+    values : mapping
+        Parameters that differ from those of the blocks, as `ctrl_df.simulate.parameters` has checked them;
+        each block takes those it knows. A `Column` in the place of a number stands for many systems at once.
+    """
+    return _fold_gains(_flatten(system, 0, values or {}))
 
 
-def _flatten(system, x0: int) -> Flat:
+def _flatten(system, x0: int, values) -> Flat:
     if isinstance(system, ct.InterconnectedSystem):
-        return _interconnection(system, x0)
+        return _interconnection(system, x0, values)
+    name = str(getattr(system, "name", ""))
+    system = with_values(system, values)
     if isinstance(system, Mechanism):
-        return _mechanism(system, x0)
+        return _mechanism(system, x0, name)
     sampled = getattr(system, "sampled", None)
     if sampled is not None:
-        return _single(sampled_node(sampled, x0), system)
+        return _single(sampled_node(sampled, x0), name)
     primitive = getattr(system, "primitive", None)
     if primitive is not None:
-        return _single(primitive_node(primitive, x0), system)
+        return _single(primitive_node(primitive, x0), name)
     if isinstance(system, ct.StateSpace | ct.TransferFunction):
-        return _single(lti_node(system, x0), system)
+        return _single(lti_node(system, x0), name)
     if isinstance(system, ct.NonlinearIOSystem):
         node, keep = user_node(system, x0)
-        flat = _single(node, system)
+        flat = _single(node, name)
         flat.keep.append(keep)
         return flat
     raise TypeError(
@@ -57,17 +69,16 @@ def _flatten(system, x0: int) -> Flat:
     )
 
 
-def _single(node: Node, system) -> Flat:
+def _single(node: Node, name: str) -> Flat:
     nin, nout = node.nin, node.nout
-    return Flat(
-        [node], np.zeros((nin, nout)), np.eye(nin), np.eye(nout), np.zeros((nout, nin)), [str(system.name)]
-    )
+    return Flat([node], np.zeros((nin, nout)), np.eye(nin), np.eye(nout), np.zeros((nout, nin)), [name])
 
 
-def _interconnection(system: ct.InterconnectedSystem, x0: int) -> Flat:
+def _interconnection(system: ct.InterconnectedSystem, x0: int, values) -> Flat:
     parts = []
     for sub in system.syslist:
-        parts.append(_flatten(sub, x0))
+        mine = {name: values[name] for name in own_parameters(sub) if name in values} if values else {}
+        parts.append(_flatten(sub, x0, mine))
         x0 += sub.nstates or 0
     # stack the parts, then close the connections
     ys, yr = _stack([p.ys for p in parts]), _stack([p.yr for p in parts])
@@ -123,7 +134,7 @@ def _stack(matrices):
     return np.asarray(block_diag(*matrices)).reshape(rows, cols) if rows and cols else np.zeros((rows, cols))
 
 
-def _mechanism(block: Mechanism, x0: int) -> Flat:
+def _mechanism(block: Mechanism, x0: int, name: str) -> Flat:
     """Input channel, core and output channel in a row."""
     core = block.core
     before = [primitive_node(p, x0 + max(state, 0)) for p, state in core.input_channel]
@@ -144,4 +155,4 @@ def _mechanism(block: Mechanism, x0: int) -> Flat:
     ys[0, last] = 1.0
     for i in range(1, block.noutputs):
         ys[i, first + i] = 1.0
-    return Flat(nodes, us, ur, ys, np.zeros((block.noutputs, 1)), [str(block.name)] * len(nodes))
+    return Flat(nodes, us, ur, ys, np.zeros((block.noutputs, 1)), [name] * len(nodes))

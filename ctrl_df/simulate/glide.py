@@ -30,15 +30,16 @@ UNEVEN = 1e-6  # difference of two samples, relative, from which on propagators 
 NEAR = 1e-3  # times the tolerance: how far samples may be from uniform, relative to one of them
 
 SAMPLE, OFFSET = 0, 1  # entries of `Glide.span`
-USABLE, USELESS = 1, 2  # entries of `Glide.ready`
+USABLE, USELESS = 1, 2  # entries of `Memory.ready`
 
 
 class Glide(NamedTuple):
     """Propagators of the modes a `Memory` knows, and scratch. Rows: states, margins, outputs, states and
     outputs at the offset."""
 
-    span: np.ndarray  # (2,): sample time [s] of the propagators, offset [s] of outputs behind a sample's start
-    ready: np.ndarray  # (SLOTS,)
+    span: (
+        np.ndarray
+    )  # (2,): sample time [s] of the propagators, offset [s] of outputs behind a sample's start
     first: np.ndarray  # (SLOTS, rows + 1): where a row begins in `column` and `value`
     column: np.ndarray  # (SLOTS, room)
     value: np.ndarray  # (SLOTS, room)
@@ -59,7 +60,7 @@ def glide_memory(memory: Memory, affine: bool, ny: int) -> Glide:
     nz = n + 2 * nr + 2 if affine else 0
     rows = 2 * n + margins + 2 * ny if affine else 0
     return Glide(
-        np.zeros(2), np.zeros(used, np.int64), np.zeros((used, rows + 1), np.int64),
+        np.zeros(2), np.zeros((used, rows + 1), np.int64),
         np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)), np.zeros((used, rows), np.int64),
         np.zeros((used, rows), np.int64), np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
         np.zeros(nz), np.zeros(nz), np.zeros((6, nz, nz)),
@@ -85,7 +86,7 @@ def glide(prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x
     uneven = segment + 2 < nt and abs(time[segment + 2] - time[segment + 1] - length) > UNEVEN * length
     if uneven or length > hmax:
         return 0, index, next_tick, False
-    _set_span(tracks, length, segment, time, index, tout, rtol)
+    _set_span(store, tracks, length, segment, time, index, tout, rtol)
     h, offset = tracks.span[SAMPLE], tracks.span[OFFSET]
     whole = offset == h
     copied = False
@@ -99,9 +100,9 @@ def glide(prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x
     here[one] = ahead[one] = bound[one] = 1.0
     outputs = n + margins
     while done < room and segment + 1 < nt and time[segment + 1] <= t_end:
-        if tracks.ready[slot] == 0:
+        if store.ready[slot] == 0:
             _make(prog, store, tracks, slot, n, nr, ny)
-        if tracks.ready[slot] == USELESS:
+        if store.ready[slot] == USELESS:
             break
         t0, t1 = time[segment], time[segment + 1]
         near = NEAR * rtol * h + 2.0 * EPS * (abs(t0) + abs(t1))
@@ -198,7 +199,7 @@ def _row(first, column, values, row, z):
 
 
 @part
-def _set_span(tracks, h, segment, time, index, tout, rtol):
+def _set_span(store, tracks, h, segment, time, index, tout, rtol):
     """Take over another sample time or another offset of the outputs; the propagators are then of no use."""
     near = NEAR * rtol * h + 2.0 * EPS * (abs(time[segment]) + abs(time[segment + 1]))
     offset = tracks.span[OFFSET]
@@ -213,8 +214,8 @@ def _set_span(tracks, h, segment, time, index, tout, rtol):
         if not known:
             tracks.span[SAMPLE] = h
         tracks.span[OFFSET] = offset
-        for slot in range(tracks.ready.shape[0]):
-            tracks.ready[slot] = 0
+        for slot in range(store.ready.shape[0]):
+            store.ready[slot] = 0
 
 
 @part
@@ -267,7 +268,7 @@ def _make(prog, store, tracks, slot, n, nr, ny):
         for j in range(nz):
             usable = usable and tracks.curved[slot, row, j] < math.inf
     if not usable:
-        tracks.ready[slot] = USELESS
+        store.ready[slot] = USELESS
         return
     _exponential(m, h, halvings, whole, power, scratch)
     _exponential(m, offset, halvings, part_way, power, scratch)
@@ -299,7 +300,7 @@ def _make(prog, store, tracks, slot, n, nr, ny):
                 if n <= j < n + nr:
                     tracks.fed[slot, row] = 1
         tracks.first[slot, row + 1] = count
-    tracks.ready[slot] = USABLE
+    store.ready[slot] = USABLE
 
 
 @part

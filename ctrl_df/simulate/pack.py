@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..column import spread
 from . import history
 from . import layout as L
 from .layout import Program
@@ -17,8 +18,27 @@ WIDEST_AFFINE = 24
 """States up to which a product with a full matrix is cheaper than the rates themselves."""
 
 
-def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
-    """Order the nodes by feedthrough, lay all out in arrays; returns program, initial modes, node names."""
+def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str]]:
+    """Order the nodes by feedthrough, lay all out in arrays.
+
+    Parameters
+    ----------
+    flat : Flat
+        Its numbers may be columns, one number for each of many systems that differ in numbers only.
+    nx : int
+        States of the system.
+
+    Returns
+    -------
+    program : Program
+        Of the first of these systems.
+    par : (systems, npar) array
+        The packed parameters of each; one row without columns.
+    modes : (nm,) array
+        Modes to begin with.
+    names : list of str
+        Of the nodes.
+    """
     nodes = flat.nodes
     s_at = np.cumsum([0] + [n.nout for n in nodes])
     u_at = np.cumsum([0] + [n.nin for n in nodes])
@@ -92,8 +112,9 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, list[str]]:
     ints[L.H_BUMP] = int(
         any(n.kind == L.MECHANISM and min(n.par[L.P_BUMP0 : L.P_BUMP1 + 1]) < np.inf for n in nodes)
     )
-    program = Program(table, np.array(ints, np.int64), np.array(par, float))
-    return program, np.array(modes, np.int64), [flat.names[i] for i in order]
+    numbers = spread(par)
+    program = Program(table, np.array(ints, np.int64), numbers[0].copy())
+    return program, numbers, np.array(modes, np.int64), [flat.names[i] for i in order]
 
 
 def _feed_order(nodes, us, s_at, u_at, names) -> list[int]:

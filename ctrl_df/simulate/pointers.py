@@ -19,6 +19,7 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba import types
+from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
 from ..status import Status
@@ -57,6 +58,14 @@ def address(law: Callable, kind: str) -> int:
     if known is None:
         known = _compiled[law] = _compile(law, kind)
     return known[0]  # pyright: ignore[reportReturnType]
+
+
+def calls_python(address: int) -> bool:
+    """Whether a law's address leads back into Python, because numba could not compile the law."""
+    return any(
+        place == address and not isinstance(kept, CFunc)  # pyright: ignore[reportGeneralTypeIssues]
+        for place, kept in _compiled.values()
+    )
 
 
 def _compile(law, kind):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from typing import Any
 
 import control as ct
@@ -11,7 +10,9 @@ import numpy as np
 
 from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
 from ..status import Status
+from . import layout as L
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
+from .parameters import checked_parameters, with_values
 
 
 class EventResponse(ct.TimeResponseData):
@@ -68,7 +69,8 @@ def event_response(
         what it is then (its own entry here is for ordinary solvers and has no effect). To see a step arrive
         late, begin the times before the step.
     params : dict
-        Parameters of blocks that differ from their own values.
+        Parameters that differ from those of the block, or of the one block in an interconnection that has
+        them.
     input_hold : {'linear', 'zoh'}
         How samples are read between the times.
     rtol, atol : float
@@ -102,12 +104,14 @@ def event_response(
     for name, value in dict(keep_events=keep_events, return_states=return_states, squeeze=squeeze).items():
         if value is not None:
             flag("event_response", name, value)
-    times = _times(timepts)
-    limits = _limits(rtol, atol, max_step, max_steps, float(times[-1] - times[0]))
-    engine = Engine(_with_params(sys, params))
+    times = checked_times("event_response", timepts)
+    limits = checked_limits("event_response", rtol, atol, max_step, max_steps, float(times[-1] - times[0]))
+    engine = _engine(sys, params)
     system = engine.system
     x0 = _initial(system, initial_state)
-    check_positions(system, x0)
+    wrong = misplaced(engine, engine.par, x0[None])
+    if wrong is not None:
+        raise ValueError(wrong[1])
     drive, samples, keep = _drive(inputs, engine.ninputs, times, input_hold)
     if max_step is None and callable(inputs):
         limits["max_step"] = 5 * float(np.median(np.diff(times)))
@@ -143,41 +147,45 @@ def event_response(
     return response
 
 
-def check_positions(system, x0) -> None:
-    """Raise ValueError where an initial state violates a gap or a stop of one of the blocks."""
-    for core, first, name in _cores(system):
-        x = x0[first : first + core.nstates]
-        if core.bodies == 2 and core.joint in ("impact", "rigid"):
-            gap = core.gap if core.joint == "impact" else 0.0
-            delta = x[2] - x[0]
-            slack = 1e-12 * (gap + abs(x[0]) + abs(x[2]))
-            if not -slack <= delta <= gap + slack:
-                raise ValueError(
-                    f"the initial state of {name} needs 0 <= x_motor - x <= {gap:g} m (the clearance of its "
-                    f"joint); got {delta:g}. Start with x_motor = x."
-                )
-        if core.stop is not None:
-            low, high = core.stop.span
-            at = x[2 * core.driven]
-            if not low <= at <= high:
-                raise ValueError(
-                    f"the initial position of {name} must lie between its stops {low:g} and {high:g} m; "
-                    f"got {at:g}."
-                )
+def misplaced(engine, par: np.ndarray, x0: np.ndarray) -> tuple[int, str] | None:
+    """Return the first state that violates a gap or a stop, with what to say of it; None where all are right.
+
+    Parameters
+    ----------
+    engine : Engine
+    par : (n, npar) array
+        Packed parameters, one row a state.
+    x0 : (n, nx) array
+    """
+    nodes, ints = engine.program.nodes, engine.program.ints
+    found: list[tuple[int, str]] = []
+    for node, name in zip(nodes, engine.node_names, strict=True):
+        if node[L.KIND] != L.MECHANISM:
+            continue
+        aux, number_at, at = node[L.AUX], node[L.PAR], node[L.X]
+        x = x0[:, at]
+        driven = x0[:, at + 2] if ints[aux + L.A_BODIES] == 2 else x
+        joint = ints[aux + L.A_JOINT]
+        if ints[aux + L.A_BODIES] == 2 and joint in (L.J_RIGID, L.J_IMPACT):
+            gap = par[:, number_at + L.P_GAP] * (joint == L.J_IMPACT)
+            delta, slack = driven - x, 1e-12 * (gap + abs(x) + abs(driven))
+            for i in np.flatnonzero(~((-slack <= delta) & (delta <= gap + slack)))[:1]:
+                found.append((int(i), (
+                    f"the initial state of {name} needs 0 <= x_motor - x <= {gap[i]:g} m (the clearance of "
+                    f"its joint); got {delta[i]:g}. Start with x_motor = x."
+                )))  # fmt: skip
+        if ints[aux + L.A_STOP]:
+            low, high = par[:, number_at + L.P_LOW], par[:, number_at + L.P_HIGH]
+            for i in np.flatnonzero(~((low <= driven) & (driven <= high)))[:1]:
+                found.append((int(i), (
+                    f"the initial position of {name} must lie between its stops {low[i]:g} and {high[i]:g} "
+                    f"m; got {driven[i]:g}."
+                )))  # fmt: skip
+    return min(found, key=lambda wrong: wrong[0], default=None)
 
 
-def _cores(system, first=0):
-    if isinstance(system, ct.InterconnectedSystem):
-        for part in system.syslist:
-            yield from _cores(part, first)
-            first += part.nstates or 0
-    elif getattr(system, "core", None) is not None:
-        yield system.core, first, system.name
-
-
-def _limits(rtol, atol, max_step, max_steps, span) -> dict[str, Any]:
-    """Return the checked tolerances and bounds as keywords of `Engine.run`."""
-    owner = "event_response"
+def checked_limits(owner: str, rtol, atol, max_step, max_steps, span: float) -> dict[str, Any]:
+    """Return the checked tolerances and bounds as keywords of `Engine.run`; `span` [s] has to be covered."""
     rtol = number(
         owner, "rtol", rtol, lower=1e-14, upper=0.1, meaning="relative tolerance",
         remedy=f"Leave it out for {RTOL:g}; floats resolve no less than 1e-14.",
@@ -199,27 +207,26 @@ def _limits(rtol, atol, max_step, max_steps, span) -> dict[str, Any]:
     return dict(rtol=rtol, atol=atol, max_step=np.inf if max_step is None else max_step, max_steps=max_steps)
 
 
-def _with_params(system, params):
-    if params is None or (isinstance(params, Mapping) and not params):
-        return system
-    mapping("event_response", "params", params)
+def _engine(system, params) -> Engine:
+    """Return the engine of a system with some parameters changed."""
     if isinstance(system, ct.InterconnectedSystem):
-        raise ValueError(
-            "params of an interconnection: change the block itself with with_parameters, then interconnect."
-        )
-    if hasattr(system, "with_parameters"):
-        return system.with_parameters(params)
-    return ct.NonlinearIOSystem(
-        system.updfcn, system.outfcn, inputs=system.input_labels, outputs=system.output_labels,
-        states=system.state_labels, params={**system.params, **params}, name=system.name,
-    )  # fmt: skip
+        values = checked_parameters("event_response", system, params)
+        several = [name for name, v in values.items() if v.ndim]
+        if several:
+            raise ValueError(
+                f"event_response needs params[{several[0]!r}] as one number; got an array. "
+                "For many runs in one call use batch_response."
+            )
+        return Engine(system, {name: float(v) for name, v in values.items()})
+    return Engine(with_values(system, {} if params is None else mapping("event_response", "params", params)))
 
 
-def _times(timepts):
-    times = np.atleast_1d(real_array("event_response", "timepts", timepts, "s"))
+def checked_times(owner: str, timepts) -> np.ndarray:
+    """Return times [s] in ascending order, at least two."""
+    times = np.atleast_1d(real_array(owner, "timepts", timepts, "s"))
     if times.ndim != 1 or len(times) < 2 or np.any(np.diff(times) <= 0):
         raise ValueError(
-            "event_response needs timepts as at least two times in ascending order [s], each once; got "
+            f"{owner} needs timepts as at least two times in ascending order [s], each once; got "
             f"{shown(timepts)}. Sort them; for a run to 10 s give np.linspace(0, 10, 1001)."
         )
     return np.ascontiguousarray(times)

@@ -113,7 +113,26 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
     n = x.shape[0]
     error = 0.0
     if order == 8:
-        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A8), lean(C8), 1, 13, want_g, want_g)
+        stages(
+            prog,
+            drive,
+            segment,
+            t,
+            h,
+            x,
+            mode,
+            work,
+            k,
+            g,
+            lowest,
+            x1,
+            lean(A8),
+            lean(C8),
+            1,
+            13,
+            want_g,
+            want_g,
+        )
         e3 = e5 = 0.0
         for j in range(n):
             scale = atol + h * grain[j] + rtol * measure(j, 13, h, k, x1, size)
@@ -131,9 +150,47 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
             return 0.0
         return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * n)
     if order == 5:
-        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A5), lean(C5), 1, 7, False, want_g)
+        stages(
+            prog,
+            drive,
+            segment,
+            t,
+            h,
+            x,
+            mode,
+            work,
+            k,
+            g,
+            lowest,
+            x1,
+            lean(A5),
+            lean(C5),
+            1,
+            7,
+            False,
+            want_g,
+        )
     else:
-        stages(prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A3), lean(C3), 1, 4, False, want_g)
+        stages(
+            prog,
+            drive,
+            segment,
+            t,
+            h,
+            x,
+            mode,
+            work,
+            k,
+            g,
+            lowest,
+            x1,
+            lean(A3),
+            lean(C3),
+            1,
+            4,
+            False,
+            want_g,
+        )
     for j in range(n):
         scale = atol + h * grain[j] + rtol * measure(j, 7 if order == 5 else 4, h, k, x1, size)
         value = 0.0
@@ -152,7 +209,26 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
 def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
     """Coefficients of the 7th-order interpolant of a finished DOP853 step, into poly[0:7]."""
     n = x.shape[0]
-    stages(prog, drive, segment, t, h, x, mode, work, k, g, g, poly[7], lean(A8X), lean(C8X), 13, 16, False, False)
+    stages(
+        prog,
+        drive,
+        segment,
+        t,
+        h,
+        x,
+        mode,
+        work,
+        k,
+        g,
+        g,
+        poly[7],
+        lean(A8X),
+        lean(C8X),
+        13,
+        16,
+        False,
+        False,
+    )
     for j in range(n):
         delta = x1[j] - x[j]
         poly[0, j] = delta

@@ -159,10 +159,25 @@ def _lean_value(context, builder, kind, value):
         return made._getvalue()
     if isinstance(kind, types.BaseTuple):
         values = [
-            _lean_value(context, builder, k, builder.extract_value(value, i)) for i, k in enumerate(kind.types)
+            _lean_value(context, builder, k, builder.extract_value(value, i))
+            for i, k in enumerate(kind.types)
         ]
         return context.make_tuple(builder, target, values)
     return context.cast(builder, value, kind, target)
+
+
+@intrinsic
+def cut(typingctx, view, first, count):
+    """Return `count` elements, or rows, of a view from `first` on, as a view."""
+    if not isinstance(view, View):
+        return None
+
+    def codegen(context, builder, sig, args):
+        at, made, _ = _place(context, builder, view, args[0], sig.args[1], args[1])
+        made.data, made.n0 = at, args[2]
+        return made._getvalue()
+
+    return view(view, types.intp, types.intp), codegen
 
 
 @intrinsic

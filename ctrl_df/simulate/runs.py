@@ -1,0 +1,265 @@
+"""Many runs in one call: shared out among threads, none of which needs the interpreter."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..status import Status
+from . import driver, many, pointers
+from .engine import FAR, RTOL, STATUS
+from .groups import Group
+from .many import Drives, How, Rows
+
+_MOST_TOGETHER = 256  # runs between two looks at what is left to do
+_SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time
+
+
+def sampled_drives(time, samples, hold: str) -> Drives:
+    """External inputs as of `sampled_drive`: `time` (nt,) or (k, nt) [s], `samples` (k, nr, nt)."""
+    samples = np.require(samples, float, ["C", "W"])
+    time = np.array(np.atleast_2d(time), dtype=float, order="C")
+    k, nr, _ = samples.shape
+    return Drives(time, samples, int(hold == "linear"), np.zeros((k, nr, 0), complex), np.zeros(k))
+
+
+def harmonic_drives(coefficients, omega) -> Drives:
+    """External inputs as of `harmonic_drive`: `coefficients` (k, nr, nh) complex, `omega` (k,) [rad/s]."""
+    c = np.array(coefficients, dtype=complex, order="C")
+    omega = np.array(np.broadcast_to(omega, c.shape[:1]), dtype=float, order="C")
+    return Drives(np.zeros((1, 0)), np.zeros((*c.shape[:2], 0)), 1, c, omega)
+
+
+@dataclass
+class Runs:
+    """Outcome of `run_many`; the first axis is the run, unless said otherwise."""
+
+    outputs: np.ndarray  # (total, ny): those of run i are the rows at[i] : at[i] + count[i]
+    states: np.ndarray | None  # (total, nx), if kept
+    at: np.ndarray
+    count: np.ndarray
+    recorded: np.ndarray  # output times reached; NaN stands behind them
+    status: list[Status]
+    time: np.ndarray  # at which the run ended [s]
+    x: np.ndarray  # state there (runs, nx)
+    steps: np.ndarray
+    event_count: np.ndarray
+    events: tuple[np.ndarray, ...] | None = None  # run, time, node, kind, in the order of runs, if kept
+    errors: dict[int, Exception] = field(default_factory=dict)  # what functions called back raised, by run
+
+
+def run_many(
+    groups: Sequence[Group],
+    x0,
+    begin,
+    end,
+    times,
+    drives: Drives,
+    *,
+    drive: Any = 0,
+    first: Any = 0,
+    count: Any = None,
+    order: int = 8,
+    rtol: float = RTOL,
+    atol: float | None = None,
+    max_step: float = np.inf,
+    height: float | None = None,
+    max_steps: Any = 20_000_000,
+    states: bool = False,
+    events: bool = False,
+    threads: int | None = None,
+) -> Runs:
+    """Run many systems or one system many times, each from a fresh state, on all cores.
+
+    What is said to be "(runs,)" may be one number for all runs. The numbers are the same, to the last bit,
+    whatever the number of threads and whatever other runs are made in the same call.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        The systems; every run is in one group. All have the same numbers of states, inputs and outputs.
+    x0 : (runs, nx) array
+        States to begin with.
+    begin, end : (runs,) arrays
+        From when to when each runs [s].
+    times : (nt,) array
+        Output times [s], ascending within a run: all runs have all of them, or run i has
+        ``times[first[i] : first[i] + count[i]]``.
+    drives : Drives
+        External inputs, from `sampled_drives` or `harmonic_drives`.
+    drive : (runs,) int array
+        Which of them drives each run.
+    first, count : (runs,) int arrays
+        See `times`; `count` None: up to the end of `times`.
+    order, rtol, atol, max_step, height
+        As in `Engine.run`, the same for all runs.
+    max_steps : (runs,) int array
+        Bound on the work of each.
+    states, events : bool
+        Whether to keep the states at the output times, and the events.
+    threads : int or None
+        How many at once; None: as many as there are processors for this process. Runs that call Python back
+        are made one after the other whatever is asked.
+
+    Returns
+    -------
+    Runs
+        A run that fails leaves NaN behind what it has reached; no run stops the others.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C, within a fraction of a second.
+    """
+    runs = sum(len(g.runs) for g in groups)
+    engine = groups[0].engine
+    rows = _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine)
+    kept = np.empty((len(rows.outputs) if states else int(rows.count.max(initial=0)), engine.nstates))
+    atol = 0.0 if atol is None else float(atol)
+    height = max(rtol, 1e-10) if height is None else float(height)
+    how = How(int(order), float(rtol), atol, float(max_step), height)
+    work = _Work(groups, rows, drives, how, kept, states, events)
+    if any(g.engine.calls_python for g in groups):
+        work.one_by_one()
+    else:
+        work.on_threads(processors() if threads is None else threads)
+    status = [STATUS[int(r)] for r in rows.reason]
+    for run in work.failed:
+        status[run] = Status.USER_ERROR
+    return Runs(
+        rows.outputs, kept if states else None, rows.at, rows.count, rows.clock[:, 1].astype(int), status,
+        rows.clock[:, 0].copy(), rows.x, rows.clock[:, 3].astype(int), rows.events,
+        work.events() if events else None, work.failed,
+    )  # fmt: skip
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0)) or 1
+    return os.cpu_count() or 1
+
+
+def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine):
+    def each(values, kind: Any = float):
+        return np.array(np.broadcast_to(np.asarray(values, kind), (runs,)), order="C")
+
+    times = np.array(times, dtype=float, order="C")
+    first = each(first, np.int64)
+    count = len(times) - first if count is None else each(count, np.int64)
+    at = np.concatenate(([0], np.cumsum(count)))
+    clock = np.zeros((runs, 9))
+    clock[:, 0], clock[:, 8] = each(begin), -1
+    par, initial = np.zeros(runs, np.int64), [engine._initial] * runs
+    for group in groups:
+        par[group.runs] = group.row
+        for run in group.runs:
+            initial[run] = group.engine._initial
+    modes = np.concatenate(([0], np.cumsum([len(m) for m in initial]))).astype(np.int64)
+    x = np.array(np.broadcast_to(np.asarray(x0, float), (runs, engine.nstates)), order="C")
+    return Rows(
+        x, np.concatenate(initial), modes, clock, each(end), each(max_steps, np.int64), each(drive, np.int64),
+        par, times, first, count, at[:-1].copy(), np.empty((int(at[-1]), engine.noutputs)),
+        np.full(runs, many.NOT_BEGUN), np.zeros(runs, np.int64),
+    )  # fmt: skip
+
+
+class _Work:
+    """The runs of one call, done and to do."""
+
+    def __init__(self, groups, rows, drives, how, kept, states, events):
+        for array in (*rows, *drives, *(g.par for g in groups)):
+            # compiled code takes them for that
+            assert np.isscalar(array) or (array.flags.c_contiguous and array.flags.writeable)
+        self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
+        self.kept, self.states, self.logged = kept, states, events
+        self.stop = np.zeros(1, np.int64)
+        self.log: list[tuple[np.ndarray, ...]] = []
+        self.failed: dict[int, Exception] = {}
+
+    def on_threads(self, threads: int) -> None:
+        """Make all runs, so many at once."""
+        todo = deque(self._parts(threads))
+        threads = max(min(threads, len(todo)), 1)
+        # compiled, or read from its file, before any thread asks for it
+        self._run(self._desk(self.groups[0]), self.groups[0], np.zeros(0, np.int64))
+        pool = ThreadPoolExecutor(threads)
+        try:
+            for future in [pool.submit(self._work, todo) for _ in range(threads)]:
+                future.result()
+        except BaseException:
+            self.stop[0] = 1
+            raise
+        finally:
+            pool.shutdown()
+
+    def one_by_one(self) -> None:
+        """Make all runs in this thread: they call functions back that nobody knows to be safe elsewhere."""
+        for group in self.groups:
+            desk = self._desk(group)
+            for run in group.runs:
+                pointers.raised.clear()
+                pointers.gave_nan.clear()
+                with pointers.interruptible():
+                    self._run(desk, group, np.array([run]))
+                try:
+                    pointers.raise_kept()
+                except RuntimeError as error:
+                    self._fail(run, error)
+                    continue
+                far = np.max(np.abs(self.rows.x[run]), initial=0.0) >= FAR
+                if self.rows.reason[run] == driver.NAN and pointers.gave_nan and not far:
+                    self._fail(run, RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]})."))
+
+    def events(self) -> tuple[np.ndarray, ...]:
+        """Return all events that were logged: run, time [s], node, kind."""
+        if not self.log:
+            none = np.zeros(0, np.int64)
+            return none, np.zeros(0), none, none
+        run, time, node, kind = (np.concatenate(column) for column in zip(*self.log, strict=True))
+        order = np.argsort(run, kind="stable")
+        return run[order], time[order], node[order], kind[order]
+
+    def _parts(self, threads):
+        """Yield (group, runs) in parts small enough to be shared out evenly."""
+        for group in self.groups:
+            size = min(max(len(group.runs) // (_SHARES * threads), 1), _MOST_TOGETHER)
+            for i in range(0, len(group.runs), size):
+                yield group, group.runs[i : i + size].astype(np.int64)
+
+    def _work(self, todo):
+        desk = at = None
+        while not self.stop[0]:
+            try:
+                group, runs = todo.popleft()
+            except IndexError:
+                return
+            if group is not at:
+                desk, at = self._desk(group), group
+            self._run(desk, group, runs)
+
+    def _desk(self, group):
+        states = self.kept if self.states else np.empty_like(self.kept)
+        return many.make_desk(group.engine, states, self.states, self.logged, self.stop)
+
+    def _run(self, desk, group, runs):
+        done = 0
+        while True:
+            done = many.run_rows(desk, self.rows, self.drives, group.par, self.how, runs, done)
+            used = int(desk.tally[0])
+            if used:
+                log = (desk.log_row, desk.log_t, desk.log_n, desk.log_k)
+                self.log.append(tuple(column[:used].copy() for column in log))
+                desk.tally[0] = 0
+            if done == len(runs) or self.stop[0]:
+                return
+
+    def _fail(self, run, error):
+        """Let a run end with what a function called back has raised."""
+        self.failed[int(run)] = error
