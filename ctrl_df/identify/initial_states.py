@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -72,38 +73,37 @@ def reach(which, core, known, windows) -> np.ndarray:
     return np.column_stack([table[name] for name in which])
 
 
-def fill(states, core, given: Mapping[str, float], usual, speed: float) -> None:
-    """Write the states of a mechanism: `usual` is position, speed and acceleration of the body measured.
+def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
+    """Write the states (nw, nx) of a mechanism at the begin of windows.
 
-    `given` holds corrections by name; `speed` [m/s] is typical of the record.
+    `usual`: positions, speeds and accelerations (nw,) of the body measured; `given`: corrections by name, each
+    (nw,) or one number; `speed` [m/s] is typical of the record.
     """
-    x, v, a = (float(s) for s in usual)
+    x, v, a = usual
     x, v = x + given.get("x", 0.0), v + given.get("v", 0.0)
     if core.stop is not None:
-        low, high = core.stop.span
-        x = min(max(x, low), high)
+        x = np.clip(x, *core.stop.span)
     stretch, rate = _joint(core, a)
     if core.joint == IMPACT:
-        stretch = min(max(given.get("slack", stretch / core.gap), 0.0), 1.0) * core.gap
+        stretch = np.clip(given.get("slack", stretch / core.gap), 0.0, 1.0) * core.gap
         rate = given.get("slack_rate", 0.0)
     elif core.joint == ELASTIC:
         stretch, rate = stretch + given.get("stretch", 0.0), given.get("stretch_rate", 0.0)
     if core.bodies == 2 and core.measured == 1:
-        states[2], states[3] = x, v
-        states[0], states[1] = x - stretch, v - rate
+        states[:, 2], states[:, 3] = x, v
+        states[:, 0], states[:, 1] = x - stretch, v - rate
     else:
-        states[0], states[1] = x, v
+        states[:, 0], states[:, 1] = x, v
         if core.bodies == 2:
-            states[2], states[3] = x + stretch, v + rate
+            states[:, 2], states[:, 3] = x + stretch, v + rate
     if core.bodies == 2 and core.stop is not None:
-        low, high = core.stop.span
-        beyond = min(max(states[2], low), high) - states[2]
-        states[2] += beyond
-        states[0] += beyond
+        beyond = np.clip(states[:, 2], *core.stop.span) - states[:, 2]
+        states[:, 2] += beyond
+        states[:, 0] += beyond
     if core.bristle is not None:
-        slip, full = _bristles(states, core)
-        share = math.tanh(3 * slip / speed) + given.get("bristle", 0.0)
-        states[core.bristle_state] = min(max(share, -1.0), 1.0) * full
+        slip, full = np.array([_bristles(row, core) for row in states]).T
+        share = np.tanh(3 * slip / speed) + given.get("bristle", 0.0)
+        states[:, core.bristle_state] = np.clip(share, -1.0, 1.0) * full
 
 
 def corrections(states, core, usual, speed: float) -> dict[str, float]:
@@ -129,13 +129,13 @@ def at_rest(core, usual, speed: float) -> dict[str, float]:
     return corrections(states, core, usual, speed)
 
 
-def _joint(core, acceleration) -> tuple[float, float]:
+def _joint(core, acceleration) -> tuple[Any, float]:
     """Return how far a joint is bent by the load that it accelerates, and at what rate."""
     if core.joint == IMPACT:
-        return (core.gap if acceleration > 0 else 0.0), 0.0
+        return core.gap * (acceleration > 0), 0.0
     if core.joint == ELASTIC:
         pull = core.masses[0] * acceleration
-        return pull / core.stiffness + (core.gap if pull > 0 else 0.0), 0.0
+        return pull / core.stiffness + core.gap * (pull > 0), 0.0
     return 0.0, 0.0
 
 

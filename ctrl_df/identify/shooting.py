@@ -233,41 +233,63 @@ class Problem:
 
     def jacobian(self, theta, nuisance, base, central=False):
         """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""
+        pairs = [self._ends(i, theta, central) for i in range(len(self.variables))]
+        thetas = [end for pair in pairs for end in pair if end is not None]
+        moved: list[Signals] = [[] for _ in thetas]
+        by_start = []
+        for k, simulator in enumerate(self.simulators):
+            asked = [(self.windows[k], self.values(q), nuisance[k]) for q in thetas]
+            starts, widths = self._moved_starts(k, nuisance)
+            values = self.values(theta)
+            asked += [(self.windows[k], values, start) for start in starts if start is not None]
+            signals = simulator.run_all(asked)
+            for found, y in zip(moved, signals, strict=False):
+                found.append(y)
+            by_start.append(self._by_start(k, starts, widths, signals[len(thetas) :], base[k]))
+        self.nfev += len(thetas)
         columns: list[Signals] = [[] for _ in self.records]
-        for i, variable in enumerate(self.variables):
-            for k, column in enumerate(self._column(i, variable, theta, nuisance, base, central)):
+        signals = iter(moved)
+        for i, pair in enumerate(pairs):
+            ends = [base if end is None else next(signals) for end in pair]
+            below = theta if pair[1] is None else pair[1]
+            for k, column in enumerate(self._column(i, *ends, float(pair[0][i] - below[i]))):
                 columns[k].append(column)
         by_parameter = [
             np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)
         ]
-        return by_parameter, [self._by_start(k, theta, nuisance, base) for k in range(len(self.records))]
+        return by_parameter, by_start
 
-    def _column(self, i, variable, theta, nuisance, base, central) -> Signals:
-        h = self.steps[i]
+    def _ends(self, i, theta, central):
+        """Return the parameters between which variable `i` is differenced; None for those there are."""
+        h, variable = self.steps[i], self.variables[i]
         up = theta.copy()
         up[i] = variable.clip(theta[i] + h)
         if up[i] == theta[i]:
             h = -h
             up[i] = theta[i] + h
-        moved, other, width = self.simulate(up, nuisance), base, up[i] - theta[i]
-        if central:
-            down = theta.copy()
-            down[i] = variable.clip(theta[i] - h)
-            if down[i] != theta[i]:
-                other, width = self.simulate(down, nuisance), up[i] - down[i]
+        if not central:
+            return up, None
+        down = theta.copy()
+        down[i] = variable.clip(theta[i] - h)
+        return up, (None if down[i] == theta[i] else down)
+
+    def _column(self, i, moved, other, width) -> Signals:
+        """Return the derivatives by variable `i`, and choose its next step."""
+        variable, h = self.variables[i], self.steps[i]
         change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
         # Next time the output shall move by a third of the noise.
         wanted = abs(h) * 0.3 * self.noise / change if change > 0 else 10 * abs(h)
         self.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
-    def _by_start(self, k, theta, nuisance, base) -> np.ndarray:
-        """Return derivatives (n, ns) of one record's output by its initial states, all windows at once."""
-        simulator, windows, rows = self.simulators[k], self.windows[k], []
-        values = self.values(theta)
+    def _moved_starts(self, k, nuisance):
+        """Return initial states (nw, ns) of one record, each moved (None where its derivative is 1), and by how much."""
+        simulator, windows = self.simulators[k], self.windows[k]
+        starts, widths = [], []
         for j, name in enumerate(simulator.nuisances):
             if name == "x" and not simulator.tied:
-                rows.append(np.ones(len(self.measured[k])))
+                starts.append(None)
+                widths.append(None)
                 continue
             size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
                 self.priors[k][:, j],
@@ -276,8 +298,15 @@ class Problem:
             moved = nuisance[k].copy()
             sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             moved[:, j] += sign * size
-            width = np.repeat(sign * size, windows.ends - windows.begins)
-            rows.append((simulator.run(windows, values, moved) - base[k]) / width)
+            starts.append(moved)
+            widths.append(np.repeat(sign * size, windows.ends - windows.begins))
+        return starts, widths
+
+    def _by_start(self, k, starts, widths, signals, base) -> np.ndarray:
+        """Return derivatives (n, ns) of one record's output by its initial states, all windows at once."""
+        rows, signals = [], iter(signals)
+        for start, width in zip(starts, widths, strict=True):
+            rows.append(np.ones(len(base)) if start is None else (next(signals) - base) / width)
         self.nfev += len(rows) / len(self.simulators)
         return np.array(rows).T.reshape(len(self.measured[k]), len(rows))
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -13,12 +12,18 @@ from ..blocks.core import is_kinetic
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import Ramp
 from ..simulate.engine import State, sampled_drive
+from ..simulate.groups import grouped
 from ..simulate.loop import closed_loop
+from ..simulate.runs import run_many, sampled_drives
 from . import initial_states
 from .measurement import Measurement
 from .ready import Ready, of_block, of_loop, of_system
 from .windows import Windows, facts
 
+Request = tuple[Windows, Mapping[str, float] | None, np.ndarray | None]
+"""Windows, parameters that differ from the model's, corrections of the initial states."""
+
+_PREPARED = 4  # parameter sets whose models are kept ready
 _TIED = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
 
 
@@ -72,7 +77,7 @@ class Simulator:
         self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
         self.facts = facts(record)
         self.runs = 0
-        self._prepared: tuple[Any, Ready | None] = (None, None)
+        self._prepared: dict[Any, Ready] = {}
 
     @property
     def tied(self) -> bool:
@@ -146,14 +151,34 @@ class Simulator:
         array
             Where the model ran away, ten times the spread of the record beside its mean.
         """
-        self.runs += 1
-        part = self._prepare(values)
-        record = self.record
-        inside = windows.samples
+        return self.run_all([(windows, values, start)], rounded=rounded)[0]
+
+    def run_all(self, asked: Sequence[Request], *, rounded: bool = False) -> list[np.ndarray]:
+        """Do what `run` does for several (windows, values, start) in one call, on all cores.
+
+        Returns
+        -------
+        list of (n,) arrays
+            One for each that is asked for.
+        """
+        self.runs += len(asked)
+        parts = [self._prepare(values) for _, values, _ in asked]
+        if self.chained:
+            outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
+        else:
+            outputs = self._together(parts, asked)
+        return [
+            self._read(part, windows, out, rounded)
+            for part, (windows, _, _), out in zip(parts, asked, outputs, strict=True)
+        ]
+
+    def _one_by_one(self, part, windows: Windows, start) -> np.ndarray:
+        """Run the windows one after the other: hidden states go on from each into the next."""
+        record, inside = self.record, windows.samples
         out = np.empty(len(inside))
         drive, hidden = self._drive(part), {}
-        carried = initial_states.carried_names(part.core, self.begins) if part.core is not None else ()
-        on = self._followed(windows) if carried else ()
+        carried = initial_states.carried_names(part.core, self.begins)
+        on = self._followed(windows)
         for w, where in enumerate(windows.slices):
             t, follows = record.t[inside[where]], w in on
             if follows:
@@ -164,6 +189,65 @@ class Simulator:
                 out[where.start + run.recorded : where.stop] = np.nan
             came = self._arrival(part, windows, w + 1, run) if follows and run.status.ok else {}
             hidden = {k: came[k] for k in carried if k in came}
+        return out
+
+    def _together(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
+        """Run all windows of all that is asked for at once, except where systems differ in their states."""
+        outputs: list[np.ndarray] = [np.empty(0)] * len(asked)
+        sizes = [(p.engine.nstates, len(p.drive_time), p.hold) for p in parts]
+        for size in dict.fromkeys(sizes):
+            which = [i for i, s in enumerate(sizes) if s == size]
+            for i, out in zip(which, self._alike([parts[i] for i in which], [asked[i] for i in which]), strict=True):
+                outputs[i] = out
+        return outputs
+
+    def _alike(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
+        counts = [len(windows) for windows, _, _ in asked]
+        edges = np.concatenate(([0], np.cumsum(counts)))
+        ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
+        x0, times, lengths, drive = [], [], [], []
+        drives: dict[int, int] = {}  # parts have one each, shared by all windows
+        for part, (windows, _, start) in zip(parts, asked, strict=True):
+            x0.append(self._starts(part, windows, start))
+            times.append(self.record.t[windows.samples] - part.delay)
+            lengths.append(windows.ends - windows.begins)
+            drive.append(np.full(len(windows), drives.setdefault(id(part), len(drives))))
+        length = np.concatenate(lengths)
+        first = np.concatenate(([0], np.cumsum(length)[:-1]))
+        every = np.concatenate(times)
+        known = {id(p): p for p in parts}
+        shared = [known[i] for i in drives]
+        result = run_many(
+            grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)]),
+            np.concatenate(x0), every[first], every[first + length - 1], every,
+            sampled_drives(
+                np.array([p.drive_time for p in shared]), np.array([p.drive_value for p in shared])[:, None],
+                parts[0].hold or self.record.input_hold,
+            ),
+            drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
+            max_steps=60 * length + 20_000,
+        )  # fmt: skip
+        for error in result.errors.values():
+            raise error
+        column, ends = result.outputs[:, 0], np.concatenate((first, [len(every)]))
+        return [column[ends[i] : ends[j]] for i, j in zip(edges[:-1], edges[1:], strict=True)]
+
+    def _starts(self, part, windows: Windows, start) -> np.ndarray:
+        """Return the states (nw, nx) in which windows begin."""
+        x0 = np.zeros((len(windows), part.engine.nstates))
+        if part.core is None:
+            return x0
+        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start).T, strict=True))
+        states = x0[:, part.offset :]
+        usual = self._usual(part, windows, slice(None))
+        initial_states.fill(states, part.core, given, usual, self.facts.speed)
+        for state, samples in part.lags:
+            states[:, state] = samples[windows.begins]
+        return x0
+
+    def _read(self, part, windows: Windows, out: np.ndarray, rounded: bool) -> np.ndarray:
+        """Return what the sensors make of outputs; what ran away is set aside."""
+        record, inside = self.record, windows.samples
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
                 out += primitive.offset + primitive.rate * (record.t[inside] - later)
@@ -231,8 +315,8 @@ class Simulator:
 
     def _prepare(self, values) -> Ready:
         key = None if values is None else tuple(values.items())
-        if self._prepared[1] is not None and self._prepared[0] == key:
-            return self._prepared[1]
+        if key in self._prepared:
+            return self._prepared[key]
         model = self.with_values(values)
         if self.closed:
             part = of_loop(model, self.record, self.input, self.mechanism)
@@ -240,25 +324,27 @@ class Simulator:
             part = of_block(model, self.record, self.input, self.thin)
         else:
             part = of_system(model, self.record, self.input)
-        self._prepared = (key, part)
+        if len(self._prepared) >= _PREPARED:
+            del self._prepared[next(iter(self._prepared))]
+        self._prepared[key] = part
         return part
 
     def _start(self, part, windows, w, start, time, hidden) -> State:
         engine, core = part.engine, part.core
-        x0 = np.zeros(engine.nstates)
+        x0 = np.zeros((1, engine.nstates))
         if core is None:
-            return engine.start(x0, time)
+            return engine.start(x0[0], time)
         given = hidden | (dict(zip(self.nuisances, start, strict=True)) if start is not None else {})
         i = int(windows.begins[w])
         usual = self._usual(part, windows, w)
-        states = x0[part.offset :]
+        states = x0[:, part.offset :]
         initial_states.fill(states, core, given, usual, self.facts.speed)
         for state, samples in part.lags:
-            states[state] = samples[i]
-        return engine.start(x0, time)
+            states[:, state] = samples[i]
+        return engine.start(x0[0], time)
 
-    def _usual(self, part, windows, w) -> tuple[float, float, float]:
-        """Return position, speed and acceleration with which a window begins, without what sensors add.
+    def _usual(self, part, windows, w) -> tuple[Any, Any, Any]:
+        """Return position, speed and acceleration with which windows begin, without what sensors add.
 
         Noise can make of the acceleration what no force of the record does: it is held within what one does.
         """
@@ -267,7 +353,7 @@ class Simulator:
         ]
         shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
         usual = self.facts.force / sum(part.core.masses)
-        return windows.x[w] - shift, windows.v[w] - drift, usual * math.tanh(windows.a[w] / usual)
+        return windows.x[w] - shift, windows.v[w] - drift, usual * np.tanh(windows.a[w] / usual)
 
 
 def free_run(
