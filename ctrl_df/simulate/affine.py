@@ -43,6 +43,7 @@ from .roots import first_root
 TERMS = 20
 SLOTS = 16
 HARMONICS = 32
+LENGTHS = 2  # of steps whose propagators are kept
 UNIT = 2.0**200  # probes of linear maps: what is constant beside them vanishes without rounding them
 SHARE = 0.01
 """Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
@@ -54,7 +55,7 @@ class Memory(NamedTuple):
     probe: Drive  # external inputs of a unit
     seen: np.ndarray  # (SLOTS, nm) modes; `order` tells how many are known and which is the next to go
     order: np.ndarray
-    ready: np.ndarray  # (SLOTS,) whether the mode has propagators, see `ctrl_df.simulate.glide`
+    ready: np.ndarray  # (SLOTS * LENGTHS,) whether the mode has propagators, see `ctrl_df.simulate.glide`
     a: np.ndarray  # (SLOTS, n, n)
     b: np.ndarray  # (SLOTS, n, nr)
     d: np.ndarray  # (SLOTS, n)
@@ -76,7 +77,7 @@ def memory(prog) -> Memory:
     n, nr, ny, ng, nm = (int(prog.ints[i]) for i in (H_NX, H_NR, L.H_NY, H_NG, L.H_NM))
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
-        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros(used, np.int64),
+        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros(used * LENGTHS, np.int64),
         np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
         np.zeros((used, ng + 2, n + nr + 1)), np.zeros((used, ng + 2)), np.zeros((used, ny, n + nr + 2)),
@@ -108,7 +109,8 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
     slot = int(store.order[1])
     store.order[1] = (slot + 1) % SLOTS
     store.order[0] = min(known + 1, SLOTS)
-    store.ready[slot] = 0
+    for i in range(slot * LENGTHS, (slot + 1) * LENGTHS):
+        store.ready[i] = 0
     for i in range(mode.shape[0]):
         store.seen[slot, i] = mode[i]
     n, nr = x.shape[0], prog.ints[H_NR]

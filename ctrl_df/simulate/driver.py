@@ -139,7 +139,9 @@ def advance(
     held = nt > 0 and drive.linear == 0
     has_tracked, bumpy, delays = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1, prog.ints[H_DELAYS] > 0
     affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
-    gliding = affine and locate and watch < 0 and nh == 0 and nt > 2 and spectrum.shape[1] == 0
+    gliding = (
+        affine and locate and watch < 0 and nh <= 1 and tout.shape[0] + nt > 2 and spectrum.shape[1] == 0
+    )
     if affine and nh > 1 and drive.omega > 0.0:
         # the series of the forcing has to converge as well
         hmax = min(hmax, 2.5 / ((nh - 1) * drive.omega))
@@ -206,17 +208,16 @@ def advance(
             jumped = False
         if affine:
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
-            if gliding and segment + 1 < nt and t == drive.time[segment]:
-                gone, index, next_tick, ticked = glide(
-                    prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x, mode, tout, xout,
-                    yout, size, scale, max_steps - steps, rtol, next_tick, x1, xi, dx, g,
+            if gliding:
+                begun = t
+                gone, t, segment, index, next_tick, ticked = glide(
+                    prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                    xout, yout, size, scale, max_steps - steps, rtol, next_tick, x1, xi, dx, g,
                 )  # fmt: skip
                 if gone > 0:
                     steps += gone
-                    segment += gone - 1
-                    h = max(h, drive.time[segment + 1] - t)
-                    t = drive.time[segment + 1]
-                    known, jumped = False, ticked
+                    h = max(h, t - begun)
+                    known, jumped = False, ticked or held
                     continue
         if jumped or not known:
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)

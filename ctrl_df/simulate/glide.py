@@ -1,9 +1,10 @@
-"""Uniform records through affine modes: one constant propagator a sample, as long as no event can lie inside.
+"""Affine modes on a regular grid: one constant propagator a step, as long as no event can lie inside.
 
-With z = (x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a sample
-of h seconds takes z to exp(M h) z, a matrix computed once for each mode. A margin c z has the curvature
+The grid is that of the samples of the inputs, the times of the outputs and the ticks of controllers. With z =
+(x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a step of h
+seconds takes z to exp(M h) z, a matrix computed once for each mode and length. A margin c z has the curvature
 c M^2 z, hence stays within h^2/8 max |c M^2 z| of the chord between its ends; with |z| <= `bound` at the start
-of a sample, |c M^2| exp(|M| h) bound limits that curvature over all of it. A sample at whose ends every margin
+of a step, |c M^2| exp(|M| h) bound limits that curvature over all of it. A step at whose ends every margin
 lies above this limit holds no event, for certain. The first that does not is left to the steps of
 `ctrl_df.simulate.driver`.
 
@@ -19,108 +20,113 @@ from typing import NamedTuple
 import numpy as np
 
 from . import layout as L
-from .affine import Memory, recall
+from .affine import LENGTHS, Memory, recall
 from .compiled import part
 from .outputs import next_sample, tick
 
 EPS = np.finfo(float).eps
 ORDER = 16  # terms of an exponential's series
-HALVINGS = 12  # of the sample, at most, before its series is summed
-UNEVEN = 1e-6  # difference of two samples, relative, from which on propagators are not worth their making
-NEAR = 1e-3  # times the tolerance: how far samples may be from uniform, relative to one of them
+HALVINGS = 12  # of the step, at most, before its series is summed
+NEAR = 1e-3  # times the tolerance: how far a step may be from a known length, relative to it
+ALIKE = 1e-6  # relative difference of two steps below which they count as the same length
 
-SAMPLE, OFFSET = 0, 1  # entries of `Glide.span`
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
 
 
 class Glide(NamedTuple):
-    """Propagators of the modes a `Memory` knows, and scratch. Rows: states, margins, outputs, states and
-    outputs at the offset."""
+    """Propagators of the modes a `Memory` knows, one for each length, and scratch.
 
-    span: (
-        np.ndarray
-    )  # (2,): sample time [s] of the propagators, offset [s] of outputs behind a sample's start
-    first: np.ndarray  # (SLOTS, rows + 1): where a row begins in `column` and `value`
-    column: np.ndarray  # (SLOTS, room)
-    value: np.ndarray  # (SLOTS, room)
-    fed: np.ndarray  # (SLOTS, rows): whether a row has entries of external inputs
-    owner: np.ndarray  # (SLOTS, rows): margin of a row, -1 where the mode has none
-    curved: np.ndarray  # (SLOTS, margins, nz): limits of curvature, times h^2/8, for each bound
+    Rows: states, margins, outputs.
+    """
+
+    length: np.ndarray  # (LENGTHS,): known steps [s]; 0: none
+    newest: np.ndarray  # (1,): which was learnt last
+    first: np.ndarray  # (SLOTS * LENGTHS, rows + 1): where a row begins in `column` and `value`
+    column: np.ndarray  # (SLOTS * LENGTHS, room)
+    value: np.ndarray  # (SLOTS * LENGTHS, room)
+    fed: np.ndarray  # (SLOTS * LENGTHS, margins): whether a row has entries of external inputs
+    owner: np.ndarray  # (SLOTS * LENGTHS, margins): margin of a row, -1 where the mode has none
+    curved: np.ndarray  # (SLOTS * LENGTHS, margins, nz): limits of curvature, times h^2/8, for each bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
-    here: np.ndarray  # z at the start of a sample
+    here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
-    matrix: np.ndarray  # (6, nz, nz)
+    matrix: np.ndarray  # (5, nz, nz)
 
 
 def glide_memory(memory: Memory, affine: bool, ny: int) -> Glide:
     """Allocate the propagators that go with a memory; small where its modes are not affine."""
-    used, n, nr = memory.b.shape
+    slots, n, nr = memory.b.shape
+    used = slots * LENGTHS
     margins = memory.rows.shape[1] if affine else 0
     nz = n + 2 * nr + 2 if affine else 0
-    rows = 2 * n + margins + 2 * ny if affine else 0
+    rows = n + margins + ny if affine else 0
     return Glide(
-        np.zeros(2), np.zeros((used, rows + 1), np.int64),
-        np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)), np.zeros((used, rows), np.int64),
-        np.zeros((used, rows), np.int64), np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
-        np.zeros(nz), np.zeros(nz), np.zeros((6, nz, nz)),
+        np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
+        np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
+        np.zeros((used, margins), np.int64), np.zeros((used, margins), np.int64),
+        np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins), np.zeros(nz), np.zeros(nz),
+        np.zeros((5, nz, nz)),
     )  # fmt: skip
 
 
 @part
-def glide(prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x, mode, tout, xout, yout,
+def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
           size, scale, room, rtol, next_tick, x1, xi, dx, g):  # fmt: skip
-    """Go on from the start of sample `segment` for as many samples as hold no event.
+    """Go on from `t` over as many steps as hold no event.
 
-    Returns the number of samples gone, the next output's index, the time of the next tick, and whether a
-    controller ticked at the end of the last.
+    Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
+    of the next tick, and whether a controller ticked at the end of the last step.
     """
     n, nr, ny = x.shape[0], prog.ints[L.H_NR], prog.ints[L.H_NY]
     margins = store.rows.shape[1]
     time, nt = drive.time, drive.time.shape[0]
     here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
     at, one = n + 2 * nr, n + 2 * nr + 1
-    held = drive.linear == 0
-    begin = time[segment]
-    length = time[segment + 1] - begin
-    uneven = segment + 2 < nt and abs(time[segment + 2] - time[segment + 1] - length) > UNEVEN * length
-    if uneven or length > hmax:
-        return 0, index, next_tick, False
-    _set_span(store, tracks, length, segment, time, index, tout, rtol)
-    h, offset = tracks.span[SAMPLE], tracks.span[OFFSET]
-    whole = offset == h
-    copied = False
+    ramped = nt > 0 and drive.linear == 1
     done, ticked = 0, False
     stale = True  # the bounds, the slack and the margins at the start are to be taken anew
     for j in range(n):
         here[j] = x[j]
+    for j in range(one):
         bound[j] = 0.0
-    for j in range(n, one):
-        bound[j] = 0.0
+    for j in range(n, at):
+        here[j] = ahead[j] = 0.0
     here[one] = ahead[one] = bound[one] = 1.0
-    outputs = n + margins
-    while done < room and segment + 1 < nt and time[segment + 1] <= t_end:
-        if store.ready[slot] == 0:
-            _make(prog, store, tracks, slot, n, nr, ny)
-        if store.ready[slot] == USELESS:
+    before = -1
+    while done < room:
+        jumped = False
+        while segment + 1 < nt and time[segment + 1] <= t:
+            segment += 1
+            jumped = not ramped
+        t1 = _following(t, time, segment, tout, index, next_tick)
+        near = NEAR * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
+        which = _known(tracks, t1 - t, near)
+        if which < 0 and t1 < t_end and done == 0 and t1 - t <= hmax:
+            which = _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick)
+        if which < 0 or t1 > t_end or t1 - t > hmax:
             break
-        t0, t1 = time[segment], time[segment + 1]
-        near = NEAR * rtol * h + 2.0 * EPS * (abs(t0) + abs(t1))
-        if abs(t1 - t0 - h) > near or next_tick < t1 - near:
+        place = slot * LENGTHS + which
+        if store.ready[place] == 0:
+            _make(store, tracks, place, slot, tracks.length[which], n, nr, ny)
+        if store.ready[place] == USELESS:
             break
-        due = index < tout.shape[0] and tout[index] <= t1 + near
-        if due and (
-            abs(tout[index] - t0 - offset) > near
-            or (index + 1 < tout.shape[0] and tout[index + 1] <= t1 + near)
-        ):
-            break
+        if place != before:
+            stale, before = True, place
         # --- the inputs, and the bounds of all
         for k in range(nr):
-            here[n + k] = ahead[n + k] = drive.samples[k, segment]
-            if not held:
-                ahead[n + k] = drive.samples[k, segment + 1]
-                here[n + nr + k] = ahead[n + nr + k] = (ahead[n + k] - here[n + k]) / (t1 - t0)
-        here[at], ahead[at] = t0, t1
+            value = drive.harmonics[k, 0].real if drive.harmonics.shape[1] > 0 else 0.0
+            if nt > 0:
+                value += drive.samples[k, segment]
+            here[n + k] = ahead[n + k] = value
+            if ramped and segment + 1 < nt:
+                slope = (drive.samples[k, segment + 1] - drive.samples[k, segment]) / (
+                    time[segment + 1] - time[segment]
+                )
+                here[n + k] = value + slope * (t - time[segment])
+                ahead[n + k] = value + slope * (t1 - time[segment])
+                here[n + nr + k] = ahead[n + nr + k] = slope
+        here[at], ahead[at] = t, t1
         for j in range(at + 1):
             if abs(here[j]) > bound[j]:
                 bound[j] = 2.0 * abs(here[j])
@@ -130,23 +136,23 @@ def glide(prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x
             for m in range(margins):
                 value = 0.0
                 for j in range(one + 1):
-                    value += tracks.curved[slot, m, j] * bound[j]
+                    value += tracks.curved[place, m, j] * bound[j]
                 slack[m] = value
-        # --- margins at the start, where they are not those at the end of the sample before
-        first, column, values = tracks.first[slot], tracks.column[slot], tracks.value[slot]
+        # --- margins at the start, where they are not those at the end of the step before
+        first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
         for m in range(margins):
-            if tracks.owner[slot, n + m] >= 0 and (stale or (held and tracks.fed[slot, n + m] == 1)):
+            if tracks.owner[place, m] >= 0 and (stale or (jumped and tracks.fed[place, m] == 1)):
                 if not _row(first, column, values, n + m, here) > slack[m]:
                     clear = False
                     break
         if not clear:
             break
         stale = False
-        # --- over the sample
+        # --- over the step
         for j in range(n):
             ahead[j] = _row(first, column, values, j, here)
         for m in range(margins):
-            owner = tracks.owner[slot, n + m]
+            owner = tracks.owner[place, m]
             if owner >= 0:
                 value = _row(first, column, values, n + m, ahead)
                 if not value > slack[m]:
@@ -155,38 +161,26 @@ def glide(prog, drive, work, store, tracks, slot, t_end, hmax, segment, index, x
                 scale[0, owner] = max(scale[0, owner], value)
         if not clear:
             break
-        if due:
-            if whole:
-                for j in range(n):
-                    xout[index, j] = ahead[j]
-                for i in range(ny):
-                    yout[index, i] = _row(first, column, values, outputs + i, ahead)
-            else:
-                for j in range(n):
-                    xout[index, j] = _row(first, column, values, outputs + ny + j, here)
-                for i in range(ny):
-                    yout[index, i] = _row(first, column, values, outputs + ny + n + i, here)
+        if index < tout.shape[0] and tout[index] <= t1 + near:
+            for j in range(n):
+                xout[index, j] = ahead[j]
+            for i in range(ny):
+                yout[index, i] = _row(first, column, values, n + margins + i, ahead)
             index += 1
         for j in range(n):
-            here[j] = ahead[j]
+            x[j] = here[j] = ahead[j]
             size[j] = max(abs(ahead[j]), 0.98 * size[j])
         done += 1
-        segment += 1
-        copied = True
+        t = t1
         ticked = next_tick <= t1 + near
         if ticked:
-            for j in range(n):
-                x[j] = here[j]
-            tick(prog, drive, segment - 1, t1, x, mode, work, dx)
-            next_tick = next_sample(prog, t1)
-            for j in range(n):
-                here[j] = x[j]
+            tick(prog, drive, segment, t, x, mode, work, dx)
+            next_tick = next_sample(prog, t)
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
             stale = True
-    if copied and not ticked:
-        for j in range(n):
-            x[j] = here[j]
-    return done, index, next_tick, ticked
+            for j in range(n):
+                here[j] = x[j]
+    return done, t, segment, index, next_tick, ticked
 
 
 @part(inline=True)
@@ -198,37 +192,69 @@ def _row(first, column, values, row, z):
     return value
 
 
-@part
-def _set_span(store, tracks, h, segment, time, index, tout, rtol):
-    """Take over another sample time or another offset of the outputs; the propagators are then of no use."""
-    near = NEAR * rtol * h + 2.0 * EPS * (abs(time[segment]) + abs(time[segment + 1]))
-    mean = (time[time.shape[0] - 1] - time[0]) / (time.shape[0] - 1)
-    if abs(mean - h) <= near:
-        h = mean  # the same wherever in the record a run begins
-    offset = tracks.span[OFFSET]
-    if index < tout.shape[0] and tout[index] <= time[segment + 1] + near:
-        offset = tout[index] - time[segment]
-        if abs(offset - h) <= near:
-            offset = h
-    known = tracks.span[SAMPLE] == h
-    if known and abs(offset - tracks.span[SAMPLE]) <= near:
-        offset = tracks.span[SAMPLE]
-    if not known or abs(offset - tracks.span[OFFSET]) > near:
-        if not known:
-            tracks.span[SAMPLE] = h
-        tracks.span[OFFSET] = offset
-        for slot in range(store.ready.shape[0]):
-            store.ready[slot] = 0
+@part(inline=True)
+def _following(t, time, segment, tout, index, next_tick):
+    """Next point of the grid after `t`: a sample, an output, a tick. Points that rounding parts are one."""
+    following = next_tick
+    if segment + 1 < time.shape[0]:
+        following = min(following, time[segment + 1])
+    if index < tout.shape[0]:
+        following = min(following, tout[index])
+    if segment + 1 < time.shape[0] and time[segment + 1] <= following + 4.0 * EPS * (abs(t) + abs(following)):
+        following = time[segment + 1]
+    return following
+
+
+@part(inline=True)
+def _known(tracks, length, near):
+    """Which of the known lengths a step has; -1: none."""
+    for which in range(LENGTHS):
+        if abs(tracks.length[which] - length) <= near:
+            return which
+    return -1
 
 
 @part
-def _make(prog, store, tracks, slot, n, nr, ny):
-    """Compute the propagators of a mode."""
+def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick):
+    """Learn a new length of step in place of the older one, if steps go on like it; -1 if not."""
+    ahead, s, i = t1, segment, index
+    regular = False
+    last = t
+    for step in range(2):
+        while s + 1 < time.shape[0] and time[s + 1] <= ahead:
+            s += 1
+        while i < tout.shape[0] and tout[i] <= ahead:
+            i += 1
+        beyond = _following(ahead, time, s, tout, i, next_tick if next_tick > ahead else math.inf)
+        if step == 0 and abs((beyond - ahead) - (t1 - t)) <= ALIKE * (t1 - t):
+            regular = True
+        if step == 1 and abs((beyond - last) - (t1 - t)) <= ALIKE * (t1 - t):
+            regular = True
+        last, ahead = ahead, beyond
+    if not regular:
+        return -1
+    length = t1 - t
+    if time.shape[0] > 1:
+        # the same wherever in the record a run begins
+        mean = (time[time.shape[0] - 1] - time[0]) / (time.shape[0] - 1)
+        share = mean / max(round(mean / length), 1.0)
+        if abs(share - length) <= near:
+            length = share
+    which = 1 - tracks.newest[0]
+    tracks.newest[0] = which
+    tracks.length[which] = length
+    for slot in range(store.ready.shape[0] // LENGTHS):
+        store.ready[slot * LENGTHS + which] = 0
+    return which
+
+
+@part
+def _make(store, tracks, place, slot, h, n, nr, ny):
+    """Compute the propagator of a mode over `h` seconds."""
     nz, margins = n + 2 * nr + 2, store.rows.shape[1]
     at, one = nz - 2, nz - 1
     m, absolute, power, scratch = tracks.matrix[0], tracks.matrix[1], tracks.matrix[2], tracks.matrix[3]
-    whole, part_way = tracks.matrix[4], tracks.matrix[5]
-    h, offset = tracks.span[SAMPLE], tracks.span[OFFSET]
+    whole = tracks.matrix[4]
     for i in range(nz):
         for j in range(nz):
             m[i, j] = 0.0
@@ -250,60 +276,53 @@ def _make(prog, store, tracks, slot, n, nr, ny):
     usable = halvings <= HALVINGS
     # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
     for row in range(margins):
+        tracks.fed[place, row] = 0
+        tracks.owner[place, row] = store.owners[row] if store.bases[slot, row] < math.inf else -1
         for j in range(nz):
-            tracks.curved[slot, row, j] = 0.0
-        if not usable or not store.bases[slot, row] < math.inf:
+            tracks.curved[place, row, j] = 0.0
+        if not usable or tracks.owner[place, row] < 0:
             continue
         for j in range(nz):
             power[0, j] = power[1, j] = 0.0
         for i in range(nz):
             c = _entry(store, slot, row, i, n, nr)
-            for j in range(nz):
-                power[0, j] += c * m[i, j]
+            if c != 0.0:
+                for j in range(nz):
+                    power[0, j] += c * m[i, j]
         for i in range(nz):
-            for j in range(nz):
-                power[1, j] += power[0, i] * m[i, j]
+            if power[0, i] != 0.0:
+                for j in range(nz):
+                    power[1, j] += power[0, i] * m[i, j]
         for i in range(nz):
             bend = abs(power[1, i]) * h * h / 8.0
             if bend > 0.0:
                 for j in range(nz):
-                    tracks.curved[slot, row, j] += bend * whole[i, j]
+                    tracks.curved[place, row, j] += bend * whole[i, j]
         for j in range(nz):
-            usable = usable and tracks.curved[slot, row, j] < math.inf
+            usable = usable and tracks.curved[place, row, j] < math.inf
     if not usable:
-        store.ready[slot] = USELESS
+        store.ready[place] = USELESS
         return
     _exponential(m, h, halvings, whole, power, scratch)
-    _exponential(m, offset, halvings, part_way, power, scratch)
     # --- the rows, zeros left out
     count = 0
-    tracks.first[slot, 0] = 0
-    total = 2 * n + margins + 2 * ny
-    for row in range(total):
-        tracks.fed[slot, row] = 0
-        tracks.owner[slot, row] = -1
-        if n <= row < n + margins and store.bases[slot, row - n] < math.inf:
-            tracks.owner[slot, row] = store.owners[row - n]
+    tracks.first[place, 0] = 0
+    for row in range(n + margins + ny):
         for j in range(nz):
+            value = 0.0
             if row < n:
                 value = whole[row, j]
-            elif row < n + margins:
-                value = _entry(store, slot, row - n, j, n, nr) if tracks.owner[slot, row] >= 0 else 0.0
-            elif row < n + margins + ny:
+            elif row >= n + margins:
                 value = _output(store, slot, row - n - margins, j, n, nr)
-            elif row < 2 * n + margins + ny:
-                value = part_way[row - n - margins - ny, j]
-            else:
-                value = 0.0
-                for i in range(nz):
-                    value += _output(store, slot, row - 2 * n - margins - ny, i, n, nr) * part_way[i, j]
+            elif tracks.owner[place, row - n] >= 0:
+                value = _entry(store, slot, row - n, j, n, nr)
+                if value != 0.0 and n <= j < n + nr:
+                    tracks.fed[place, row - n] = 1
             if value != 0.0:
-                tracks.column[slot, count], tracks.value[slot, count] = j, value
+                tracks.column[place, count], tracks.value[place, count] = j, value
                 count += 1
-                if n <= j < n + nr:
-                    tracks.fed[slot, row] = 1
-        tracks.first[slot, row + 1] = count
-    store.ready[slot] = USABLE
+        tracks.first[place, row + 1] = count
+    store.ready[place] = USABLE
 
 
 @part

@@ -13,7 +13,7 @@ from typing import Any
 
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, signature
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global, signature
 from numba.extending import (
     infer_getattr,
     intrinsic,
@@ -22,7 +22,6 @@ from numba.extending import (
     models,
     register_model,
 )
-from numba.core.typing.templates import infer_global
 
 
 class View(types.Type):
