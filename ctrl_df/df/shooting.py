@@ -28,8 +28,8 @@ TOLERANCE = 3e-10  # error of an orbit's state, relative to its size
 def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
     """`close`, from Python."""
     return close(
-        lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum), budget,
-        shots, eager,
+        lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
+        budget, shots, eager,
     )  # fmt: skip
 
 

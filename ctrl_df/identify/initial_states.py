@@ -76,8 +76,8 @@ def reach(which, core, known, windows) -> np.ndarray:
 def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
     """Write the states (nw, nx) of a mechanism at the begin of windows.
 
-    `usual`: positions, speeds and accelerations (nw,) of the body measured; `given`: corrections by name, each
-    (nw,) or one number; `speed` [m/s] is typical of the record.
+    `usual`: positions, speeds and accelerations (nw,) of the body measured; `given`: corrections by name,
+    each (nw,) or one number; `speed` [m/s] is typical of the record.
     """
     x, v, a = usual
     x, v = x + given.get("x", 0.0), v + given.get("v", 0.0)

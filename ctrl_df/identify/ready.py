@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ..simulate.engine import Engine
 from .drive import lagged, thinned
+from .measurement import Measurement
 
+_THINNED: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
 REFERENCE = ("reference", "r")
 
 
@@ -83,12 +86,22 @@ def of_block(block, record, u, thin: int) -> Ready:
         inner = block._remade(block._values, kept)
     time, value, hold = t, held, record.input_hold
     if thin > 1:
-        time, value, hold = thinned(t, held, thin)
+        time, value, hold = _thinned(record, held, thin)
     time, value = _before(record, time, value)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
     return Ready(
         Engine(inner), inner.core, 0, time + input_delay, value, float(sum(delays)), output, lags, hold
     )
+
+
+def _thinned(record, held, thin):
+    """Return `thinned`, kept for as long as the record lives where no law has changed its input."""
+    if held is not record.u:
+        return thinned(record.t, held, thin)
+    known = _THINNED.setdefault(record, {})
+    if thin not in known:
+        known[thin] = thinned(record.t, held, thin)
+    return known[thin]
 
 
 def _lags(core, record, signal):

@@ -248,9 +248,9 @@ class Problem:
             by_start.append(self._by_start(k, starts, widths, signals[len(thetas) :], base[k]))
         self.nfev += len(thetas)
         columns: list[Signals] = [[] for _ in self.records]
-        signals = iter(moved)
+        ready = iter(moved)
         for i, pair in enumerate(pairs):
-            ends = [base if end is None else next(signals) for end in pair]
+            ends = [base if end is None else next(ready) for end in pair]
             below = theta if pair[1] is None else pair[1]
             for k, column in enumerate(self._column(i, *ends, float(pair[0][i] - below[i]))):
                 columns[k].append(column)
@@ -283,7 +283,7 @@ class Problem:
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
     def _moved_starts(self, k, nuisance):
-        """Return initial states (nw, ns) of one record, each moved (None where its derivative is 1), and by how much."""
+        """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
         simulator, windows = self.simulators[k], self.windows[k]
         starts, widths = [], []
         for j, name in enumerate(simulator.nuisances):
@@ -304,9 +304,9 @@ class Problem:
 
     def _by_start(self, k, starts, widths, signals, base) -> np.ndarray:
         """Return derivatives (n, ns) of one record's output by its initial states, all windows at once."""
-        rows, signals = [], iter(signals)
+        rows, moved = [], iter(signals)
         for start, width in zip(starts, widths, strict=True):
-            rows.append(np.ones(len(base)) if start is None else (next(signals) - base) / width)
+            rows.append(np.ones(len(base)) if start is None else (next(moved) - base) / width)
         self.nfev += len(rows) / len(self.simulators)
         return np.array(rows).T.reshape(len(self.measured[k]), len(rows))
 
@@ -321,29 +321,29 @@ class Problem:
                 h += a.T @ a
                 g += a.T @ r
                 continue
-            for w, where in enumerate(windows.slices):
-                a, s, r, c = jp[k][where], js[k][where], residual[k][where], weights[k][where]
-                ac = a * c[:, None]
-                h += ac.T @ a
-                g += ac.T @ r
-                if s.shape[1]:
-                    sc = s * c[:, None]
-                    precision = prior / self.priors[k][w] ** 2
-                    ss = sc.T @ s + np.diag(precision)
-                    ss += damping * np.diag(np.diag(ss))
-                    sa, sr = sc.T @ a, sc.T @ r - precision * (nuisance[k][w] - means[k][w])
-                    solved = np.linalg.solve(ss, np.column_stack((sa, sr)))
-                    h -= sa.T @ solved[:, :p]
-                    g -= sa.T @ solved[:, p]
-                    pieces.append((k, w, solved))
+            products = _by_window(js[k], jp[k], residual[k], weights[k], windows)
+            ns = js[k].shape[1]
+            h += products[:, ns:-1, ns:-1].sum(axis=0)
+            g += products[:, ns:-1, -1].sum(axis=0)
+            if ns:
+                precision = prior / self.priors[k] ** 2
+                ss, right = products[:, :ns, :ns], products[:, :ns, ns:].copy()
+                i = np.arange(ns)
+                ss[:, i, i] += precision
+                ss[:, i, i] *= 1 + damping
+                right[:, :, -1] -= precision * (nuisance[k] - means[k])
+                solved = np.linalg.solve(ss, right)
+                h -= np.einsum("wsi,wsj->ij", right[:, :, :p], solved[:, :, :p])
+                g -= np.einsum("wsi,ws->i", right[:, :, :p], solved[:, :, p])
+                pieces.append((k, solved))
 
         def back(step):
             moved = [a.copy() for a in nuisance]
-            for k, w, solved in pieces:
-                limit = 3 * self.priors[k][w]
-                there = moved[k][w] + solved[:, p] - solved[:, :p] @ step
+            for k, solved in pieces:
+                limit = 3 * self.priors[k]
+                there = moved[k] + solved[:, :, p] - solved[:, :, :p] @ step
                 # The data say where a window begins: the start is no parameter to hide the model's faults in.
-                moved[k][w] = np.clip(there, means[k][w] - limit, means[k][w] + limit)
+                moved[k] = np.clip(there, means[k] - limit, means[k] + limit)
             for k, simulator in enumerate(self.simulators):
                 if "slack" in simulator.nuisances:
                     j = simulator.nuisances.index("slack")
@@ -387,3 +387,15 @@ class Problem:
         limits = np.array([v.step(q) for v, q in zip(self.variables, theta, strict=True)])
         largest = float(np.max(np.abs(step) / limits)) if p else 0.0
         return step / max(largest, 1.0)
+
+
+def _by_window(states, parameters, residual, weights, windows: Windows) -> np.ndarray:
+    """Return Z' W Z of every window, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
+    z = np.column_stack((states, parameters, residual))
+    weighted = z * weights[:, None]
+    begins = np.concatenate(([0], np.cumsum(windows.ends - windows.begins)[:-1]))
+    products = np.empty((len(windows), z.shape[1], z.shape[1]))
+    for i in range(z.shape[1]):
+        column = np.add.reduceat(weighted[:, i:] * z[:, i : i + 1], begins, axis=0)
+        products[:, i, i:] = products[:, i:, i] = column
+    return products

@@ -197,9 +197,8 @@ class Simulator:
         sizes = [(p.engine.nstates, len(p.drive_time), p.hold) for p in parts]
         for size in dict.fromkeys(sizes):
             which = [i for i, s in enumerate(sizes) if s == size]
-            for i, out in zip(
-                which, self._alike([parts[i] for i in which], [asked[i] for i in which]), strict=True
-            ):
+            done = self._alike([parts[i] for i in which], [asked[i] for i in which])
+            for i, out in zip(which, done, strict=True):
                 outputs[i] = out
         return outputs
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -98,14 +99,14 @@ class Windows:
         """Sample numbers where windows begin, and the end of the last, (nw + 1,)."""
         return np.append(self.begins, self.ends[-1])
 
-    @property
+    @cached_property
     def samples(self) -> np.ndarray:
         """Numbers of the record's samples within the windows, (n,)."""
         if np.array_equal(self.begins[1:], self.ends[:-1]):
             return np.arange(self.begins[0], self.ends[-1])
         return np.concatenate([np.arange(i, j) for i, j in zip(self.begins, self.ends, strict=True)])
 
-    @property
+    @cached_property
     def slices(self) -> list[slice]:
         """Each window as a slice of the samples within the windows."""
         at = np.concatenate(([0], np.cumsum(self.ends - self.begins)))

@@ -102,9 +102,9 @@ def address() -> int:
 
 @njit(error_model="numpy")
 def run(
-    engine, prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
-    watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
-    spectrum, omega,
+    engine, prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate,
+    stop_at_event, watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale,
+    fresh, space, spectrum, omega,
 ):  # fmt: skip
     """Run from clock[0] to t_end: `advance`, at its address `engine`, on views of the arrays."""
     return call_native(engine, (

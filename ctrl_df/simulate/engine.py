@@ -266,8 +266,8 @@ class Engine:
                 until = min(t_end, times[int(clock[1]) + _MOST_OUTPUTS])
             with pointers.interruptible():
                 reason = driver.run(
-                    address, self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order, rtol, atol,
-                    max_step, locate, stop_at_event, watch, level, -direction, height,
+                    address, self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order,
+                    rtol, atol, max_step, locate, stop_at_event, watch, level, -direction, height,
                     min(max_steps - int(clock[3]), chunk), log_t, log_n, log_k, before, scale, fresh,
                     self._space, spectrum, omega,
                 )  # fmt: skip

@@ -1,11 +1,11 @@
 """Affine modes on a regular grid: one constant propagator a step, as long as no event can lie inside.
 
-The grid is that of the samples of the inputs, the times of the outputs and the ticks of controllers. With z =
-(x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a step of h
+The grid is that of the samples of the inputs, the times of the outputs and the ticks of controllers. With
+z = (x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a step of h
 seconds takes z to exp(M h) z, a matrix computed once for each mode and length. A margin c z has the curvature
-c M^2 z, hence stays within h^2/8 max |c M^2 z| of the chord between its ends; with |z| <= `bound` at the start
-of a step, |c M^2| exp(|M| h) bound limits that curvature over all of it. A step at whose ends every margin
-lies above this limit holds no event, for certain. The first that does not is left to the steps of
+c M^2 z, hence stays within h^2/8 max |c M^2 z| of the chord between its ends; with |z| <= `bound` at the
+start of a step, |c M^2| exp(|M| h) bound limits that curvature over all of it. A step at whose ends every
+margin lies above this limit holds no event, for certain. The first that does not is left to the steps of
 `ctrl_df.simulate.driver`.
 
 The matrices are kept row by row, zeros left out. Bounds are taken element by element, so that units do not
@@ -151,6 +151,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         # --- over the step
         for j in range(n):
             ahead[j] = _row(first, column, values, j, here)
+            clear = clear and abs(ahead[j]) < math.inf
         for m in range(margins):
             owner = tracks.owner[place, m]
             if owner >= 0:
@@ -347,7 +348,7 @@ def _output(store, slot, row, j, n, nr):
 
 @part
 def _exponential(m, h, halvings, out, power, scratch):
-    """Sum exp(m h / 2^halvings) and square it as often; False where ORDER terms are too few, by any element."""
+    """Sum exp(m h / 2^halvings) and square it as often; False where ORDER terms are too few for an element."""
     nz = m.shape[0]
     step = h / 2.0**halvings
     for i in range(nz):

@@ -108,8 +108,8 @@ def make_desk(engine, states: np.ndarray, keep: bool, logged: bool, stop: np.nda
     scale, before = np.zeros((4, ng)), np.zeros(n)
     spectrum = np.zeros((engine.noutputs, 0), complex)
     return Desk(
-        driver.address(), program.nodes, program.ints, space, scale, before, spectrum, states, int(keep), log_t,
-        log_n, log_k, log_row, np.array([0, -1]), max(int(_FEW_STEPS / (1 + (n / 6) ** 2)), 10), stop,
+        driver.address(), program.nodes, program.ints, space, scale, before, spectrum, states, int(keep),
+        log_t, log_n, log_k, log_row, np.array([0, -1]), max(int(_FEW_STEPS / (1 + (n / 6) ** 2)), 10), stop,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Parts of compiled functions: typed and lowered once, machine code only within the function that uses them."""
+"""Parts of compiled functions: lowered once, machine code only within the function that uses them."""
 
 from __future__ import annotations
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections import deque
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -139,6 +140,12 @@ def run_many(
     )  # fmt: skip
 
 
+@functools.lru_cache(maxsize=4)
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    """Threads for all calls of one process (those of its parent do not survive a fork)."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="ctrl_df")
+
+
 def processors() -> int:
     """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -189,15 +196,15 @@ class _Work:
         threads = max(min(threads, len(todo)), 1)
         # compiled, or read from its file, before any thread asks for it
         self._run(self._desk(self.groups[0]), self.groups[0], np.zeros(0, np.int64))
-        pool = ThreadPoolExecutor(threads)
+        # this thread only waits: it is the one that hears Ctrl-C
+        workers = [_pool(os.getpid(), threads).submit(self._work, todo) for _ in range(threads)]
         try:
-            for future in [pool.submit(self._work, todo) for _ in range(threads)]:
-                future.result()
+            for worker in workers:
+                worker.result()
         except BaseException:
             self.stop[0] = 1
+            wait(workers)
             raise
-        finally:
-            pool.shutdown()
 
     def one_by_one(self) -> None:
         """Make all runs in this thread: they call functions back that nobody knows to be safe elsewhere."""
