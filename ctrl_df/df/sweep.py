@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Orbits of consecutive points, each started from those before."""
 
 from __future__ import annotations

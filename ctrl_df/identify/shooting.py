@@ -250,9 +250,9 @@ class Problem:
         columns: list[Signals] = [[] for _ in self.records]
         ready = iter(moved)
         for i, pair in enumerate(pairs):
-            ends = [base if end is None else next(ready) for end in pair]
-            below = theta if pair[1] is None else pair[1]
-            for k, column in enumerate(self._column(i, *ends, float(pair[0][i] - below[i]))):
+            above, below = (base if end is None else next(ready) for end in pair)
+            width = float(pair[0][i] - (theta if pair[1] is None else pair[1])[i])
+            for k, column in enumerate(self._column(i, above, below, width)):
                 columns[k].append(column)
         by_parameter = [
             np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)

@@ -59,7 +59,9 @@ def part(function=None, *, inline=False) -> Any:
     """
     if function is None:
         return functools.partial(part, inline=inline)
-    options = dict(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    options: dict[str, Any] = dict(
+        error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )
     if inline:
         options["forceinline"] = True
     return numba.njit(pipeline_class=PartCompiler, **options)(function)

@@ -348,7 +348,7 @@ def _output(store, slot, row, j, n, nr):
 
 @part
 def _exponential(m, h, halvings, out, power, scratch):
-    """Sum exp(m h / 2^halvings) and square it as often; False where ORDER terms are too few for an element."""
+    """Sum exp(m h / 2^halvings), squared as often; False where ORDER terms are too few for an element."""
     nz = m.shape[0]
     step = h / 2.0**halvings
     for i in range(nz):

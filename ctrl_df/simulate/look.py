@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Single states looked at from Python: rates, margins and outputs there, and the jump of one event."""
 
 from __future__ import annotations

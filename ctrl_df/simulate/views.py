@@ -1,3 +1,5 @@
+# pyright: reportCallIssue=false, reportOptionalCall=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Arrays as compiled code hands them on: an address and the lengths, nothing else.
 
 numba passes an array as seven values, counts references and looks after negative indices at every access;
@@ -65,9 +67,9 @@ def _address(context, builder, view, value):
     return builder.ptrtoint(made.data, context.get_value_type(types.intp))
 
 
-def _indices(index):
+def _indices(index: Any) -> list[Any] | None:
     """Types of the indices, or None if they are no integers."""
-    found = list(index) if isinstance(index, types.BaseTuple) else [index]
+    found: list[Any] = list(index.types) if isinstance(index, types.BaseTuple) else [index]  # pyright: ignore
     return found if all(isinstance(i, types.Integer) for i in found) else None
 
 
@@ -75,9 +77,10 @@ def _indices(index):
 class _GetItem(AbstractTemplate):
     def generic(self, args, kws):
         view, index = args
-        if not isinstance(view, View) or _indices(index) is None:
+        kinds = _indices(index)
+        if not isinstance(view, View) or kinds is None:
             return None
-        left = view.ndim - len(_indices(index))  # type: ignore[arg-type]
+        left = view.ndim - len(kinds)
         if left < 0:
             return None
         return signature(view.dtype if left == 0 else View(view.dtype, left), view, index)
@@ -87,9 +90,10 @@ class _GetItem(AbstractTemplate):
 class _SetItem(AbstractTemplate):
     def generic(self, args, kws):
         view, index, value = args
-        if not isinstance(view, View) or _indices(index) is None:
+        kinds = _indices(index)
+        if not isinstance(view, View) or kinds is None or len(kinds) != view.ndim:
             return None
-        if len(_indices(index)) != view.ndim or not isinstance(value, types.Number | types.Boolean):  # type: ignore[arg-type]
+        if not isinstance(value, types.Number | types.Boolean):
             return None
         return signature(types.none, view, index, view.dtype)
 
@@ -97,7 +101,7 @@ class _SetItem(AbstractTemplate):
 def _place(context, builder, view, value, index, at):
     """Pointer to an element or a row, and the view's fields."""
     made = cgutils.create_struct_proxy(view)(context, builder, value)
-    kinds = _indices(index)
+    kinds: list[Any] = _indices(index) or []
     places = cgutils.unpack_tuple(builder, at) if isinstance(index, types.BaseTuple) else [at]
     offset = None
     for k in range(view.ndim):
@@ -136,7 +140,7 @@ def _setitem(context, builder, sig, args):
     return context.get_dummy_value()
 
 
-def lean_type(kind):
+def lean_type(kind: Any) -> Any:
     """Type of a value once it is lean."""
     if isinstance(kind, types.Array):
         return View(kind.dtype, kind.ndim)
@@ -147,7 +151,7 @@ def lean_type(kind):
     return types.unliteral(kind)
 
 
-def _lean_value(context, builder, kind, value):
+def _lean_value(context, builder, kind: Any, value):
     target = lean_type(kind)
     if isinstance(kind, types.Array):
         array = cgutils.create_struct_proxy(kind)(context, builder, value)
