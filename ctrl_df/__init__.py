@@ -63,6 +63,7 @@ _LAZY = {
     "refit": "identify.refit",
     "diagnose": "identify.diagnose",
     "improve": "identify.improve",
+    "warm_up": "warm",
 }
 
 __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]

@@ -52,6 +52,9 @@ def _parser() -> argparse.ArgumentParser:
     cycles.add_argument("--json", action="store_true", help="machine-readable answer")
     cycles.set_defaults(run=_limit_cycles)
 
+    warm = commands.add_parser("warm-up", help="compile ahead what is compiled on first use")
+    warm.set_defaults(run=_warm_up)
+
     better = commands.add_parser("improve", help="find what a model is missing, from a record", **shape)
     better.add_argument("data", metavar="DATA.csv")
     better.add_argument("--model", required=True, metavar="MODEL.toml")
@@ -65,6 +68,13 @@ def _demo(options) -> int:
     from .demo import run
 
     run(Path(options.out))
+    return 0
+
+
+def _warm_up(options) -> int:
+    from .warm import warm_up
+
+    warm_up(progress=True)
     return 0
 
 

@@ -212,10 +212,9 @@ def advance(
                 begun = t
                 gone, t, segment, index, next_tick, ticked = glide(
                     prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-                    xout, yout, size, scale, max_steps - steps, rtol, next_tick, x1, xi, dx, g,
+                    xout, yout, size, scale, rtol, next_tick, x1, xi, dx, g,
                 )  # fmt: skip
                 if gone > 0:
-                    steps += gone
                     h = max(h, t - begun)
                     known, jumped = False, ticked or held
                     continue

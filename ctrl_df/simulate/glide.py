@@ -72,7 +72,7 @@ def glide_memory(memory: Memory, affine: bool, ny: int) -> Glide:
 
 @part
 def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
-          size, scale, room, rtol, next_tick, x1, xi, dx, g):  # fmt: skip
+          size, scale, rtol, next_tick, x1, xi, dx, g):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
 
     Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
@@ -94,7 +94,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         here[j] = ahead[j] = 0.0
     here[one] = ahead[one] = bound[one] = 1.0
     before = -1
-    while done < room:
+    while t < t_end:
         jumped = False
         while segment + 1 < nt and time[segment + 1] <= t:
             segment += 1
