@@ -138,13 +138,13 @@ class OrbitFinder:
     # --- from a guess -------------------------------------------------------------------------------------
 
     def from_guess(self, guess) -> Orbit | None:
-        """Return the orbit that a guess leads to; None if to none."""
+        """Return the orbit that a guess leads to, as `checked_guess` returns it; None if to none."""
         self.tried, self.merged, self.centre = [], False, False
         if isinstance(guess, Orbit):
             return self._from_orbit(guess)
-        if isinstance(guess, np.ndarray) and guess.shape == (self.engine.nstates,):
+        if isinstance(guess, np.ndarray):
             return self._from_state(guess)
-        amplitude, omega = _amplitude_omega(guess, self.engine.nstates)
+        amplitude, omega = (guess.amplitude, guess.omega) if hasattr(guess, "amplitude") else guess
         told = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
         if self.by_simulation:
             return self._simulated(self._start(guess, amplitude, omega), "the prediction")[0]
@@ -391,22 +391,3 @@ def _near(orbit, amplitude, omega, factors=SAME_CYCLE) -> bool:
 
 def _distance(orbit, amplitude, omega) -> float:
     return abs(np.log(orbit.omega / omega)) + 0.5 * abs(np.log(orbit.amplitude / amplitude))
-
-
-def _amplitude_omega(guess, nstates):
-    if hasattr(guess, "amplitude"):
-        return float(guess.amplitude), float(guess.omega)
-    try:
-        amplitude, omega = (float(v) for v in guess)
-    except (TypeError, ValueError):
-        raise TypeError(
-            "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an "
-            f"array of shape ({nstates},); got {guess!r}."
-        ) from None
-    if not (0 < amplitude < np.inf and 0 < omega < np.inf):
-        raise ValueError(
-            "a guess needs amplitude > 0 and omega > 0 [rad/s], both finite; got "
-            f"({amplitude:g}, {omega:g}). "
-            "Leave the guess out to search."
-        )
-    return amplitude, omega

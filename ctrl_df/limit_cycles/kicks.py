@@ -111,7 +111,8 @@ class Kicks:
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
-        if jump > 1e-6 * abs(law(1e6 * least)):
+        # over six decades any power of the argument grows by more than twofold, unless a jump hides it
+        if jump > 0.5 * abs(law(1e6 * least)):
             return jump * gain or 1.0
         return _bend(law, 1 / gain if gain else 0.0) or 1.0
 
