@@ -177,7 +177,7 @@ class Explorer:
 
     def _row(self, size, course, orbit, x0) -> Start:
         fate = course.fate
-        if orbit is not None and fate == UNDECIDED:
+        if orbit is not None and orbit.stable is not False and fate == UNDECIDED:
             fate = CYCLES
         elif fate == CYCLES and orbit is None:
             fate = UNDECIDED

@@ -18,7 +18,7 @@ from .answer import responder
 from .arguments import check_search, checked_guess
 from .closing import Centre, Closing, NoClosure
 from .fate import Explorer
-from .forced_start import harmonic_start
+from .forced_start import harmonic_start, path_starts
 from .linear import LinearPart
 from .orbit import NoOrbit, Orbit, Try
 from .path import End, Path, corrected_near, follow_path
@@ -235,15 +235,11 @@ class OrbitFinder:
             self.tried.append(Try(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)"))
             return None
         self.missed = np.inf
-        start, period = harmonic_start(self.loop, path.waveform, path.omega), 2 * np.pi / path.omega
+        (start,), period = path_starts(self.loop, path, 1), 2 * np.pi / path.omega
         orbit = self._closed(start, period, name)
         if orbit is None:
-            k = np.arange(len(path.waveform))
-            along = [start] + [
-                harmonic_start(self.loop, path.waveform * np.exp(2j * np.pi * k * i / _PIECES), path.omega)
-                for i in range(1, _PIECES)
-            ]
-            orbit = self._closed(np.array(along), period, "states all along it", self.closing.close_along)
+            along = np.array(path_starts(self.loop, path, _PIECES))
+            orbit = self._closed(along, period, "states all along it", self.closing.close_along)
         if orbit is None and self.missed < _NEAR_MISS:
             orbit = self._closed(
                 start, period, "the mismatch after a lap, let shrink", lambda *at: trace(self.closing, *at)
