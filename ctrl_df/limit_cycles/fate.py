@@ -26,7 +26,8 @@ class Start:
     size : float
         Displacement at rest [m], or amplitude at the input of an element.
     fate : str
-        ``rests``, ``cycles``, ``diverges``, or ``undecided`` within the bound on work.
+        ``rests`` (or slows down without end, each swing longer than the last by a steady ratio), ``cycles``,
+        ``diverges``, or ``undecided`` within the bound on work.
     orbit : Orbit or None
         The one it cycles on.
     growth : float
