@@ -52,6 +52,23 @@ def _sampled(cells):
     return respond
 
 
+def jumps(method: Method, amplitude: float) -> bool:
+    """Whether a law without time jumps under a sine of that amplitude; a hysteresis switches, so it does."""
+    primitive = getattr(method.subject, "primitive", None)
+    if getattr(primitive, "hysteretic", False):
+        return True
+    law = getattr(primitive, "value", None)
+    if law is None:
+        law = _pointwise(method.subject) if method.name == "law" and callable(method.subject) else None
+    if law is None:
+        return False
+    coarse, fine = (
+        np.abs(np.diff(np.asarray(law(amplitude * np.cos(np.linspace(0, 2 * np.pi, n))), dtype=float))).max()
+        for n in (SAMPLES, 4 * SAMPLES)
+    )
+    return bool(fine > 0.5 * coarse)  # a smooth law changes by a quarter of it between samples so much denser
+
+
 _INSIDE = (np.arange(64) + 0.5) / 64
 
 

@@ -290,6 +290,8 @@ class OrbitFinder:
         if self.by_simulation:
             return self._averaged(x0, laps, self.swings.repeats(laps))
         orbit = self._closed_laps(laps)
+        if complete and course.fate == UNDECIDED and orbit is not None and orbit.stable is False:
+            orbit = None  # one of many that an irregular motion passes: rounding tells which
         if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= 1000:
             return self._averaged(x0, laps, False)
         return orbit
