@@ -373,3 +373,29 @@ def test_a_relay_that_switches_at_samples_only_has_its_band_as_wide():
     assert width > 0.5 * cycle.omega * 0.07 * cycle.sensitivity.omega
     (row,) = cdf.verify(response)
     assert row.in_band
+
+
+@pytest.mark.parametrize("grid", [(14, 17), (30, 40), (47, 61)])
+def test_a_quantizer_may_balance_a_loop_at_very_many_amplitudes(grid):
+    """|H| = 1 at the phase of -180 degrees: N of a quantizer swings about 1, twice a level."""
+    step = 0.05
+    H = ct.tf([8], [1, 3, 3, 1])
+    response = cdf.describing_function_response(
+        H,
+        cdf.quantizer(step),
+        np.geomspace(0.501 * step, 20.3 * step, grid[0]),
+        np.geomspace(0.1, 20, grid[1]),
+    )
+    assert len(response.limit_cycles) == 40 and "bound on work" not in response.status
+    levels = [c.amplitude / step for c in response.limit_cycles]
+    assert all(0.4 < k < 0.6 for k in np.diff(levels)[4:])
+
+
+def test_swings_of_a_law_fade_where_it_is_straight():
+    """A start below the bend decays as the linear loop does; a tenth of the laps to 1e-6 tell so."""
+    loop = cdf.closed_loop(ct.tf([6.0], [1, 3, 3, 1]), lambda v: v + v**3)
+    swing = OrbitFinder(loop).swings
+    assert swing.kicks.straight == pytest.approx(swing.kicks.scale)
+    course = swing.follow(swing.kicks.state(0.03 * swing.kicks.scale), 1000)
+    assert course.fate == "rests" and len(course.laps) < 40
+    assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).swings.kicks.straight == 0

@@ -24,6 +24,7 @@ _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
 _EVEN = 0.05  # spread of logarithmic growths within which a growth counts as steady
 _STEPS = 3  # such growths in a row, at least; two do where each is tenfold
+_WITHIN = 0.1  # of the input up to which a block is a straight line: there the loop is linear
 _RECENT = 64  # laps among which they are looked for
 _BEYOND = 10.0  # times the largest kick's first swing: growth at a steady ratio from there has no bound
 _GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
@@ -176,7 +177,7 @@ class Swings:
                 break
             if found and laps[-1].peak > _BEYOND and _explodes(laps):
                 return Course(laps, DIVERGES, np.inf, state)
-            if found and _creeps(laps):
+            if found and (_creeps(laps) or self._fades(laps)):
                 fate = RESTS
                 break
             if found and decided is not None:
@@ -200,6 +201,13 @@ class Swings:
             if node[KIND] == DELAY:
                 state.x[node[X]] = 0.0
         return state
+
+    def _fades(self, laps) -> bool:
+        """Whether the swings shrink by a steady ratio where the block is a straight line: so they go on."""
+        recent = laps[-_RECENT:]
+        if not max(lap.peak for lap in recent[-_STEPS:]) * self._unit < _WITHIN * self.kicks.straight:
+            return False
+        return _endless([1 / max(lap.peak, 1e-300) for lap in recent], 1 / _FAINT) > 0
 
     def repeats(self, laps) -> bool:
         """Whether the last two passages met the same state; closer if no Newton follows."""
