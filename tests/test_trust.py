@@ -1,12 +1,18 @@
 """Three honest answers (an orbit, none, not found), what the loop does, and the same in every unit."""
 
+import time
+
 import control as ct
 import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.limit_cycles import swings
+from ctrl_df.limit_cycles.closing import Closing
 from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.limit_cycles.orbit import NoOrbit
+from ctrl_df.limit_cycles.path import End
+from ctrl_df.limit_cycles.swings import Lap
 from ctrl_df.status import Status
 
 FRICTION = cdf.pid(2000, 44250, 130)
@@ -254,3 +260,142 @@ def test_a_centre_is_no_limit_cycle():
     for guess in (None, (1.0, float(np.sqrt(2000 / 9)))):
         answer = cdf.find_limit_cycle(loop, guess=guess)
         assert not answer and answer.status is Status.CENTRE
+
+
+# --- fates by trend, not by waiting -------------------------------------------------------------------------
+
+
+def _laps(durations, peaks):
+    times = np.cumsum(np.concatenate([[0.0], durations]))
+    return [Lap(t, np.zeros(1), p) for t, p in zip(times, peaks, strict=True)]
+
+
+def test_growth_without_end_is_told_from_growth_towards_a_limit():
+    """exp(c (1 - 0.9^n)) rises by e^c and no more; a steady ratio is told after a few steps."""
+    n = np.arange(40)
+    assert swings._endless(1.3 ** n[:6], 1e4) and swings._endless(12.0 ** n[:3], 1e4)
+    assert not swings._endless(np.exp(5 * (1 - 0.9**n)), 1e4)
+    assert not swings._endless(1.0 + n, 1e4) and not swings._endless(np.ones(40), 1e4)
+
+
+def test_a_motion_that_slows_down_by_a_ratio_each_swing_comes_to_rest():
+    slower = 1.6 ** np.arange(8)
+    assert swings._creeps(_laps(slower, np.full(9, 0.05)))
+    assert not swings._creeps(_laps(slower, 1.3 ** np.arange(9)))  # its swings grow: it does not creep
+    assert not swings._creeps(_laps(np.full(8, 2.0), np.full(9, 0.05)))
+    loop = cdf.closed_loop(ct.tf([429], [1, 17.01, 63.17, 0]), cdf.play(0.3725))
+    begun = time.perf_counter()
+    fate = OrbitFinder(loop).explorer.explore()
+    assert {row.fate for row in fate} == {"rests"} and time.perf_counter() - begun < 20
+
+
+def test_a_simulation_that_spends_its_work_is_undecided(monkeypatch):
+    monkeypatch.setattr(swings, "_WORK", 30)
+    finder = OrbitFinder(cdf.closed_loop(ct.tf([8], [1, 2, 2, 1]), np.tanh))
+    assert {row.fate for row in finder.explorer.explore(edges=False)} == {"undecided"}
+
+
+@pytest.mark.parametrize("force", [1e-9, 1e-4, 1e9])
+def test_the_scale_of_a_smooth_law_in_other_units(force):
+    """A straight line near zero is no jump, however it is rounded."""
+
+    def scale(f):
+        loop = cdf.closed_loop(ct.tf([11.5], [1, 1.92, 2.15, 1.65]), lambda v: f * (v / f) / (1 + abs(v / f)))
+        return OrbitFinder(loop).swings.kicks.scale / f
+
+    assert scale(force) == pytest.approx(scale(1.0), rel=1e-6)
+
+
+def test_a_known_orbit_is_closed_once(monkeypatch):
+    closed = []
+    close = Closing.close
+    monkeypatch.setattr(Closing, "close", lambda self, *at: closed.append(1) or close(self, *at))
+    H = ct.tf([11.5], [1, 1.92, 2.15, 1.65])
+    check = cdf.verify(
+        cdf.describing_function_response(H, np.tanh, np.geomspace(0.1, 60, 20), np.geomspace(0.1, 20, 30))
+    )
+    assert [row.verdict for row in check] == ["confirmed"] and len(check.fate.cycles) == 6
+    assert all(row.orbit is check.orbits[0] for row in check.fate) and len(closed) == 1
+
+
+def test_a_start_beside_an_unstable_orbit_does_not_cycle_on_it():
+    loop = cdf.closed_loop(cdf.pid(1800, 19500, 100), cdf.backlash_masses(1, 8, 0.018, 0.5))
+    fate = OrbitFinder(loop).explorer.explore(edges=False)
+    stable = [row.orbit.stable for row in fate.cycles if row.orbit is not None]
+    assert False not in stable and stable.count(True) == 4
+
+
+def test_the_path_of_a_rattle_reaches_its_orbit():
+    """Under one force the gap has several motions; the path stays on the one it began on."""
+    response = cdf.describing_function_response(
+        cdf.pid(1800, 19500, 100),
+        cdf.backlash_masses(1, 8, 0.018, 0.8),
+        np.geomspace(8, 13, 6),
+        np.geomspace(100, 160, 6),
+    )
+    (cycle,) = response.limit_cycles
+    assert cycle.path.end is End.REACHED and cycle.corrected == pytest.approx(
+        (12.717699, 156.045031), rel=0.03
+    )
+
+
+def test_a_sample_may_take_months():
+    dt = 5e6
+    H = ct.tf([0.005468, 0.01967, 0.004416], [1, -2.609, 2.263, -0.6523], dt)
+    response = cdf.describing_function_response(
+        H, cdf.saturation(1.0), np.geomspace(1.01, 40, 10), np.geomspace(1e-3, 2.7, 20) / dt
+    )
+    assert np.isfinite(response.response.response).all()
+
+
+@pytest.mark.parametrize("grid", [(14, 17), (30, 40), (47, 61)])
+def test_two_solutions_beside_a_jump_of_a_quantizer_are_found_on_any_grid(grid):
+    """N rises with the square root of what the amplitude is beyond a level: 0.05 % there."""
+    step = 0.2146
+    probe = 1.5003 * step
+    N = float(np.real(complex(cdf.describing_function(cdf.quantizer(step), probe))))
+    H = ct.tf([8 / N], [1, 3, 3, 1])  # |H| is 1 / N where its phase is -180 degrees
+    response = cdf.describing_function_response(
+        H, cdf.quantizer(step), np.geomspace(1.2 * step, 2 * step, grid[0]), np.geomspace(0.1, 20, grid[1])
+    )
+    amplitudes = [c.amplitude for c in response.limit_cycles]
+    assert len(amplitudes) == 2 and min(abs(a / probe - 1) for a in amplitudes) < 1e-6
+
+
+def test_a_relay_that_switches_at_samples_only_has_its_band_as_wide():
+    """The loop's swing is a whole number of samples, anywhere within half a sample of the mean."""
+    H = ct.sample_system(ct.tf([1.0], [1, 3, 3, 1]), 0.07, "zoh")
+    response = cdf.describing_function_response(
+        H, cdf.relay(1.0), np.geomspace(0.01, 1, 12), np.geomspace(0.3, 10, 20)
+    )
+    (cycle,) = response.limit_cycles
+    width = np.log(cycle.omega_band[1] / cycle.omega)
+    assert width > 0.5 * cycle.omega * 0.07 * cycle.sensitivity.omega
+    (row,) = cdf.verify(response)
+    assert row.in_band
+
+
+@pytest.mark.parametrize("grid", [(14, 17), (30, 40), (47, 61)])
+def test_a_quantizer_may_balance_a_loop_at_very_many_amplitudes(grid):
+    """|H| = 1 at the phase of -180 degrees: N of a quantizer swings about 1, twice a level."""
+    step = 0.05
+    H = ct.tf([8], [1, 3, 3, 1])
+    response = cdf.describing_function_response(
+        H,
+        cdf.quantizer(step),
+        np.geomspace(0.501 * step, 20.3 * step, grid[0]),
+        np.geomspace(0.1, 20, grid[1]),
+    )
+    assert len(response.limit_cycles) == 40 and "bound on work" not in response.status
+    levels = [c.amplitude / step for c in response.limit_cycles]
+    assert all(0.4 < k < 0.6 for k in np.diff(levels)[4:])
+
+
+def test_swings_of_a_law_fade_where_it_is_straight():
+    """A start below the bend decays as the linear loop does; a tenth of the laps to 1e-6 tell so."""
+    loop = cdf.closed_loop(ct.tf([6.0], [1, 3, 3, 1]), lambda v: v + v**3)
+    swing = OrbitFinder(loop).swings
+    assert swing.kicks.straight == pytest.approx(swing.kicks.scale)
+    course = swing.follow(swing.kicks.state(0.03 * swing.kicks.scale), 1000)
+    assert course.fate == "rests" and len(course.laps) < 40
+    assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).swings.kicks.straight == 0

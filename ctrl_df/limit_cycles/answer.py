@@ -10,6 +10,7 @@ import numpy as np
 from ..blocks.element import Element
 from ..blocks.primitives import PiecewiseAffine, Play, Quantizer
 from ..df.dispatch import Method
+from .waveform import WaveformOrbit
 
 SAMPLES = 2048
 STATIC_HARMONICS, DYNAMIC_HARMONICS = 63, 21
@@ -19,7 +20,8 @@ def responder(F, method: Method) -> tuple[Callable, int] | None:
     """Return how the block answers a waveform, and the harmonics to keep; None where that is not known.
 
     The answer is a function ``respond(U, omega) -> Y``: coefficients k = 0, 1, ... of the steady output for
-    those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic answer.
+    those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic answer. A block
+    with dynamics may have several: it goes on from the one before (see `WaveformOrbit`).
     """
     if method.name == "element":
         cells = _element_cells(method.subject)
@@ -27,7 +29,7 @@ def responder(F, method: Method) -> tuple[Callable, int] | None:
     if method.name == "law" and callable(method.subject):
         return _sampled(_cell_means(_pointwise(method.subject))), STATIC_HARMONICS
     if method.name in ("friction", "backlash", "orbit") and isinstance(F, ct.NonlinearIOSystem):
-        return _orbits(F, method.output), DYNAMIC_HARMONICS
+        return WaveformOrbit(F, method.output), DYNAMIC_HARMONICS
     return None
 
 
@@ -50,6 +52,23 @@ def _sampled(cells):
     return respond
 
 
+def jumps(method: Method, amplitude: float) -> bool:
+    """Whether a law without time jumps under a sine of that amplitude; a hysteresis switches, so it does."""
+    primitive = getattr(method.subject, "primitive", None)
+    if getattr(primitive, "hysteretic", False):
+        return True
+    law = getattr(primitive, "value", None)
+    if law is None:
+        law = _pointwise(method.subject) if method.name == "law" and callable(method.subject) else None
+    if law is None:
+        return False
+    coarse, fine = (
+        np.abs(np.diff(np.asarray(law(amplitude * np.cos(np.linspace(0, 2 * np.pi, n))), dtype=float))).max()
+        for n in (SAMPLES, 4 * SAMPLES)
+    )
+    return bool(fine > 0.5 * coarse)  # a smooth law changes by a quarter of it between samples so much denser
+
+
 _INSIDE = (np.arange(64) + 0.5) / 64
 
 
@@ -69,18 +88,6 @@ def _cell_means(law):
         return mean
 
     return cells
-
-
-def _orbits(block, output):
-    """Answer of a block with dynamics: its forced periodic orbit under the whole waveform."""
-    from .waveform import WaveformOrbit
-
-    solver = WaveformOrbit(block, output)
-
-    def respond(U, omega):
-        return solver.respond(U, omega)
-
-    return respond
 
 
 def _element_cells(block: Element):

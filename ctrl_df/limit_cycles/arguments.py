@@ -27,7 +27,15 @@ def checked_guess(loop, guess: Any) -> Any:
         return values
     if values.shape not in ((2,), (n,)):
         raise TypeError(wrong)
-    return tuple(values.tolist()) if values.shape == (2,) else values
+    if values.shape != (2,):
+        return values
+    amplitude, omega = values.tolist()
+    if not (0 < amplitude < np.inf and 0 < omega < np.inf):
+        raise ValueError(
+            "a guess needs amplitude > 0 and omega > 0 [rad/s], both finite; got "
+            f"({amplitude:g}, {omega:g}). Leave the guess out to search."
+        )
+    return amplitude, omega
 
 
 def check_search(owner: str, *, max_iterations: Any = 1, search_time: Any = None, **flags: Any) -> None:

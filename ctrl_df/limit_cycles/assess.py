@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..df.family import Family
-from .answer import responder
+from .answer import jumps, responder
 from .bound import mees_bergen
 from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros
@@ -125,6 +125,7 @@ class Assessor:
         sense = sensitivity(crossing.jacobian)
         # only the motion that the method names can be asked how it answers returned harmonics
         spread, path, remark = self._spread(crossing, distortion, sense, regime, motion is None)
+        spread = tuple(one + s * self._late(a, w) for one, s in zip(spread, sense, strict=True))
         notes += remark
         stable = loeb(crossing.jacobian) if attracts else False
         if self.method.name == "memory":
@@ -151,6 +152,14 @@ class Assessor:
             path=path,
             bound=bound,
         )
+
+    def _late(self, a, w) -> float:
+        """Relative error of N for switching at samples only.
+
+        A swing of whole samples answers alike wherever within a sample the law would switch: up to half a
+        sample earlier or later than the mean, an error of N in its phase.
+        """
+        return 0.5 * w * self.linear.dt if self.linear.dt and jumps(self.method, a) else 0.0
 
     def _named_motion(self, a, w):
         omega = np.array([w]) if self.method.needs_omega else None

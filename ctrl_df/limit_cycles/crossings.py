@@ -10,7 +10,7 @@ coexisting motions) are counted.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ _MOST_STARTS = 600
 _MOST_PER_CELL = 4
 _STEP = 1e-5  # of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10
 _ACCEPT = 1e-8
+_SAME = 1e-5  # difference of ln a and ln omega below which two zeros are one
 _TOGETHER = 1e-3  # of a cell: starts so near to each other converge to one zero
 
 
@@ -77,6 +78,57 @@ def find_crossings(D: Callable, log_a, log_w, values, refine=True) -> Scan:
     box = (log_a[0], log_a[-1], log_w[0], log_w[-1])
     found, unresolved = _polish(D, p, q, reach, box, refine)
     return Scan(found, cells, missing, unresolved, truncated)
+
+
+def real_crossings(D: Callable, log_a, log_w, N, H: Callable) -> list[Crossing]:
+    """Zeros of 1 + N H where N is real and depends on the amplitude alone: there may be very many.
+
+    The phase of H fixes the frequency, then N the amplitude: brackets on the two axes, one after the other.
+
+    Parameters
+    ----------
+    D : callable
+        As in `find_crossings`.
+    log_a, log_w : ndarray
+        Grid, ascending.
+    N : ndarray of float
+        On the amplitudes of the grid.
+    H : callable
+        ``H(omega)``, array of complex.
+    """
+    found = []
+    for q in _bracketed(lambda q: H(np.exp(q)).imag, log_w, H(np.exp(log_w)).imag):
+        gain = float(H(np.exp(np.array([q])))[0].real)
+        if not np.isfinite(gain) or abs(H(np.exp(np.array([q])))[0].imag) > 1e-6 * abs(gain):
+            continue  # a pole: the phase jumps there
+        here = np.full(1, q)
+        for p in _bracketed(lambda p, q=q: D(p, np.full(p.size, q)).real, log_a, 1 + N * gain):
+            value = abs(D(np.array([p]), here)[0])
+            if value <= _ACCEPT:
+                J = jacobian(D, np.array([p]), here)[0]
+                found.append(Crossing(float(np.exp(p)), float(np.exp(q)), float(value), J))
+    return found
+
+
+def _bracketed(f, grid, values):
+    """Return the zeros of a function, bisecting all intervals of a grid across which its sign changes."""
+    at = np.flatnonzero((values[:-1] < 0) != (values[1:] < 0))
+    low, high, sign = grid[at].copy(), grid[at + 1].copy(), np.sign(values[at])
+    for _ in range(60 if at.size else 0):
+        middle = 0.5 * (low + high)
+        same = np.sign(f(middle)) == sign
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return 0.5 * (low + high)
+
+
+def merged(scan: Scan, more: list[Crossing]) -> Scan:
+    """Return a scan with crossings that a search to no bound on work found, each once."""
+    kept = list(scan.crossings)
+    for c in more:
+        places = [np.log([c.amplitude / k.amplitude, c.omega / k.omega]) for k in kept]
+        if not any((np.abs(place) < _SAME).all() for place in places):
+            kept.append(c)
+    return replace(scan, crossings=sorted(kept, key=lambda c: (c.amplitude, c.omega)), truncated=False)
 
 
 def jacobian(D: Callable, p, q) -> np.ndarray:
@@ -188,7 +240,7 @@ def _polish(D, p, q, reach, box, refine):
     found: list[Crossing] = []
     places: list[np.ndarray] = []
     for i in keep[np.argsort(np.abs(value[keep]))]:
-        near = 1e-5 if refine else 1.0 * reach[i]
+        near = _SAME if refine else 1.0 * reach[i]
         if any((np.abs(x[i] - place) < near).all() for place in places):
             continue
         places.append(x[i])

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .known import KnownOrbits
 from .orbit import Orbit
 from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, Swings
 
 _SWINGS = 1000  # of one simulation
 _HALVINGS = 40  # of the interval between two starts of different fate
 _ASKED = (6, 12, 18, 26, 40)  # halvings after which the motion on the border is tried for an orbit
+_WIDTH = 1e-3  # of a border whose orbit is known, relative
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,8 @@ class Start:
     size : float
         Displacement at rest [m], or amplitude at the input of an element.
     fate : str
-        ``rests``, ``cycles``, ``diverges``, or ``undecided`` within the bound on work.
+        ``rests`` (or slows down without end, each swing longer than the last by a steady ratio), ``cycles``,
+        ``diverges``, or ``undecided`` within the bound on work.
     orbit : Orbit or None
         The one it cycles on.
     growth : float
@@ -134,7 +137,7 @@ class Fate:
             + "; ".join(parts)
         )
         for border in self.borders:
-            text += f"; the border lies at {0.5 * (border.below + border.above):.6g}"
+            text += f"; the border lies at {0.5 * (border.below + border.above):.4g}"
         return text
 
 
@@ -151,28 +154,31 @@ class Explorer:
     def __init__(self, swings: Swings, close: Callable):
         self.swings, self.close = swings, close
 
-    def explore(self, longest=None, edges=True) -> Fate:
-        """Simulate every start; with `edges` close in on the borders between starts of different fate."""
-        kicks, orbits = self.swings.kicks, []
-        courses: dict[float, Course] = {}
+    def explore(self, longest=None, edges=True, known: KnownOrbits | None = None) -> Fate:
+        """Simulate every start; with `edges` close in on the borders between starts of different fate.
+
+        Starts whose course ends on an orbit of `known` are not followed to its end, nor closed again.
+        """
+        kicks, met = self.swings.kicks, []
+        known = KnownOrbits(self.swings, []) if known is None else known
         rows = []
         for size, x0 in kicks.all():
-            course = courses[size] = self.swings.follow(x0, _SWINGS, longest)
-            orbit = kept(orbits, self.close(x0, course, True))
+            course = self.swings.follow(x0, _SWINGS, longest, decided=known.ending)
+            orbit = known.reached(course) or known.kept(self.close(x0, course, True))
             rows.append(self._row(size, course, orbit, x0))
+            _once(met, orbit)
         rows.sort(key=lambda row: row.size)
         borders = []
         if edges:
             for low, high in zip(rows[:-1], rows[1:], strict=True):
                 if low.fate != high.fate and UNDECIDED not in (low.fate, high.fate):
-                    border = self._border(low, high, longest)
-                    borders.append(border)
-                    kept(orbits, border.orbit)
-        return Fate(tuple(rows), tuple(borders), kicks.unit, orbits)
+                    borders.append(self._border(low, high, longest, known))
+                    _once(met, borders[-1].orbit)
+        return Fate(tuple(rows), tuple(borders), kicks.unit, met)
 
     def _row(self, size, course, orbit, x0) -> Start:
         fate = course.fate
-        if orbit is not None and fate == UNDECIDED:
+        if orbit is not None and orbit.stable is not False and fate == UNDECIDED:
             fate = CYCLES
         elif fate == CYCLES and orbit is None:
             fate = UNDECIDED
@@ -190,28 +196,28 @@ class Explorer:
         gains = np.abs(course.state.x) / self.swings.units
         return float(max(gains[:nc].max() / max(gains[nc:].max(), 1e-300), 1.0 + 1e-9))
 
-    def _border(self, low: Start, high: Start, longest) -> Border:
+    def _border(self, low: Start, high: Start, longest, known) -> Border:
         below, above, fates, orbit = low.size, high.size, (low.fate, high.fate), None
         for count in range(1, _HALVINGS + 1):
+            if orbit is not None and above < (1 + _WIDTH) * below:
+                break
             middle = float(np.sqrt(below * above))
             if not below < middle < above:
                 break
             x0 = self.swings.kicks.state(middle)
-            course = self.swings.follow(x0, _SWINGS, longest)
+            course = self.swings.follow(x0, _SWINGS, longest, decided=known.ending)
             if course.fate == fates[0]:
                 below = middle
             elif course.fate == fates[1]:
                 above = middle
             else:
                 break
-            if count in _ASKED:
-                orbit = self._slowest(x0, course)
-                if orbit is not None and orbit.stable is False:
-                    break
-        return Border(below, above, fates, orbit if orbit is not None and orbit.stable is False else None)
+            if orbit is None and count in _ASKED:
+                orbit = self._slowest(x0, course, known)
+        return Border(below, above, fates, orbit)
 
-    def _slowest(self, x0, course: Course) -> Orbit | None:
-        """Orbit near which a course lingers: its passages change least there."""
+    def _slowest(self, x0, course: Course, known) -> Orbit | None:
+        """Unstable orbit near which a course lingers: its passages change least there."""
         laps = course.laps
         if len(laps) < 4:
             return None
@@ -220,19 +226,16 @@ class Explorer:
             for a, b in zip(laps[:-1], laps[1:], strict=True)
         ]
         k = int(np.argmin(change))
-        if change[k] > 0.3:
-            return None
+        orbit = known.beside(laps[k])
+        if orbit is not None or change[k] > 0.3:
+            return orbit
         near = laps[max(k - 4, 0) : k + 2]
         padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near
-        return self.close(x0, Course(padded, UNDECIDED, 1.0, course.state), False)
+        orbit = self.close(x0, Course(padded, UNDECIDED, 1.0, course.state), False)
+        return known.kept(orbit) if orbit is not None and orbit.stable is False else None
 
 
-def kept(orbits, orbit):
-    """Return the known orbit that this one is, or the orbit itself, now known."""
-    if orbit is None:
-        return None
-    for known in orbits:
-        if orbit.same_as(known, 1e-4 if orbit.status.ok else 2e-2):
-            return known
-    orbits.append(orbit)
-    return orbit
+def _once(orbits, orbit):
+    """Append an orbit to those met, unless it is among them."""
+    if orbit is not None and not any(orbit is other for other in orbits):
+        orbits.append(orbit)

@@ -18,7 +18,7 @@ from .answer import responder
 from .arguments import check_search, checked_guess
 from .closing import Centre, Closing, NoClosure
 from .fate import Explorer
-from .forced_start import harmonic_start
+from .forced_start import harmonic_start, path_starts
 from .linear import LinearPart
 from .orbit import NoOrbit, Orbit, Try
 from .path import End, Path, corrected_near, follow_path
@@ -138,13 +138,13 @@ class OrbitFinder:
     # --- from a guess -------------------------------------------------------------------------------------
 
     def from_guess(self, guess) -> Orbit | None:
-        """Return the orbit that a guess leads to; None if to none."""
+        """Return the orbit that a guess leads to, as `checked_guess` returns it; None if to none."""
         self.tried, self.merged, self.centre = [], False, False
         if isinstance(guess, Orbit):
             return self._from_orbit(guess)
-        if isinstance(guess, np.ndarray) and guess.shape == (self.engine.nstates,):
+        if isinstance(guess, np.ndarray):
             return self._from_state(guess)
-        amplitude, omega = _amplitude_omega(guess, self.engine.nstates)
+        amplitude, omega = (guess.amplitude, guess.omega) if hasattr(guess, "amplitude") else guess
         told = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
         if self.by_simulation:
             return self._simulated(self._start(guess, amplitude, omega), "the prediction")[0]
@@ -235,15 +235,11 @@ class OrbitFinder:
             self.tried.append(Try(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)"))
             return None
         self.missed = np.inf
-        start, period = harmonic_start(self.loop, path.waveform, path.omega), 2 * np.pi / path.omega
+        (start,), period = path_starts(self.loop, path, 1), 2 * np.pi / path.omega
         orbit = self._closed(start, period, name)
         if orbit is None:
-            k = np.arange(len(path.waveform))
-            along = [start] + [
-                harmonic_start(self.loop, path.waveform * np.exp(2j * np.pi * k * i / _PIECES), path.omega)
-                for i in range(1, _PIECES)
-            ]
-            orbit = self._closed(np.array(along), period, "states all along it", self.closing.close_along)
+            along = np.array(path_starts(self.loop, path, _PIECES))
+            orbit = self._closed(along, period, "states all along it", self.closing.close_along)
         if orbit is None and self.missed < _NEAR_MISS:
             orbit = self._closed(
                 start, period, "the mismatch after a lap, let shrink", lambda *at: trace(self.closing, *at)
@@ -294,6 +290,8 @@ class OrbitFinder:
         if self.by_simulation:
             return self._averaged(x0, laps, self.swings.repeats(laps))
         orbit = self._closed_laps(laps)
+        if complete and course.fate == UNDECIDED and orbit is not None and orbit.stable is False:
+            orbit = None  # one of many that an irregular motion passes: rounding tells which
         if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= 1000:
             return self._averaged(x0, laps, False)
         return orbit
@@ -391,22 +389,3 @@ def _near(orbit, amplitude, omega, factors=SAME_CYCLE) -> bool:
 
 def _distance(orbit, amplitude, omega) -> float:
     return abs(np.log(orbit.omega / omega)) + 0.5 * abs(np.log(orbit.amplitude / amplitude))
-
-
-def _amplitude_omega(guess, nstates):
-    if hasattr(guess, "amplitude"):
-        return float(guess.amplitude), float(guess.omega)
-    try:
-        amplitude, omega = (float(v) for v in guess)
-    except (TypeError, ValueError):
-        raise TypeError(
-            "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an "
-            f"array of shape ({nstates},); got {guess!r}."
-        ) from None
-    if not (0 < amplitude < np.inf and 0 < omega < np.inf):
-        raise ValueError(
-            "a guess needs amplitude > 0 and omega > 0 [rad/s], both finite; got "
-            f"({amplitude:g}, {omega:g}). "
-            "Leave the guess out to search."
-        )
-    return amplitude, omega

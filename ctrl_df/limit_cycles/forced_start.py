@@ -12,7 +12,7 @@ from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
 from .answer import responder
-from .waveform import WaveformOrbit
+from .path import Path
 
 _PERIODS = 40  # of forced motion before it is measured
 
@@ -64,6 +64,27 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, mo
     return np.concatenate([x_control, x_block])
 
 
+def path_starts(loop: Any, path: Path, count: int) -> list[np.ndarray]:
+    """States of a loop at equal steps of time along the cycle at the end of a path, `count` in a period."""
+    turns = np.exp(2j * np.pi * np.outer(np.arange(count) / count, np.arange(len(path.waveform))))
+    waveforms = path.waveform * turns
+    if path.motion is None:
+        return [harmonic_start(loop, U, path.omega) for U in waveforms]
+    block = loop.parts.block
+    engine, core = Engine(block), getattr(block, "core", None)
+    row = list(block.output_labels).index(loop.output_labels[0])
+    period = 2 * np.pi / path.omega
+    run = engine.run(
+        path.motion, period, harmonic_drive([path.waveform], path.omega),
+        period * np.arange(count) / count, **_options(period, path.waveform),
+    )  # fmt: skip
+    starts = []
+    for U, x in zip(waveforms, run.states, strict=True):
+        motion = _measured(engine, core, row, engine.start(x), U, path.omega)
+        starts.append(harmonic_start(loop, U, path.omega, motion=motion))
+    return starts
+
+
 def _forced_motion(loop, U, omega, wanted):
     """State of the block alone at t = 0 under the guessed input, its mean position removed, and its Y_k."""
     block, amplitude = loop.parts.block, abs(U[1])
@@ -92,10 +113,6 @@ def _forced_motion(loop, U, omega, wanted):
                     -core.masses[1] / core.masses[0] * x[3]
                 )  # no net momentum: the pair must not drift away
                 starts.append(x)
-    if len(U) > 2:  # a waveform comes from a known motion, which may repel: closed, not waited for
-        solver = WaveformOrbit(block, loop.output_labels[0])
-        if solver.respond(U, omega) is not None and solver.previous is not None:
-            return _measured(engine, core, row, solver.previous, U, omega)
     found = [_forced_from(engine, core, row, x, U, omega) for x in starts]
     if wanted is not None:
         return min(found, key=lambda f: abs(abs(f[1][1]) - wanted))
@@ -110,7 +127,7 @@ def _forced_from(engine, core, row, x0, U, omega):
     return _measured(engine, core, row, run.state, U, omega)
 
 
-def _options(period, U):
+def _options(period, U) -> dict[str, Any]:
     return dict(rtol=1e-8, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=400_000)
 
 

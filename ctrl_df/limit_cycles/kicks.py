@@ -32,6 +32,9 @@ class Kicks:
         The size at which the block's nonlinearity matters.
     pace : float
         A frequency at which the loop moves [rad/s].
+    straight : float
+        Input of an element or a law up to which it is a straight line (a law within a hundredth); 0 where
+        that is not known, as for mechanisms, which may have friction on a scale of its own.
     """
 
     def __init__(self, loop, engine):
@@ -39,6 +42,7 @@ class Kicks:
         self.parts: Any = getattr(loop, "parts", None)
         self.block: Any = None if self.parts is None else self.parts.block
         self.core: Any = getattr(self.block, "core", None)
+        self.straight = 0.0
         if self.core is not None:
             self.pace = corner_frequency(self.parts)
             self.scale, self.unit = self._length_scale(), "m"
@@ -102,8 +106,11 @@ class Kicks:
         """Input at which an element or a law bends; of one that jumps at zero, what its jump drives."""
         primitive = getattr(self.block, "primitive", None)
         corners = [abs(corner) for corner in getattr(primitive, "corners", ())]
-        size = max([*corners, getattr(primitive, "step", 0.0), getattr(primitive, "gap", 0.0)])
+        step = getattr(primitive, "step", 0.0)
+        size = max([*corners, step, getattr(primitive, "gap", 0.0)])
         if size > 0:
+            if not self.block.nstates:
+                self.straight = min([*corners, 0.5 * step] if step else corners)
             return size
         if self.block.nstates:
             return 1.0
@@ -111,9 +118,12 @@ class Kicks:
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
-        if jump > 1e-6 * abs(law(1e6 * least)):
+        # over six decades any power of the argument grows by more than twofold, unless a jump hides it
+        if jump > 0.5 * abs(law(1e6 * least)):
             return jump * gain or 1.0
-        return _bend(law, 1 / gain if gain else 0.0) or 1.0
+        bend = _bend(law, 1 / gain if gain else 0.0)
+        self.straight = bend or 0.0
+        return bend or 1.0
 
     def _gain(self) -> float:
         """Gain of the linear part at the loop's pace."""

@@ -10,6 +10,8 @@ import numpy as np
 from .linear import LinearPart
 from .scan_grid import refined_omega
 
+_INDENT = 1e-4  # radius of the contour's way round a pole, relative to the frequencies looked at
+
 
 def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
     """Return the Nyquist response of H over `omega`, or over python-control's own choice.
@@ -42,6 +44,10 @@ def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
         omega = refined_omega(linear, omega, most=1000)  # the drawn curve passes through the crossings
     if omega is None and not linear.proper:  # its contour never closes: draw what is scanned
         omega, warn = linear.grid(), False
+    if not linear.measured and "indent_radius" not in kwargs:
+        # python-control's own is in rad/s: where a period takes days it swallows the contour
+        seen = linear.grid() if omega is None else np.asarray(omega)
+        kwargs = {**kwargs, "indent_radius": _INDENT * float(np.sqrt(seen[seen > 0].min() * seen.max()))}
     with warnings.catch_warnings():
         if not warn:
             warnings.simplefilter("ignore")

@@ -21,12 +21,14 @@ from enum import Enum
 
 import numpy as np
 
+from ..simulate.engine import State
 from .arclength import correction, tangent
 
 _CLOSED = 1e-7  # defect, relative to the fundamental, of a point on the curve
 _NUDGE = 1e-5  # of the difference quotients; all unknowns are relative
 _LONGEST, _SHORTEST, _FIRST = 0.25, 1e-3, 0.1  # steps along the curve
 _MOST_STEPS = 80
+_NAMED = 0.01  # |1 + N H| of a motion that is taken for the one of the prediction
 _REACH = np.log([30.0, 10.0])  # in amplitude and frequency, beyond which a curve is given up
 _ODD = 1e-7  # even harmonics and mean of the answer to an odd waveform, below which a block is odd
 
@@ -58,6 +60,8 @@ class Path:
         Those of the block's output.
     folds : int
         Times the curve turned back.
+    motion : State or None
+        The block's motion at the end, at t = 0; None for a law without time.
     """
 
     end: End
@@ -66,6 +70,7 @@ class Path:
     waveform: np.ndarray
     answer: np.ndarray
     folds: int = 0
+    motion: State | None = None
 
     @property
     def solution(self) -> tuple[float, float]:
@@ -111,15 +116,37 @@ class _Curve:
     def __init__(self, respond, harmonics, linear, amplitude, omega):
         self.respond, self.harmonics, self.linear = respond, harmonics, linear
         self.first = np.log([amplitude, omega])
+        self.motion = None
         self.kept = np.array([0, *range(2, harmonics + 1)])
-        U = np.zeros(harmonics + 1, complex)
-        U[1], U[3] = amplitude, 0.05 * amplitude * np.exp(0.7j)
-        Y = respond(U, omega)
-        if Y is not None and np.abs(Y[0::2]).max() < _ODD * np.abs(Y).max():
-            self.kept = np.arange(3, harmonics + 1, 2)
+        self._begin(amplitude, omega)
         gain = linear.static_gain
         self.fixed_mean = bool(np.isnan(gain)) and not linear.measured
         self.static_gain = 0.0 if np.isnan(gain) else gain
+
+    def _begin(self, amplitude, omega):
+        """Find the motion that the describing function names, and whether it answers odd waveforms oddly."""
+        U = np.zeros(self.harmonics + 1, complex)
+        U[1] = amplitude
+        nearest = getattr(self.respond, "nearest", None)
+        if nearest is not None:  # of several, the one whose N balances H there
+            H = self.linear.clamped(np.array([omega]))[0][0]
+            nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), _NAMED)
+        motion = self.motion
+        U[3] = 0.05 * amplitude * np.exp(0.7j)
+        Y = self.respond(U, omega)
+        if Y is not None and np.abs(Y[0::2]).max() < _ODD * np.abs(Y).max():
+            self.kept = np.arange(3, self.harmonics + 1, 2)
+        self.motion = motion
+
+    @property
+    def motion(self):
+        """The block's motion last answered with, from which it goes on where it has several."""
+        return getattr(self.respond, "motion", None)
+
+    @motion.setter
+    def motion(self, motion):
+        if hasattr(self.respond, "motion"):
+            self.respond.motion = motion
 
     def waveform(self, z):
         """Return U_k, a and omega of the unknowns."""
@@ -158,14 +185,16 @@ class _Curve:
 
     def jacobian(self, z, r):
         """Return the derivatives of the defect by all unknowns; None where the block does not answer."""
-        columns = []
+        columns, motion = [], self.motion
         for i in range(z.size):
+            self.motion = motion
             moved = z.copy()
             moved[i] += _NUDGE if i < z.size - 1 or z[i] < 0.5 else -_NUDGE
             there, _ = self.defect(moved)
             if there is None:
                 return None
             columns.append((there - r) / (moved[i] - z[i]))
+        self.motion = motion
         return np.array(columns).T
 
     def begin(self):
@@ -193,6 +222,7 @@ class _Curve:
             return self.path(End.STOPPED, z, 0.0, Y, 0)
         z, Y, J = found
         border = tangent(J, border)
+        motion = self.motion
         step, share, folds = _FIRST, 0.0, 0
         reason = End.STOPPED
         for _ in range(_MOST_STEPS):
@@ -222,6 +252,7 @@ class _Curve:
                 step *= 0.5
                 if step < _SHORTEST:
                     break
+                self.motion = motion  # what was tried may have led to another one
                 fresh, _ = self.defect(z)
                 J = J if fresh is None else self.jacobian(z, fresh)
                 if J is None:
@@ -232,7 +263,7 @@ class _Curve:
             if turned[-1] * border[-1] < 0.0:
                 folds += 1
             z, Y, J = found
-            border = turned
+            border, motion = turned, self.motion
             share = max(share, float(z[-1]))
             step = min(1.6 * step, _LONGEST)
             if (np.abs(z[:2] - self.first) > _REACH).any():
@@ -274,4 +305,4 @@ class _Curve:
     def path(self, end, z, share, Y, folds) -> Path:
         """Return where the curve stands."""
         U, _, omega = self.waveform(z)
-        return Path(end, share, omega, U, Y, folds)
+        return Path(end, share, omega, U, Y, folds, self.motion)

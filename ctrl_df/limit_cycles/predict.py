@@ -15,7 +15,7 @@ from ..df.work import progress_bar
 from ..drawing import draw
 from .assess import Assessor
 from .branches import branch_crossings
-from .crossings import Scan, find_crossings
+from .crossings import Scan, find_crossings, merged, real_crossings
 from .grade import LimitCycle
 from .linear import LinearPart
 from .nyquist import nyquist_of
@@ -174,6 +174,11 @@ def describing_function_response(
     with progress_bar(None, progress, "refining crossings", "point") as bar:
         D = defect(method, linear, bar)
         scan = find_crossings(D, log_a, log_w, values, refine)
+        if refine and method.name in ("element", "law") and not method.needs_omega and log_a.size > 1:
+            N: Any = method.harmonics(np.exp(log_a), None, 1)[0][:, 0, 1]
+            if (np.abs(N.imag) <= 1e-12 * np.abs(N)).all():
+                more = real_crossings(D, log_a, log_w, N.real, lambda w: linear.clamped(w)[0])
+                scan = merged(scan, more)
         branched = branch_crossings(method, linear, family, (log_a, log_w), values, scan.crossings, refine)
     cycles = Assessor(method, linear, F, D, (log_a, log_w), scan, family, orders, branched).cycles()
     return DescribingFunctionResponse(

@@ -13,6 +13,8 @@ from .linear import LinearPart
 
 _AMPLITUDES = {"element": 480, "law": 160}  # at least: steps of a quantizer put two crossings within 4 %
 FAST = ("element", "law", "rate", "linear", "friction")
+_LEVELS = 200  # of a quantizer, whose corners enter the grid: beyond N differs from 1 by less than 1e-3
+_BEYOND = 4.0 ** np.arange(-10.0, -3.0)  # relative, from a corner on
 _AT_ONCE = 1 << 16  # points of a closed form between two chances to interrupt it
 _NOISE = 1e-6  # spread of an average from which N jumps from point to point
 
@@ -42,6 +44,8 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
     if method.name in FAST:
         coarse = family.amplitudes
         a = _refined(coarse, _AMPLITUDES.get(method.name, 60))
+        if method.name == "element":
+            a = _with_corners(a, method.subject.primitive)
         if method.needs_omega and a.size * w.size > 60_000:
             a = coarse
         N = _fundamental(method, a, w, family)
@@ -72,6 +76,22 @@ def _refined(grid, least):
     return np.unique(
         np.concatenate([np.geomspace(lo, hi, cuts + 1) for lo, hi in zip(grid[:-1], grid[1:], strict=True)])
     )
+
+
+def _with_corners(a, primitive):
+    """Add the amplitudes at which an element's N bends, and points closing in on them from above.
+
+    As a sine reaches a further jump N rises at once, with the square root of what it is beyond: between two
+    points of any grid it may fall and rise again. All other bends are milder.
+    """
+    corners = np.abs(np.asarray(getattr(primitive, "corners", ()), dtype=float))
+    step = getattr(primitive, "step", 0.0)
+    if step > 0:
+        most = min(int(a[-1] / step + 0.5), _LEVELS)
+        corners = np.concatenate([corners, (np.arange(most) + 0.5) * step])
+    corners = corners[(corners >= a[0]) & (corners < a[-1])]
+    beyond = corners[:, None] * (1.0 + _BEYOND)
+    return np.unique(np.concatenate([a, corners, beyond[beyond < a[-1]]]))
 
 
 def refined_omega(linear, w, change=0.15, most=3000):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from ..blocks.element import Element
 from ..simulate import driver
 from ..simulate.engine import Engine, State
 from ..simulate.layout import DELAY, H_OUT, KIND, X
+from ..status import Status
 from .kicks import Kicks
 
 _WORK = 300_000  # integration steps of one simulation
@@ -20,6 +22,10 @@ _DEAD = 1e-9  # of the largest state met, below which a loop without passages is
 _PEEKS = 129  # in a stride of about four swings, from which its peaks are read
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
+_EVEN = 0.05  # spread of logarithmic growths within which a growth counts as steady
+_STEPS = 3  # such growths in a row, at least; two do where each is tenfold
+_WITHIN = 0.1  # of the input up to which a block is a straight line: there the loop is linear
+_RECENT = 64  # laps among which they are looked for
 _BEYOND = 10.0  # times the largest kick's first swing: growth at a steady ratio from there has no bound
 _GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
 # Change of the swings from the third to the last quarter of a course below which they keep their size, and
@@ -115,7 +121,14 @@ class Swings:
         """Largest state in units of the loop."""
         return float(np.max(np.abs(x) / self.units, initial=0.0))
 
-    def follow(self, start, count: int, longest: float | None = None, until_repeated: bool = True) -> Course:
+    def follow(
+        self,
+        start,
+        count: int,
+        longest: float | None = None,
+        until_repeated: bool = True,
+        decided: Callable[[list[Lap]], str] | None = None,
+    ) -> Course:
         """Upward passages from a start on, until they repeat, the loop rests, or the bound on work is hit.
 
         Parameters
@@ -128,6 +141,8 @@ class Swings:
             Simulated time at most [s].
         until_repeated : bool
             End as soon as the passages repeat.
+        decided : callable, optional
+            Asked after every passage for the fate of the laps so far; empty: not yet known.
 
         Returns
         -------
@@ -140,12 +155,15 @@ class Swings:
         limit = np.inf if longest is None else longest
         bound = _GONE * max(1.0, largest)
         stride = self._by_samples if self.held else self._by_passage
-        fate = ""
+        fate, stopped = "", False
         while len(laps) < count and state.time < limit and quiet <= _QUIET and work <= _WORK:
             run, found = stride(state, laps, limit)
             state, work = run.state, work + run.steps
-            if not run.status.ok or not self.size(state.x) < bound:
+            if run.status is Status.DIVERGED or not self.size(state.x) < bound:
                 return Course(laps, DIVERGES, np.inf, state)
+            if not run.status.ok:
+                stopped = True  # by its bound on work, or a motion that no step resolves: no fate
+                break
             laps += found
             quiet = 0 if found else quiet + 1
             highest = max([highest, *(lap.peak for lap in found)])
@@ -159,13 +177,20 @@ class Swings:
                 break
             if found and laps[-1].peak > _BEYOND and _explodes(laps):
                 return Course(laps, DIVERGES, np.inf, state)
+            if found and (_creeps(laps) or self._fades(laps)):
+                fate = RESTS
+                break
+            if found and decided is not None:
+                fate = decided(laps)
+                if fate:
+                    break
             if until_repeated and len(laps) > 12 and self.repeats(laps):
                 fate = CYCLES if laps[-1].peak > _FAINT * max(lap.peak for lap in laps) else RESTS
                 break
         growth = _growth(laps)
         if not fate:
-            fate = RESTS if quiet > _QUIET else _tendency(laps)
-        if work > _WORK and len(laps) < _FEW:
+            fate = RESTS if quiet > _QUIET else UNDECIDED if stopped else _tendency(laps)
+        if (stopped or work > _WORK) and len(laps) < _FEW:
             laps = []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
         return Course(laps, fate, growth, state)
 
@@ -176,6 +201,13 @@ class Swings:
             if node[KIND] == DELAY:
                 state.x[node[X]] = 0.0
         return state
+
+    def _fades(self, laps) -> bool:
+        """Whether the swings shrink by a steady ratio where the block is a straight line: so they go on."""
+        recent = laps[-_RECENT:]
+        if not max(lap.peak for lap in recent[-_STEPS:]) * self._unit < _WITHIN * self.kicks.straight:
+            return False
+        return _endless([1 / max(lap.peak, 1e-300) for lap in recent], 1 / _FAINT) > 0
 
     def repeats(self, laps) -> bool:
         """Whether the last two passages met the same state; closer if no Newton follows."""
@@ -232,12 +264,44 @@ def _growth(laps, ago: int = 0) -> float:
     return float(np.mean(peaks[-quarter:]) / before) if before > 0 else float("nan")
 
 
-def _explodes(laps, count: int = 8) -> bool:
-    """Whether the last swings grew at a steady ratio."""
-    if len(laps) < count:
+def _endless(values, factor: float) -> int:
+    """How many of the last values grow so steadily that they will by `factor` at least; 0 if they do not.
+
+    Growths (logarithmic) that differ by no more than a share e over n of them may at worst be falling off
+    geometrically, by ``1 - e / (n - 1)`` each; what is then still to come sums to ``(n - 1) / e`` times the
+    last one. A growth towards a limit less than `factor` away is told from one without.
+    """
+    growths = np.diff(np.log(np.maximum(values, 1e-300)))[::-1]
+    high = np.maximum.accumulate(growths)
+    low = np.minimum.accumulate(growths)
+    count = np.arange(1, growths.size + 1)
+    enough = (
+        (low > (1 - _EVEN) * high)
+        & ((count >= _STEPS) | ((count > 1) & (low > np.log(10.0))))
+        & ((count - 1) * low > _EVEN * np.log(factor))
+    )
+    return int(count[enough][0]) + 1 if enough.any() else 0
+
+
+def _explodes(laps) -> bool:
+    """Whether the swings grow at a steady ratio and without bound."""
+    return _endless([lap.peak for lap in laps[-_RECENT:]], _GONE) > 0
+
+
+def _creeps(laps) -> bool:
+    """Whether every swing takes longer than the one before by a steady ratio, while none is larger.
+
+    So a motion ends whose speed falls by a ratio each time it crosses a gap: its position never settles, its
+    speed does.
+    """
+    recent = laps[-_RECENT:]
+    durations = np.diff([lap.time for lap in recent])
+    count = _endless(durations, 1 / _FAINT)
+    if not count:
         return False
-    ratios = np.diff(np.log([max(lap.peak, 1e-300) for lap in laps[-count:]]))
-    return bool(ratios.min() > 1e-3 and ratios.max() < 1.05 * ratios.min())
+    slowing = np.log(durations[-1] / durations[-count])
+    growth = np.log(max(recent[-1].peak, 1e-300) / max(recent[-count].peak, 1e-300))
+    return bool(growth < _EVEN * slowing)
 
 
 def _tendency(laps) -> str:

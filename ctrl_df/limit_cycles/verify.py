@@ -12,9 +12,10 @@ from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
 from .arguments import check_search
-from .fate import Fate, kept
+from .fate import Fate
 from .finder import SAME_CYCLE, OrbitFinder
 from .grade import LimitCycle
+from .known import KnownOrbits
 from .orbit import NoOrbit, Orbit
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
@@ -206,22 +207,23 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         finder = OrbitFinder(loop)
 
     orbits: list[Orbit] = []
-
+    known = KnownOrbits(finder.swings, orbits)
     led: dict[int, Orbit] = {}
     sought: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
     for cycle in cycles if finder.parts is not None else []:
         found = finder.from_guess(cycle)
-        orbit = kept(orbits, found)
+        orbit = known.kept(found)
         sought[id(cycle)] = finder.none()
         if found is not None and orbit is not None and not found.note:
             led[id(cycle)] = orbit
     fate = Fate()
     if search:
-        fate = finder.explorer.explore(search_time, edges=not finder.by_simulation)
+        beside = KnownOrbits(finder.swings, list(orbits))
+        fate = finder.explorer.explore(search_time, edges=not finder.by_simulation, known=beside)
         for orbit in fate.orbits:
             if orbit.status.ok or not orbits:
-                kept(orbits, orbit)
+                known.kept(orbit)
     partner = _pairs(cycles, orbits, led)
     if finder.engine.delayed:
         return Check(tuple(_by_simulation(cycles, orbits, partner)), [], DELAYED, loop, fate)
@@ -240,7 +242,7 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
 
 
 def _unpaired(cycle: LimitCycle, sought: NoOrbit | None) -> Row:
-    """Row of a prediction without an orbit: `no such orbit` only where that was e."""
+    """Row of a prediction without an orbit: `no such orbit` only where that was shown."""
     if cycle.branch:
         return Row(cycle, None, None, NOT_FOUND, _UNHELD)
     if sought is not None and sought.status is Status.NO_SUCH_ORBIT:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
@@ -18,6 +20,9 @@ RTOL = 1e-9
 class WaveformOrbit:
     """Forced periodic motions of one block, each started from the one before.
 
+    Under one force there may be several. Who follows one of them keeps `motion` and sets it again before
+    going on from another point; without one, several starts are tried.
+
     Parameters
     ----------
     block : ct.NonlinearIOSystem
@@ -25,11 +30,17 @@ class WaveformOrbit:
         Output described.
     max_steps : int
         Bound on the work of one motion, in integration steps.
+
+    Attributes
+    ----------
+    motion : State or None
+        The motion last answered with, at t = 0.
     """
 
     def __init__(self, block, output, max_steps=60_000):
         self.row = list(block.output_labels).index(output)
         self.max_steps = max_steps
+        self.motion = None
         self.core = block.core if isinstance(block, Mechanism) else None
         block, self.delay = _undelayed(block, self.row)
         self.engine = Engine(block)
@@ -42,28 +53,45 @@ class WaveformOrbit:
         # a free mass may be anywhere, and has no mean position of its own
         self.adrift = self.core is not None and bool(laws.shifts)
         self.transform, self.inverse, self.kept = laws.transform, laws.inverse, laws.free
-        self.previous = None
 
-    def respond(self, U, omega: float):
+    def __call__(self, U, omega: float):
         """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, or None."""
+        return next(self._answers(U, omega), None)
+
+    def nearest(self, U, omega: float, apart: Callable, near: float):
+        """Return of the answers from all starts the one least ``apart(Y)``; the first one `near`."""
+        self.motion, best, least = None, None, np.inf
+        motion = None
+        for Y in self._answers(U, omega):
+            if apart(Y) < least:
+                best, least, motion = Y, apart(Y), self.motion
+            if least < near:
+                break
+            self.motion = None
+        self.motion = motion
+        return best
+
+    def _answers(self, U, omega):
         U = np.asarray(U, dtype=complex)
         if not self.suited:
-            return None
+            return
         self.omega, self.period, self.left = omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([U], omega)
         for state in self._starts(float(abs(U[1]))):
             orbit = None if state is None else self._close(state)
-            if orbit is not None:
-                self.previous = orbit
-                return self._harmonics(orbit, U.size)
-        return None
+            Y = None if orbit is None else self._harmonics(orbit, U.size)
+            if Y is not None:
+                self.motion = orbit
+                yield Y
 
     def _starts(self, size):
-        """States to start from: the last motion; rest; for a gap, a knock against its faces."""
-        if self.previous is not None:
-            yield self.previous
-            self.previous = None
+        """States to start from: the last motion; if there is none, rest, or a knock against a gap's faces."""
         gap = 0.0 if self.core is None else self.core.gap
+        if self.motion is not None:
+            yield self.motion
+            if gap > 0:  # any other start may lead to another motion
+                yield self._follow(self.motion, 20)
+                return
         if self.core is None or gap == 0:
             for periods in (3, 30):
                 yield self._follow(self.engine.start(), periods)

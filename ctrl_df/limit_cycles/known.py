@@ -1,0 +1,104 @@
+"""The orbits already found of one loop, and whether a simulation is on its way to one of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .orbit import Orbit
+from .swings import CYCLES, Course, Lap, Swings
+
+_THERE = 1e-3  # of an orbit's size: a passage so near a stable one, and coming nearer, ends on it
+_BESIDE = 0.03  # the same for a passage that lingers beside an unstable one
+_ON = 1e-5  # difference of a lap's time from the period, relative, within which a passage is that near
+_PASSAGES = 3  # in a row that come nearer
+
+
+class KnownOrbits:
+    """Orbits of one loop, each once.
+
+    Parameters
+    ----------
+    swings : Swings
+        Whose passages are compared with those of the orbits: the upward crossings of the signal it watches.
+    orbits : list of Orbit
+        Known from the start; further ones are appended to it.
+    """
+
+    def __init__(self, swings: Swings, orbits: list[Orbit]):
+        self.swings, self.orbits = swings, orbits
+        # a passage tells nothing where the state is a history, or passages are looked for among samples
+        self._telling = not swings.tight and not getattr(swings.parts, "dt", 0)
+        self._passages: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def kept(self, orbit: Orbit | None) -> Orbit | None:
+        """Return the known orbit that this one is, or the orbit itself, now known."""
+        if orbit is None:
+            return None
+        for known in self.orbits:
+            if orbit.same_as(known, 1e-4 if orbit.status.ok else 2e-2):
+                return known
+        self.orbits.append(orbit)
+        return orbit
+
+    def approached(self, laps: list[Lap]) -> Orbit | None:
+        """Return the stable orbit that the last passages come nearer and nearer to, almost there; or None."""
+        if len(laps) <= _PASSAGES:
+            return None
+        for orbit in self.orbits:
+            if orbit.stable:
+                apart = [self._distance(orbit, lap) for lap in laps[-_PASSAGES:]]
+                if apart[-1] < _THERE and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
+                    return orbit
+        return None
+
+    def repeated(self, laps: list[Lap]) -> Orbit | None:
+        """Return the orbit that repeating passages are on; None if it is not known."""
+        if len(laps) < 2:
+            return None
+        for orbit in self.orbits:
+            if not orbit.status.ok:
+                continue
+            passages = len(self._of(orbit)[0])
+            if not passages or len(laps) <= passages:
+                continue
+            lap = laps[-1].time - laps[-1 - passages].time
+            if abs(lap / orbit.period - 1) < _ON and self._distance(orbit, laps[-1]) < _THERE:
+                return orbit
+        return None
+
+    def beside(self, lap: Lap) -> Orbit | None:
+        """Return the unstable orbit that a passage is beside; or None."""
+        for orbit in self.orbits:
+            if orbit.stable is False and self._distance(orbit, lap) < _BESIDE:
+                return orbit
+        return None
+
+    def ending(self, laps: list[Lap]) -> str:
+        """Return the fate of laps that end on a known orbit, empty for others; see `Swings.follow`."""
+        return CYCLES if self.approached(laps) is not None else ""
+
+    def reached(self, course: Course) -> Orbit | None:
+        """Return the known orbit that a course has ended on; None for any other."""
+        if course.fate != CYCLES:
+            return None
+        return self.approached(course.laps) or self.repeated(course.laps)
+
+    def _distance(self, orbit: Orbit, lap: Lap) -> float:
+        """Largest difference of a state from those of the orbit at its nearest passage, in its sizes."""
+        states, size = self._of(orbit)
+        if not len(states) or not self._telling:
+            return np.inf
+        return float(np.max(np.abs(states - lap.state) / size, axis=1).min())
+
+    def _of(self, orbit: Orbit):
+        """States of an orbit where the signal watched passes zero upwards, and the size of each state."""
+        found = self._passages.get(id(orbit))
+        if found is None:
+            states = np.asarray(orbit.states)
+            size = np.maximum(np.abs(states).max(axis=1), 1e-9 * self.swings.units)
+            y = np.asarray(orbit.outputs)[self.swings.row]
+            ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+            share = y[ups] / (y[ups] - y[ups + 1])
+            met = states[:, ups] + share * (states[:, ups + 1] - states[:, ups])
+            found = self._passages[id(orbit)] = (met.T, size)
+        return found
