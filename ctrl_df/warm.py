@@ -1,4 +1,4 @@
-"""Compiling ahead: everything that the package compiles on first use, side by side, kept for every process."""
+"""Compiling ahead: all that the package compiles on first use, side by side, kept for every process."""
 
 from __future__ import annotations
 
