@@ -39,6 +39,8 @@ class BatchResponse:
         How each run ended.
     end_times : (runs,) array
         Time at which each run ended [s]; the last of `time` where nothing failed.
+    propagated : (runs,) int array
+        As `EventResponse.propagated`.
     event_counts : (runs,) int array
         Number of events of each run, those not kept included.
     events : tuple of list of Event, or None
@@ -57,6 +59,7 @@ class BatchResponse:
     status: tuple[Status, ...]
     end_times: np.ndarray
     event_counts: np.ndarray
+    propagated: np.ndarray
     events: tuple[list[Event], ...] | None
     errors: dict[int, Exception]
     input_labels: tuple[str, ...]
@@ -95,6 +98,7 @@ class BatchResponse:
         response.events = [] if self.events is None else self.events[run]
         response.event_count = int(self.event_counts[run])
         response.status = self.status[run]
+        response.propagated = int(self.propagated[run])
         return response
 
     def __repr__(self) -> str:
@@ -211,7 +215,7 @@ def batch_response(
         times, np.broadcast_to(samples, (runs, samples.shape[1], len(times))),
         result.outputs.reshape(runs, len(times), -1).swapaxes(1, 2),
         None if result.states is None else result.states.reshape(runs, len(times), -1).swapaxes(1, 2),
-        tuple(result.status), result.time, result.event_count, _events(result, groups), result.errors,
+        tuple(result.status), result.time, result.event_count, result.propagated, _events(result, groups), result.errors,
         tuple(system.input_labels), tuple(system.output_labels), tuple(system.state_labels), str(system.name),
         result.recorded,
     )  # fmt: skip

@@ -29,6 +29,7 @@ sliding, step below the resolution of time, more steps within a delay than its h
 
 PATIENCE = 40  # steps before a lower order that failed is tried again
 DENSE = 1e-3  # error of a step, times its tolerance, below which a lower order is tried
+SAME = 1e-15  # relative difference of two instants that only rounding parts
 GRAINS = 200  # steps after which rounding is asked anew
 REACH = 1e-4  # of a step: the time over which rates of inputs are taken
 SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
@@ -124,7 +125,7 @@ def advance(
     """Run from clock[0] to t_end; see `ctrl_df.simulate.engine.Engine.run` for the arguments.
 
     ``clock``: [time, next output index, last step size, steps used, events so far, events in this log,
-    segment, on section, margin of the last event].
+    segment, on section, margin of the last event, steps by constant propagators].
     ``before``: state just before the event that stopped the run. ``scale`` (4, ng): see `renewed`.
     ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
@@ -176,7 +177,7 @@ def advance(
     renewed(prog, mode, scale, -1)
     next_tick = next_sample(prog, t)
     while reason == DONE:
-        while index < tout.shape[0] and tout[index] <= t:
+        while index < tout.shape[0] and tout[index] <= t + SAME * abs(t):
             if jumped:
                 settle(prog, drive, segment, t, x, mode, work, dx)
             for j in range(n):
@@ -215,6 +216,7 @@ def advance(
                     xout, yout, size, scale, rtol, next_tick, x1, xi, dx, g,
                 )  # fmt: skip
                 if gone > 0:
+                    clock[9] += gone
                     h = max(h, t - begun)
                     known, jumped = False, ticked or held
                     continue
@@ -384,7 +386,7 @@ def advance(
                 blocked = -1
             reached = t + theta * length if theta < 1.0 else (limit if truncated else t + length)
             # --- outputs inside the step
-            while index < tout.shape[0] and tout[index] < reached:
+            while index < tout.shape[0] and tout[index] < reached - SAME * abs(reached):
                 record_inside(
                     prog, drive, segment, t, (tout[index] - t) / length, length, x, mode, work, terms, poly,
                     xout[index], yout[index],

@@ -78,6 +78,7 @@ class Run:
     states: np.ndarray  # (nt, nx)
     recorded: int
     steps: int
+    propagated: int  # steps taken by constant propagators, see `ctrl_df.simulate.glide`
     event_count: int
     events: tuple[np.ndarray, np.ndarray, np.ndarray]  # time, node, kind
     before: np.ndarray  # state just before the event that stopped the run
@@ -236,7 +237,7 @@ class Engine:
         ng, address = int(self.program.ints[layout.H_NG]) + 1, driver.address()
         scale = now.scale if now.scale is not None else np.zeros((4, ng))
         xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
-        clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1])
+        clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
         log_t, log_n, log_k = (
             np.zeros(max(log, 1)),
             np.zeros(max(log, 1), np.int64),
@@ -306,6 +307,7 @@ class Engine:
             xout,
             int(clock[1]),
             int(clock[3]),
+            int(clock[9]),
             int(clock[4]),
             events,
             before,

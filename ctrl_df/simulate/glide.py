@@ -22,7 +22,8 @@ import numpy as np
 from . import layout as L
 from .affine import LENGTHS, Memory, recall
 from .compiled import part
-from .outputs import next_sample, tick
+from .modes import settle
+from .outputs import next_sample, record, tick
 
 EPS = np.finfo(float).eps
 ORDER = 16  # terms of an exponential's series
@@ -162,25 +163,30 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 scale[0, owner] = max(scale[0, owner], value)
         if not clear:
             break
-        if index < tout.shape[0] and tout[index] <= t1 + near:
-            for j in range(n):
-                xout[index, j] = ahead[j]
-            for i in range(ny):
-                yout[index, i] = _row(first, column, values, n + margins + i, ahead)
-            index += 1
         for j in range(n):
             x[j] = here[j] = ahead[j]
             size[j] = max(abs(ahead[j]), 0.98 * size[j])
         done += 1
         t = t1
         ticked = next_tick <= t1 + near
+        due = index < tout.shape[0] and tout[index] <= t1 + near
         if ticked:
             tick(prog, drive, segment, t, x, mode, work, dx)
             next_tick = next_sample(prog, t)
+            if due:
+                settle(prog, drive, segment, t, x, mode, work, dx)
+                record(prog, drive, segment, t, x, mode, work, yout[index])
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
             stale = True
             for j in range(n):
                 here[j] = x[j]
+        elif due:
+            for i in range(ny):
+                yout[index, i] = _row(first, column, values, n + margins + i, ahead)
+        if due:
+            for j in range(n):
+                xout[index, j] = x[j]
+            index += 1
     return done, t, segment, index, next_tick, ticked
 
 
@@ -220,18 +226,14 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
     """Learn a new length of step in place of the older one, if steps go on like it; -1 if not."""
     ahead, s, i = t1, segment, index
     regular = False
-    last = t
-    for step in range(2):
+    for _ in range(2):  # every step, or every other one
         while s + 1 < time.shape[0] and time[s + 1] <= ahead:
             s += 1
         while i < tout.shape[0] and tout[i] <= ahead:
             i += 1
         beyond = _following(ahead, time, s, tout, i, next_tick if next_tick > ahead else math.inf)
-        if step == 0 and abs((beyond - ahead) - (t1 - t)) <= ALIKE * (t1 - t):
-            regular = True
-        if step == 1 and abs((beyond - last) - (t1 - t)) <= ALIKE * (t1 - t):
-            regular = True
-        last, ahead = ahead, beyond
+        regular = regular or abs((beyond - ahead) - (t1 - t)) <= ALIKE * (t1 - t)
+        ahead = beyond
     if not regular:
         return -1
     length = t1 - t

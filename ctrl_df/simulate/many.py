@@ -53,7 +53,7 @@ class Rows(NamedTuple):
     x: np.ndarray  # (n, nx) states, moved on
     mode: np.ndarray  # moved on
     modes: np.ndarray  # (n + 1,)
-    clock: np.ndarray  # (n, 9) as `driver.run` has it
+    clock: np.ndarray  # (n, 10) as `driver.run` has it
     end: np.ndarray  # (n,) [s]
     max_steps: np.ndarray  # (n,)
     drive: np.ndarray  # (n,) which of the drives

@@ -28,11 +28,15 @@ class EventResponse(ct.TimeResponseData):
     status : Status
         How the simulation ended; anything but CONVERGED means that `time` ends early, at the last state that
         is right.
+    propagated : int
+        Steps between samples and outputs that were taken at once, by the constant propagator of a mode, where
+        no event could lie inside; 0 for systems with laws that are not affine between events.
     """
 
     events: list[Event]
     event_count: int
     status: Status
+    propagated: int = 0
 
 
 def event_response(
@@ -144,6 +148,7 @@ def event_response(
     response.events = engine.name_events(run.events) if keep_events else []
     response.event_count = run.event_count
     response.status = run.status
+    response.propagated = run.propagated
     return response
 
 

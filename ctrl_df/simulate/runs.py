@@ -51,6 +51,7 @@ class Runs:
     x: np.ndarray  # state there (runs, nx)
     steps: np.ndarray
     event_count: np.ndarray
+    propagated: np.ndarray
     events: tuple[np.ndarray, ...] | None = None  # run, time, node, kind, in the order of runs, if kept
     errors: dict[int, Exception] = field(default_factory=dict)  # what functions called back raised, by run
 
@@ -136,6 +137,7 @@ def run_many(
     return Runs(
         rows.outputs, kept if states else None, rows.at, rows.count, rows.clock[:, 1].astype(int), status,
         rows.clock[:, 0].copy(), rows.x, rows.clock[:, 3].astype(int), rows.events,
+        rows.clock[:, 9].astype(int),
         work.events() if events else None, work.failed,
     )  # fmt: skip
 
@@ -161,7 +163,7 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, e
     first = each(first, np.int64)
     count = len(times) - first if count is None else each(count, np.int64)
     at = np.concatenate(([0], np.cumsum(count)))
-    clock = np.zeros((runs, 9))
+    clock = np.zeros((runs, 10))
     clock[:, 0], clock[:, 8] = each(begin), -1
     par, initial = np.zeros(runs, np.int64), [engine._initial] * runs
     for group in groups:

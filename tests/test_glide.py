@@ -1,0 +1,140 @@
+"""Constant propagators between samples: the same answers as the general steps, no event missed."""
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.simulate import driver
+
+STEP = 2e-3
+SHORT = 0.9e-3  # a longest step that leaves no propagator to use
+
+
+def rigs(rng):
+    """Mechanisms and loops that are affine between events, sizes drawn."""
+
+    def size(low, high):
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    mass = cdf.Mass(size(0.5, 5))
+    dry = mass.with_effect(cdf.Coulomb(size(1, 4)))
+    damped = dry.with_effect(cdf.Viscous(size(0.1, 2)))
+    gap = cdf.backlash_masses(size(0.5, 2), size(0.5, 2), size(2e-3, 2e-2), size(0.2, 0.8))
+    gains = cdf.pid(size(300, 900), size(200, 2000), size(10, 40), tf=4e-3)
+    return {
+        "coulomb": dry,
+        "viscous": damped,
+        "static level": damped.with_effect(cdf.Stiction(size(5, 7))),
+        "spring": damped.with_effect(cdf.LinearSpring(size(50, 500))),
+        "unequal": mass.with_effect(cdf.AsymmetricCoulomb(0.7)).with_effect(cdf.Coulomb(2.0)),
+        "stop": damped.with_effect(cdf.LinearSpring(30.0)).with_effect(cdf.HardStop(size(0.02, 0.2), 0.4)),
+        "gap": gap,
+        "joint": damped.with_effect(cdf.Compliance(size(2e3, 2e4), size(1, 10))),
+        "lag": damped.with_effect(cdf.InputLag(size(5e-3, 5e-2))),
+        "saturation": damped.with_effect(cdf.InputSaturation(size(4, 9))),
+        "dead zone": damped.with_effect(cdf.InputDeadZone(size(0.5, 3))),
+        "drift": damped.with_effect(cdf.Drift(0.1)),
+        "loop": cdf.closed_loop(gains, damped),
+        "loop with gap": cdf.closed_loop(gains, gap),
+        "sampled": cdf.closed_loop(gains, damped, dt=4e-3),
+        "sampled off the grid": cdf.closed_loop(gains, damped, dt=7e-3),
+    }
+
+
+def record(rng, name, times):
+    """Two sines, for a loop the reference."""
+    scale = 0.01 if "loop" in name or "sampled" in name else 15.0
+    low, high = rng.uniform(2, 6), rng.uniform(9, 30)
+    return scale * (np.sin(low * times) + 0.6 * np.sin(high * times + 1))
+
+
+@pytest.mark.parametrize("hold", ["zoh", "linear"])
+@pytest.mark.parametrize("name", list(rigs(np.random.default_rng(0))))
+def test_the_same_as_the_general_steps(name, hold):
+    for seed in range(3):
+        rng = np.random.default_rng([seed, 5])
+        system = rigs(rng)[name]
+        t = np.arange(1500) * STEP
+        u = record(rng, name, t)
+        fast = cdf.event_response(system, t, u, input_hold=hold)
+        slow = cdf.event_response(system, t, u, input_hold=hold, max_step=SHORT)
+        assert fast.propagated > 200 and slow.propagated == 0
+        assert [(e.subsystem, e.kind) for e in fast.events] == [(e.subsystem, e.kind) for e in slow.events]
+        np.testing.assert_allclose(
+            [e.time for e in fast.events], [e.time for e in slow.events], rtol=0, atol=1e-8 * t[-1]
+        )
+        size = np.max(np.abs(slow.outputs), axis=-1, keepdims=True)
+        error = np.max(np.abs(fast.outputs - slow.outputs) / size)
+        assert error < 2e-7, error
+
+
+@pytest.mark.parametrize(("late", "every"), [(0.3e-3, 1), (0.0, 4), (0.0, 0.25), (0.7e-3, 1)])
+def test_outputs_off_the_samples(late, every):
+    """Outputs between the samples, some of them, or several a sample."""
+    from ctrl_df.simulate.engine import Engine, sampled_drive
+
+    block = cdf.friction_mass(2, 3, 0.4)
+    t = np.arange(1500) * STEP
+    u = record(np.random.default_rng(3), "", t)
+    times = np.arange(late, t[-1], every * STEP)
+    engine = Engine(block)
+    drive = sampled_drive(t, u, "linear")
+    fast = engine.run(engine.start(), times[-1], drive, times)
+    slow = engine.run(engine.start(), times[-1], drive, times, max_step=0.2 * STEP, rtol=1e-10)
+    assert fast.propagated > len(times) // 2
+    np.testing.assert_allclose(fast.outputs, slow.outputs, atol=1e-8 * np.max(np.abs(slow.outputs)))
+    np.testing.assert_allclose(fast.states, slow.states, atol=1e-8 * np.max(np.abs(slow.states)))
+
+
+def test_a_touch_inside_a_sample_is_met():
+    """A mass swings against a stop for a small part of one sample; the samples themselves see nothing."""
+    omega = 10.0
+    swing = cdf.Mass(1.0).with_effect(cdf.LinearSpring(omega**2))
+    hits = []
+    for phase in np.linspace(0, 1, 41):
+        # highest point 1e-4 beyond the stop, somewhere between two samples
+        step = 0.11
+        t = np.arange(6) * step
+        begin = -(2 + phase) * step * omega
+        block = swing.with_effect(cdf.HardStop(np.cos(0.02), 0.0, lower=-2.0))
+        response = cdf.event_response(block, t, 0.0, [np.cos(begin), -omega * np.sin(begin)])
+        hits.append(response.event_count > 0)
+        assert np.max(response.outputs[0]) <= np.cos(0.02) + 1e-12
+    assert all(hits)
+
+
+def test_units_do_not_matter():
+    """Lengths and forces in other units by 1e9: the same steps, the same answers."""
+    t = np.arange(1500) * STEP
+    u = record(np.random.default_rng(4), "", t)
+    found = []
+    for unit in (1e-9, 1.0, 1e9):
+        block = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0 * unit)).with_effect(cdf.LinearSpring(80.0))
+        found.append(cdf.event_response(block, t, unit * u))
+    for one in found[::2]:
+        assert one.propagated == found[1].propagated and one.event_count == found[1].event_count
+    for one, unit in ((found[0], 1e-9), (found[2], 1e9)):
+        np.testing.assert_allclose(
+            one.outputs / unit, found[1].outputs, atol=1e-11 * np.max(np.abs(found[1].outputs))
+        )
+
+
+def test_more_modes_than_are_kept():
+    """A staircase has more modes than propagators are kept for: those that come back are made anew."""
+    corners = np.arange(1, 15) * 1.0
+    points = [(-1.0, -1.0), *[(c, c + 0.3 * (-1) ** i) for i, c in enumerate(corners)]]
+    law = cdf.piecewise_linear([p[0] for p in points], [p[1] for p in points])
+    from control import tf
+
+    loop = cdf.closed_loop(tf([1], [1, 1]), law)
+    t = np.arange(4000) * STEP
+    u = 16 * np.sin(0.9 * t) + 10
+    fast = cdf.event_response(loop, t, u)
+    slow = cdf.event_response(loop, t, u, max_step=SHORT)
+    assert fast.event_count == slow.event_count > 20
+    np.testing.assert_allclose(fast.outputs, slow.outputs, atol=1e-8)
+
+
+def test_the_engine_is_compiled_once():
+    assert driver.address() == driver.address()
+    assert len(driver.advance.overloads) == 1
