@@ -215,7 +215,8 @@ def batch_response(
         times, np.broadcast_to(samples, (runs, samples.shape[1], len(times))),
         result.outputs.reshape(runs, len(times), -1).swapaxes(1, 2),
         None if result.states is None else result.states.reshape(runs, len(times), -1).swapaxes(1, 2),
-        tuple(result.status), result.time, result.event_count, result.propagated, _events(result, groups), result.errors,
+        tuple(result.status), result.time, result.event_count,
+        result.propagated, _events(result, groups), result.errors,
         tuple(system.input_labels), tuple(system.output_labels), tuple(system.state_labels), str(system.name),
         result.recorded,
     )  # fmt: skip
