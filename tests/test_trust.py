@@ -12,6 +12,7 @@ from ctrl_df.limit_cycles.closing import Closing
 from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.limit_cycles.orbit import NoOrbit
 from ctrl_df.limit_cycles.path import End
+from ctrl_df.limit_cycles.pieces import by_pieces
 from ctrl_df.limit_cycles.swings import Lap
 from ctrl_df.status import Status
 
@@ -399,3 +400,35 @@ def test_swings_of_a_law_fade_where_it_is_straight():
     course = swing.follow(swing.kicks.state(0.03 * swing.kicks.scale), 1000)
     assert course.fate == "rests" and len(course.laps) < 40
     assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).swings.kicks.straight == 0
+
+
+def test_no_passage_is_lost_between_two_strides_of_samples():
+    """Strides of 1024 samples: a loop of 137 samples a swing, followed over many swings."""
+    H = ct.sample_system(ct.tf([30.0], [1, 3, 3, 1]), 2 * np.pi / np.sqrt(3) / 137, "zoh")
+    response = cdf.describing_function_response(
+        H, cdf.saturation(1.0), np.geomspace(1.01, 40, 12), np.geomspace(0.3, 10, 20)
+    )
+    check = cdf.verify(response)
+    assert [row.verdict for row in check] == ["confirmed"]
+    swings_of = OrbitFinder(check.loop).swings
+    laps = swings_of.follow(check.orbits[0].states[:, 0], 500, until_repeated=False).laps
+    spans = np.diff([lap.time for lap in laps])[10:]
+    assert len(spans) > 400 and spans.max() < 1.5 * np.median(spans)
+
+
+def test_an_orbit_that_visits_a_level_briefly_is_closed_by_its_pieces():
+    """Newton on the state from the same waveform meets the neighbour that does not visit it."""
+    step = 0.2146
+    N = float(np.real(complex(cdf.describing_function(cdf.quantizer(step), 1.51 * step))))
+    H = ct.tf([8 / N], [1, 3, 3, 1])
+    response = cdf.describing_function_response(
+        H, cdf.quantizer(step), np.geomspace(1.2 * step, 2 * step, 20), np.geomspace(0.1, 20, 30)
+    )
+    cycle = max(response.limit_cycles, key=lambda c: c.amplitude)
+    loop = cdf.closed_loop(H, cdf.quantizer(step))
+    assert cycle.path is not None
+    found = by_pieces(loop, cycle.path)
+    assert found is not None and 2 * np.pi / found[1] == pytest.approx(cycle.path.omega, rel=1e-4)
+    orbit = OrbitFinder(loop).closing.close(*found, stay=True)
+    assert orbit.period == pytest.approx(found[1], rel=1e-8) and orbit.stable is False
+    assert by_pieces(cdf.closed_loop(*NEAR_FOLD), cycle.path) is None

@@ -51,9 +51,12 @@ class Closing:
         self.tracer = Tracer(engine)
         self.parts: Any = getattr(loop, "parts", None)
 
-    def close(self, x0, period: float) -> Orbit:
-        """Newton from a state near the orbit and an estimate of the period; NoClosure if it fails."""
-        start, size = self.free_state(np.array(x0, float), period)
+    def close(self, x0, period: float, stay: bool = False) -> Orbit:
+        """Newton from a state near the orbit and an estimate of the period; NoClosure if it fails.
+
+        With `stay` from that very state: it is so near that moving along the orbit would spoil it.
+        """
+        start, size = self.free_state(np.array(x0, float), period, stay)
         status, best, grown, first = Status.NOT_CONVERGED, np.inf, 0, period
         lap = beside = None
         for _ in range(self.max_iterations):
@@ -124,7 +127,7 @@ class Closing:
                     return short, period / part
         return lap, period
 
-    def free_state(self, x0, period) -> tuple[Any, Any]:
+    def free_state(self, x0, period, stay=False) -> tuple[Any, Any]:
         """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
         state = self.engine.start(x0)
         lap = self.tracer.lap(state, period, differentiate=False)
@@ -134,6 +137,9 @@ class Closing:
         run = self.engine.run(self.engine.start(x0), period, times=times, rtol=1e-8, log=1)
         largest = np.max(np.abs([s.start.x for s in lap.segments] + [lap.end.x]), axis=0)
         largest = np.maximum(largest, np.nanmax(np.abs(run.states), axis=0))
+        if stay:
+            begin = lap.segments[0].start
+            return begin, self.tracer.sizes(begin, period, largest)
         constraints = [self._constraints(s.start.mode) for s in lap.segments]
         least = min(constraints)
         length, k = max((s.length, i) for i, s in enumerate(lap.segments) if constraints[i] == least)

@@ -22,12 +22,14 @@ from .forced_start import harmonic_start, path_starts
 from .linear import LinearPart
 from .orbit import NoOrbit, Orbit, Try
 from .path import End, Path, corrected_near, follow_path
+from .pieces import by_pieces
 from .shrinking import Merged, trace
 from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
 
 # A prediction and an orbit within these factors of frequency and amplitude are taken for one cycle.
 SAME_CYCLE = (1.25, 2.0)
 _SAME_AS_PATH = (1.1, 1.3)  # the same for the end of a path, which lacks the highest harmonics only
+_AT_ITS_END = 1e-3  # distance of an orbit from the end of its path that harmonics left out may explain
 _PIECES = 8  # of multiple shooting
 _NEAR_MISS = 0.3  # mismatch of a lap, relative to the orbit, from which it is worth following
 _ENOUGH = 6  # swings from which an orbit can be judged
@@ -240,11 +242,21 @@ class OrbitFinder:
         if orbit is None:
             along = np.array(path_starts(self.loop, path, _PIECES))
             orbit = self._closed(along, period, "states all along it", self.closing.close_along)
+        if orbit is None or _distance(orbit, *path.solution) > _AT_ITS_END:
+            at = by_pieces(self.loop, path)
+            exact = None if at is None else self._closed(*at, "the pieces it runs through", self._close_here)
+            if exact is not None and (
+                orbit is None or _distance(exact, *path.solution) < _distance(orbit, *path.solution)
+            ):
+                orbit = exact
         if orbit is None and self.missed < _NEAR_MISS:
             orbit = self._closed(
                 start, period, "the mismatch after a lap, let shrink", lambda *at: trace(self.closing, *at)
             )
         return orbit
+
+    def _close_here(self, x0, period):
+        return self.closing.close(x0, period, stay=True)
 
     def _belongs(self, orbit, path) -> bool:
         """Whether the orbit closed from the end of a path is the path's own."""

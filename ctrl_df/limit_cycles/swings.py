@@ -236,7 +236,9 @@ class Swings:
     def _by_samples(self, state, laps, limit):
         """Passages between the samples of a held signal, looked at between the ticks."""
         dt = self.parts.dt
-        times = (round(state.time / dt) + 0.5 + np.arange(_SAMPLES)) * dt
+        # from the sample before on, where the last stride ended: no passage is lost between two strides
+        first = np.ceil(state.time / dt - 0.5 - 1e-6)
+        times = np.maximum((first + 0.5 + np.arange(_SAMPLES)) * dt, state.time)
         times = times[times <= max(limit, times[1])]
         run = self.engine.run(state, times[-1], times=times, rtol=1e-8, log=1, max_steps=400_000)
         y = run.outputs[:, self.row]
