@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import ctrl_df as cdf
 from ctrl_df.status import Status
@@ -188,6 +189,32 @@ def test_play_holds_and_follows():
         center = min(max(center, u - 0.25), u + 0.25)
         expected.append(center)
     np.testing.assert_allclose(np.ravel(response.outputs), np.interp(t, fine, expected), atol=1e-6)
+
+
+@pytest.mark.parametrize("force, time", [(1.0, 1.0), (1e-6, 10.0), (1e3, 1e-4)])
+@pytest.mark.parametrize("start", [(0.0, 6.9), (-1.2, 3.4), (2.5, -0.3)])
+def test_a_play_lets_go_at_every_peak(force, time, start):
+    """Against exact steps of the linear part with the law of the play between them, in several units."""
+    gain, pole, gap = 0.6224, 0.4192, 0.42841
+    H = ct.tf([gain / time**2], [1, pole / time, 0])
+    loop = cdf.closed_loop(H, cdf.play(gap * force))
+    a, b, c = (np.asarray(m) for m in (loop.syslist[0].A, loop.syslist[0].B, loop.syslist[0].C))
+    # the same motion whatever the realization: u and its rate are given
+    u, rate = start[1] * gain, start[0] * gain
+    x0 = np.linalg.solve(np.vstack([c, c @ a]), [u * force, rate * force / time])
+    end, count = 60.0 * time, 60_000
+    run = cdf.event_response(loop, np.linspace(0, end, 61), 0, np.append(x0, 0.0))
+    h = end / count
+    big = expm(np.block([[a, -b], [np.zeros((1, 3))]]) * h)
+    x, y, play, seen = x0, 0.0, cdf.play(gap * force), []
+    for k in range(count + 1):
+        if k % 1000 == 0:
+            seen.append(float((c @ x)[0]))
+        y, _ = play.step(float((c @ x)[0]), y)
+        x = big[:2, :2] @ x + big[:2, 2] * y
+    assert np.abs(np.asarray(run.outputs)[-1] - seen).max() < 5e-3 * np.abs(seen).max()
+    kinds = [event.kind for event in run.events]
+    assert all(one != other for one, other in zip(kinds[:-1], kinds[1:], strict=True))
 
 
 def test_sampled_controller_is_a_difference_equation():

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .compiled import part
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
@@ -44,6 +46,8 @@ from .layout import (
     X,
 )
 from .mechanics import closed
+
+ROUNDING = 4.0 * np.finfo(float).eps
 
 
 @part
@@ -185,6 +189,9 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         return E_SWITCH
     if kind == PLAY:
         if mode[mo] != 0:
+            # free from here on: rounding must not find the output at that side of the gap still
+            refresh(prog, drive, segment, t, x, mode, w)
+            x[xo] += mode[mo] * ROUNDING * (abs(node_input(prog, node, 0, w)) + abs(x[xo]))
             mode[mo] = 0
             return E_DISENGAGE
         mode[mo] = 1 if slot == 1 else -1
