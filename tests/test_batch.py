@@ -354,7 +354,7 @@ def test_run_many_has_a_time_span_a_start_and_outputs_for_each_run():
     first, last = np.array(windows).T
     x0 = np.random.default_rng(0).normal(size=(4, 2)) * [1e-3, 0.1]
     drives = sampled_drives(T, np.stack([U, 2 * U])[:, None], "zoh")
-    which, steps = np.array([0, 1, 0, 1]), np.array([10**6, 10**6, 10**6, 20])
+    which, steps = np.array([0, 1, 0, 1]), np.array([10**6, 10**6, 10**6, 1])
     group = Group(engine, engine.par, np.arange(4), np.zeros(4, int))
     runs = run_many(
         [group], x0, T[first], T[last - 1], T, drives, drive=which, first=first, count=last - first, order=5,

@@ -41,7 +41,7 @@ def test_initial_states_and_their_corrections_are_one_map(name):
         given = {k: 0.3 * rng.normal() for k in initial_states.names(core)}
         given |= {"slack": rng.uniform(), "bristle": 0.0}
         states = np.zeros(6)
-        initial_states.fill(states, core, given, usual, 0.5)
+        initial_states.fill(states[None], core, given, usual, 0.5)
         back = initial_states.corrections(states, core, usual, 0.5)
         for k in initial_states.names(core):
             assert back[k] == pytest.approx(given[k], abs=1e-9)

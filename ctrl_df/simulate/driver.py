@@ -313,12 +313,14 @@ def advance(
                     atol,
                     locate,
                 )
-                if not error <= 1.0 and rank < order:
+                # many short steps may not err more than the one long step they stand for
+                share = min(length / h, 1.0) if rank < order else 1.0
+                if not error <= share and rank < order:
                     level = 8 if rank == 5 else min(order, 5)
                     patience = PATIENCE
                     continue
                 patience = max(patience - 1, 0)
-                if truncated and rank == level and patience == 0 and error < DENSE:
+                if truncated and rank == level and patience == 0 and error < DENSE * length / h:
                     level = 5 if level == 8 else 3
                 if not error < math.inf:
                     h = 0.2 * length

@@ -79,9 +79,7 @@ def primitive_node(primitive, x0) -> Node:
         aux = [len(p.low) + 1] + [v for pair in zip(p.below, p.above, strict=True) for v in pair]
         return Node(L.PWA, 1, 1, x0, 0, par, 1, 2, aux, feed=1, start=[p.start], affine=True)
     if isinstance(primitive, Quantizer):
-        return Node(
-            L.QUANTIZER, 1, 1, x0, 0, [primitive.step], 1, 2, feed=1, start=[0], affine=True
-        )
+        return Node(L.QUANTIZER, 1, 1, x0, 0, [primitive.step], 1, 2, feed=1, start=[0], affine=True)
     if isinstance(primitive, Smooth):
         return Node(
             L.SMOOTH, 1, 1, x0, 0, primitive.p, feed=1, laws=[(address(primitive.law, "smooth"), 0, 0, 0)]
