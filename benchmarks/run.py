@@ -12,11 +12,14 @@ for _name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import platform  # noqa: E402
+import shutil  # noqa: E402
 import statistics  # noqa: E402
 import subprocess  # noqa: E402
 import sys  # noqa: E402
+import tempfile  # noqa: E402
 import time  # noqa: E402
 import tracemalloc  # noqa: E402
+from pathlib import Path  # noqa: E402
 
 import control as ct  # noqa: E402
 import numpy as np  # noqa: E402
@@ -274,6 +277,43 @@ def records() -> None:
     row("10,000 samples with five effects", f"{1e3 * worst:.1f} ms", "10 ms", worst <= 0.010)
 
 
+def against_c() -> None:
+    """Time records of 10,000 samples over a friction mass in C, compiled here if there is a compiler."""
+    t = 1e-3 * np.arange(10_000)
+    u = 20 * np.sin(8.168 * t) + 8 * np.sin(23.25 * t + 1)
+    dry = cdf.Mass(2.0, [cdf.Coulomb(5.0), cdf.Viscous(0.5)])
+    models = [
+        ("friction mass", cdf.friction_mass(2, 5, 0.5), 4),
+        ("two masses with a gap", cdf.backlash_masses(1, 1, 0.01, 0.5), 8),
+        ("Stribeck", dry.with_effect(cdf.Stribeck(7.0, 0.05)), 25),
+        ("five effects", cdf.Mass(2.0, [cdf.Coulomb(5.0), cdf.Viscous(0.5), cdf.CubicSpring(100.0),
+                                        cdf.LinearSpring(10.0), cdf.QuadraticDrag(0.3)]), 25),
+        ("bristle", dry.with_effect(cdf.Bristle(1e5, 300.0)), 40),
+    ]  # fmt: skip
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        row("records of 10,000 samples over C", "no C compiler here", "4 x to 40 x", False)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        program = str(Path(folder) / "friction")
+        source = Path(__file__).with_name("friction.c")
+        subprocess.run([compiler, "-O2", str(source), "-o", program, "-lm"], check=True)
+        for name, block, limit in models:
+            ratios = []
+            cdf.event_response(block, t, u, input_hold="zoh")
+            for _ in range(5):  # beside each other, as the machine is now
+                done = subprocess.run([program], capture_output=True, text=True, check=True)
+                times = []
+                for _ in range(20):
+                    begin = time.process_time()
+                    cdf.event_response(block, t, u, input_hold="zoh")
+                    times.append(time.process_time() - begin)
+                ratios.append(min(times) / float(done.stdout.split()[0]))
+            ratio = statistics.median(ratios)
+            what = f"record of 10,000 samples, {name}, over a friction mass in C"
+            row(what, f"{ratio:.1f} x", f"{limit} x", ratio <= limit)
+
+
 def batches() -> None:
     """Time 1,000 runs in one call over one run by `event_response`; starts, parameters, inputs differ."""
     rng, runs, t = np.random.default_rng(2), 1_000, 1e-3 * np.arange(2_500)
@@ -345,6 +385,7 @@ def main() -> int:
         family_times,
         simulation,
         records,
+        against_c,
         batches,
         imports,
     ]

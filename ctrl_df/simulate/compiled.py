@@ -118,6 +118,11 @@ class KeptCode(FunctionCache):
         """The folder that is tried first."""
         return str(self._places[0][0])
 
+    @property
+    def known(self) -> bool:
+        """Whether machine code is kept that is as new as the sources."""
+        return any(files._load_index() for _, files in self._places)
+
     def flush(self):
         """Forget the code wherever it can be forgotten."""
         for _, files in self._places:
