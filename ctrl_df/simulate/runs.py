@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numba.core import config
 
 from ..status import Status
 from . import driver, many, pointers
@@ -149,10 +150,9 @@ def _pool(process: int, threads: int) -> ThreadPoolExecutor:
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0)) or 1
-    return os.cpu_count() or 1
+    """Return how many processors this process may use; ``NUMBA_NUM_THREADS`` bounds it."""
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(min(available or 1, getattr(config, "NUMBA_NUM_THREADS", 1)), 1)
 
 
 def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine):
