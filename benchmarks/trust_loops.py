@@ -137,7 +137,9 @@ def _element(rng, family, name, parts, factor, reach, pace, build, sampled=None)
         block = build(u)
         H = _linear(num, den, u)
         if dt:
-            H = ct.sample_system(H, dt * u.time, "zoh")
+            # sampled first, then written in other units: small coefficients are zero to SciPy
+            H = ct.sample_system(_linear(num, den, Units()), dt, "zoh")
+            H = ct.tf(H.num, H.den, dt * u.time)
         # signals of elements are written in units of force
         box = (reach[0] * factor * u.force, reach[1] * factor * u.force)
         top = 30.0 if not dt else min(30.0, 0.9 * np.pi / sampled)

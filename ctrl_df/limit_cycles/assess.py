@@ -193,8 +193,7 @@ class Assessor:
             )
             return spread, path, [(2, note)]
         if path.end is not End.REACHED:
-            unasked = path.end is End.UNANSWERED and path.share == 0.0
-            return spread, path, [(1 if unasked else 2, path.end.value)]
+            return spread, path, [(2, path.end.value)]
         shift = [abs(math.log(path.solution[0] / a)), abs(math.log(path.solution[1] / w))]
         notes = [(2, "it passes a fold as its harmonics are fed back")] if path.folds else []
         safety = SAFETY[self.method.name in DYNAMIC]

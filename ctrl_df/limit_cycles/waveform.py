@@ -7,13 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
-from ..df.symmetries import find_symmetries
+from ..df.symmetries import Sizes, find_symmetries
 from ..simulate import layout
 from ..simulate.engine import Engine, harmonic_drive
 
 # Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)
 _CLOSED = 1e-8  # mismatch after a period, relative to the size of the motion
+_FAMILIAR = 100.0  # factor between sizes of motions from which on the laws are asked anew
+_DIFFERENCE = 1e-5  # step of difference quotients, relative to the size of a coordinate
 RTOL = 1e-9
 
 
@@ -46,10 +48,15 @@ class WaveformOrbit:
         self.engine = Engine(block)
         kinds = self.engine.program.nodes[:, layout.KIND]
         self.suited = not np.isin(kinds, _UNSUITED).any()
-        if not self.suited:
-            return
-        laws = find_symmetries(self.engine, block)
-        self.suited = laws.autonomous
+        if self.suited:
+            self.block = block
+            self._ask(Sizes.ones(self.engine.nstates))
+
+    def _ask(self, sizes: Sizes):
+        """Ask the laws for their symmetries, about motions of such sizes."""
+        self.sizes = sizes
+        laws = find_symmetries(self.engine, self.block, sizes)
+        self.autonomous, self.power = laws.autonomous, laws.power
         # a free mass may be anywhere, and has no mean position of its own
         self.adrift = self.core is not None and bool(laws.shifts)
         self.transform, self.inverse, self.kept = laws.transform, laws.inverse, laws.free
@@ -75,6 +82,9 @@ class WaveformOrbit:
         U = np.asarray(U, dtype=complex)
         if not self.suited:
             return
+        self._acquaint(float(abs(U[1])), float(omega))
+        if not self.autonomous:
+            return
         self.omega, self.period, self.left = omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([U], omega)
         for state in self._starts(float(abs(U[1]))):
@@ -83,6 +93,13 @@ class WaveformOrbit:
             if Y is not None:
                 self.motion = orbit
                 yield Y
+
+    def _acquaint(self, size, omega):
+        """Ask the laws again where a motion is of another size than the one they were asked about."""
+        inertia = np.where(self.power > 0, sum(self.core.masses) if self.core is not None else 1.0, 1.0)
+        sizes = Sizes(size / (inertia * omega**self.power), size, omega)
+        if not sizes.near(self.sizes, _FAMILIAR):
+            self._ask(sizes)
 
     def _starts(self, size):
         """States to start from: the last motion; if there is none, rest, or a knock against a gap's faces."""
@@ -145,7 +162,10 @@ class WaveformOrbit:
                 matrix = self._differences(state, after_y, size)
                 if matrix is None:
                     return None
-            change = np.linalg.lstsq(np.eye(step.size) - matrix, step, rcond=1e-7)[0]
+            scale = size[self.kept]
+            relative = (np.eye(step.size) - matrix) * scale / scale[:, None]
+            # directions that differences cannot tell from neutral ones (a steady travel) stay as they are
+            change = scale * np.linalg.lstsq(relative, step / scale, rcond=10 * RTOL / _DIFFERENCE)[0]
             if not np.isfinite(change).all() or np.any(np.abs(change) > 3 * size[self.kept]):
                 state, matrix = after, None
                 continue
@@ -170,7 +190,7 @@ class WaveformOrbit:
         columns = []
         for i in self.kept:
             y = base.copy()
-            y[i] += 1e-6 * size[i] * (1 if base[i] <= 0 else -1)
+            y[i] += _DIFFERENCE * size[i] * (1 if base[i] <= 0 else -1)
             moved = self._at(y)
             h = (self.transform @ moved.x)[i] - base[i]
             after = self._map(moved) if h else None
