@@ -27,7 +27,6 @@ import numpy as np  # noqa: E402
 import ctrl_df as cdf  # noqa: E402
 from ctrl_df.identify.simulator import Simulator  # noqa: E402
 from ctrl_df.identify.windows import make_windows  # noqa: E402
-from ctrl_df.simulate.runs import processors  # noqa: E402
 
 ROWS: list[tuple[str, str, str, bool]] = []
 
@@ -347,7 +346,7 @@ def batches() -> None:
     ratio, (two, cores) = statistics.median(ratios), sorted(spread)[len(spread) // 2]
     what = "batch_response, 1,000 runs of 2,500 samples, over event_response"
     row(what, f"{ratio:.2f} x", "0.8 x", ratio <= 0.8)
-    if processors() < 2:
+    if (os.cpu_count() or 1) < 2:
         row(f"{what}, two cores", "this machine has one core", "0.4 x", False)
     else:
         row(f"{what}, two cores, wall", f"{two:.2f} x, {cores:.1f} cores to be had", "0.4 x", two <= 0.4)
