@@ -61,15 +61,15 @@ def _side_by_side(names):
                 if process.poll() is None:
                     continue
                 del running[name]
+                said = process.communicate()[1].decode(errors="replace").strip().splitlines()
                 if process.returncode != 0:
-                    said = process.stderr.read().decode(errors="replace").strip().splitlines()
                     raise RuntimeError(f"compiling {name} failed: {said[-1] if said else process.returncode}")
                 yield name
             time.sleep(0.05)
     finally:
         for process in running.values():
             process.kill()
-            process.wait()
+            process.communicate()
 
 
 def _start(name):

@@ -14,6 +14,7 @@ import math
 from ..simulate import driver
 from ..simulate.compiled import njit, part
 from ..simulate.driver import copy
+from ..simulate.matrices import multiply
 from ..simulate.native import call_native
 from ..simulate.views import lean
 from .shot import coordinates, place
@@ -303,12 +304,7 @@ def spectral_radius(shot, jacobian):
         for r in range(nf):
             for c in range(nf):
                 a[r, c] /= norm
-        for r in range(nf):
-            for c in range(nf):
-                value = 0.0
-                for k in range(nf):
-                    value += a[r, k] * a[k, c]
-                b[r, c] = value
+        multiply(a, a, b)
         for r in range(nf):
             for c in range(nf):
                 a[r, c] = b[r, c]

@@ -60,9 +60,8 @@ class Memory(NamedTuple):
     b: np.ndarray  # (SLOTS, n, nr)
     d: np.ndarray  # (SLOTS, n)
     c: np.ndarray  # (SLOTS, n): rates at zero
-    rows: np.ndarray  # (SLOTS, ng + 2, n + nr + 1): a margin's slopes over x, r, t
-    bases: np.ndarray  # (SLOTS, ng + 2): margins at zero, inf where the mode has none
-    outs: np.ndarray  # (SLOTS, ny, n + nr + 2): an output's slopes over x, r, t, and its value at zero
+    rows: np.ndarray  # (SLOTS, ng + 2, n + nr + 2): a margin's slopes over x, r, t; at zero, inf: none
+    outs: np.ndarray  # (SLOTS, ny, n + nr + 2): an output's slopes over x, r, t; its value at zero
     owners: np.ndarray  # (ng + 2,): margin that each row belongs to
     base: np.ndarray  # scratch: rates and margins (ng + 3) at zero
     ahead: np.ndarray  # scratch: margins at a unit state, extended
@@ -80,8 +79,7 @@ def memory(prog) -> Memory:
         probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros(used * LENGTHS, np.int64),
         np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
-        np.zeros((used, ng + 2, n + nr + 1)), np.zeros((used, ng + 2)), np.zeros((used, ny, n + nr + 2)),
-        np.zeros(ng + 2, np.int64),
+        np.zeros((used, ng + 2, n + nr + 2)), np.zeros((used, ny, n + nr + 2)), np.zeros(ng + 2, np.int64),
         np.zeros(ng + 3), np.zeros(ng + 3), np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
         np.zeros(n),
     )  # fmt: skip
@@ -155,10 +153,10 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
             for i in range(store.rows.shape[1]):
                 known_margin = store.base[i] < math.inf
                 store.rows[slot, i, column] = (margin[i] - store.base[i]) / UNIT if known_margin else 0.0
-    for i in range(store.bases.shape[1]):
+    for i in range(store.rows.shape[1]):
         owner = i if i < prog.ints[H_NG] else _owner(prog, i - prog.ints[H_NG])
         store.owners[i] = owner
-        store.bases[slot, i] = store.base[i] if owner >= 0 else math.inf
+        store.rows[slot, i, n + nr + 1] = store.base[i] if owner >= 0 else math.inf
     return slot
 
 

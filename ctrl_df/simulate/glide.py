@@ -22,6 +22,7 @@ import numpy as np
 from . import layout as L
 from .affine import LENGTHS, Memory, recall
 from .compiled import part
+from .matrices import multiply
 from .modes import settle
 from .outputs import next_sample, record, tick
 
@@ -243,7 +244,7 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
         share = mean / max(round(mean / length), 1.0)
         if abs(share - length) <= near:
             length = share
-    which = 1 - tracks.newest[0]
+    which = (tracks.newest[0] + 1) % LENGTHS
     tracks.newest[0] = which
     tracks.length[which] = length
     for slot in range(store.ready.shape[0] // LENGTHS):
@@ -280,7 +281,7 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
     # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
     for row in range(margins):
         tracks.fed[place, row] = 0
-        tracks.owner[place, row] = store.owners[row] if store.bases[slot, row] < math.inf else -1
+        tracks.owner[place, row] = store.owners[row] if store.rows[slot, row, n + nr + 1] < math.inf else -1
         for j in range(nz):
             tracks.curved[place, row, j] = 0.0
         if not usable or tracks.owner[place, row] < 0:
@@ -288,7 +289,7 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
         for j in range(nz):
             power[0, j] = power[1, j] = 0.0
         for i in range(nz):
-            c = _entry(store, slot, row, i, n, nr)
+            c = _entry(store.rows[slot, row], i, n, nr)
             if c != 0.0:
                 for j in range(nz):
                     power[0, j] += c * m[i, j]
@@ -316,9 +317,9 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
             if row < n:
                 value = whole[row, j]
             elif row >= n + margins:
-                value = _output(store, slot, row - n - margins, j, n, nr)
+                value = _entry(store.outs[slot, row - n - margins], j, n, nr)
             elif tracks.owner[place, row - n] >= 0:
-                value = _entry(store, slot, row - n, j, n, nr)
+                value = _entry(store.rows[slot, row - n], j, n, nr)
                 if value != 0.0 and n <= j < n + nr:
                     tracks.fed[place, row - n] = 1
             if value != 0.0:
@@ -329,23 +330,11 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
 
 
 @part
-def _entry(store, slot, row, j, n, nr):
-    """Entry of a margin's row over z."""
+def _entry(row, j, n, nr):
+    """Entry over z of a row of `Memory.rows` or `Memory.outs`; slopes of inputs stand beside."""
     if j < n + nr:
-        return store.rows[slot, row, j]
-    if j < n + 2 * nr:
-        return 0.0
-    return store.rows[slot, row, n + nr] if j == n + 2 * nr else store.bases[slot, row]
-
-
-@part
-def _output(store, slot, row, j, n, nr):
-    """Entry of an output's row over z."""
-    if j < n + nr:
-        return store.outs[slot, row, j]
-    if j < n + 2 * nr:
-        return 0.0
-    return store.outs[slot, row, n + nr + (j - n - 2 * nr)]
+        return row[j]
+    return row[j - nr] if j >= n + 2 * nr else 0.0
 
 
 @part
@@ -359,27 +348,16 @@ def _exponential(m, h, halvings, out, power, scratch):
     small = False
     for k in range(1, ORDER + 1):
         small = True
+        multiply(m, power, scratch)
         for i in range(nz):
             for j in range(nz):
-                value = 0.0
-                for q in range(nz):
-                    if m[q, j] != 0.0:
-                        value += power[i, q] * m[q, j]
-                scratch[i, j] = value * step / k
-        for i in range(nz):
-            for j in range(nz):
-                power[i, j] = scratch[i, j]
-                out[i, j] += scratch[i, j]
-                small = small and abs(scratch[i, j]) <= 1e-3 * EPS * abs(out[i, j])
+                power[i, j] = scratch[i, j] * step / k
+                out[i, j] += power[i, j]
+                small = small and abs(power[i, j]) <= 1e-3 * EPS * abs(out[i, j])
         if small:
             break
     for _ in range(halvings):
-        for i in range(nz):
-            for j in range(nz):
-                value = 0.0
-                for q in range(nz):
-                    value += out[i, q] * out[q, j]
-                scratch[i, j] = value
+        multiply(out, out, scratch)
         for i in range(nz):
             for j in range(nz):
                 out[i, j] = scratch[i, j]

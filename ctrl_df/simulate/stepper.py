@@ -114,25 +114,9 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
     error = 0.0
     if order == 8:
         stages(
-            prog,
-            drive,
-            segment,
-            t,
-            h,
-            x,
-            mode,
-            work,
-            k,
-            g,
-            lowest,
-            x1,
-            lean(A8),
-            lean(C8),
-            1,
-            13,
+            prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A8), lean(C8), 1, 13, want_g,
             want_g,
-            want_g,
-        )
+        )  # fmt: skip
         e3 = e5 = 0.0
         for j in range(n):
             scale = atol + h * grain[j] + rtol * measure(j, 13, h, k, x1, size)
@@ -151,46 +135,14 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
         return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * n)
     if order == 5:
         stages(
-            prog,
-            drive,
-            segment,
-            t,
-            h,
-            x,
-            mode,
-            work,
-            k,
-            g,
-            lowest,
-            x1,
-            lean(A5),
-            lean(C5),
-            1,
-            7,
-            False,
+            prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A5), lean(C5), 1, 7, False,
             want_g,
-        )
+        )  # fmt: skip
     else:
         stages(
-            prog,
-            drive,
-            segment,
-            t,
-            h,
-            x,
-            mode,
-            work,
-            k,
-            g,
-            lowest,
-            x1,
-            lean(A3),
-            lean(C3),
-            1,
-            4,
-            False,
+            prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A3), lean(C3), 1, 4, False,
             want_g,
-        )
+        )  # fmt: skip
     for j in range(n):
         scale = atol + h * grain[j] + rtol * measure(j, 7 if order == 5 else 4, h, k, x1, size)
         value = 0.0
