@@ -66,7 +66,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _demo(options) -> int:
     from .demo import run
+    from .warm import is_warm, warm_up
 
+    if not is_warm():
+        warm_up(progress=True)
     run(Path(options.out))
     return 0
 

@@ -86,8 +86,11 @@ for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
 
 def spread(numbers) -> np.ndarray:
     """Return numbers and columns side by side, shape (runs, numbers); one row where there is no column."""
-    runs = next((len(v.values) for v in numbers if isinstance(v, Column)), 1)
-    table = np.empty((runs, len(numbers)))
-    for i, v in enumerate(numbers):
-        table[:, i] = v.values if isinstance(v, Column) else v
+    columns = [(i, v.values) for i, v in enumerate(numbers) if isinstance(v, Column)]
+    if not columns:
+        return np.array([numbers], float)
+    table = np.empty((len(columns[0][1]), len(numbers)))
+    table[:] = [0.0 if isinstance(v, Column) else v for v in numbers]
+    for i, values in columns:
+        table[:, i] = values
     return table

@@ -42,6 +42,14 @@ def warm_up(progress: bool | None = None) -> None:
                 )
 
 
+def is_warm() -> bool:
+    """Return whether machine code of the engine is kept, as new as its sources (or none is wanted)."""
+    from .simulate import driver
+
+    kept = getattr(driver.advance, "_cache", None)  # none where numba is switched off
+    return kept is None or kept.known
+
+
 def step(name: str) -> None:
     """Compile one step (a name in `STAGES`) in this process."""
     next(stage[name] for stage in STAGES if name in stage)()

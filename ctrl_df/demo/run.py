@@ -32,9 +32,9 @@ def run(folder: Path) -> list[Path]:
         raise ValueError(f"--out needs a directory; got the file {folder}. Give another name.")
     folder.mkdir(parents=True, exist_ok=True)
     begin = time.perf_counter()
-    print("Azenha & Machado (1997), checked. F1, x1: fundamental amplitudes of force and position.")
     print(
-        "(The first run after installation compiles for a minute or two; the result is kept.)\n", flush=True
+        "Azenha & Machado (1997), checked. F1, x1: fundamental amplitudes of force and position.\n",
+        flush=True,
     )
     findings: dict[str, Finding] = {}
     rows = []

@@ -23,10 +23,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import ccallback, config, sigutils
+from numba.core import ccallback, config, event, sigutils
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
+from .notice import Notice
 from .parts import PartCompiler
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -228,3 +229,6 @@ def _say_once():
         RuntimeWarning,
         stacklevel=2,
     )
+
+
+event.register("numba:compile", Notice(lambda made: isinstance(getattr(made, "_cache", None), KeptCode)))

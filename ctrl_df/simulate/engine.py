@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import control as ct
 import numpy as np
@@ -37,8 +37,7 @@ STATUS = {
 }
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(NamedTuple):
     """One located event: time [s], the subsystem it happened in, and its kind."""
 
     time: float
@@ -238,11 +237,8 @@ class Engine:
         scale = now.scale if now.scale is not None else np.zeros((4, ng))
         xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
         clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
-        log_t, log_n, log_k = (
-            np.zeros(max(log, 1)),
-            np.zeros(max(log, 1), np.int64),
-            np.zeros(max(log, 1), np.int64),
-        )
+        log = max(log, 1)
+        log_t, log_n, log_k = np.empty(log), np.empty(log, np.int64), np.empty(log, np.int64)
         before = now.x.copy()
         kept: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         fresh = int(now.fresh)
@@ -316,4 +312,5 @@ class Engine:
 
     def name_events(self, events) -> list[Event]:
         """Turn the event arrays of a run into `Event` values."""
-        return [Event(float(t), self.node_names[n], EVENT_KINDS[k]) for t, n, k in zip(*events, strict=True)]
+        names, rows = self.node_names, zip(*(column.tolist() for column in events), strict=True)
+        return [Event(time, names[node], EVENT_KINDS[kind]) for time, node, kind in rows]

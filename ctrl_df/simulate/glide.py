@@ -46,11 +46,13 @@ class Glide(NamedTuple):
     first: np.ndarray  # (SLOTS * LENGTHS, rows + 1): where a row begins in `column` and `value`
     column: np.ndarray  # (SLOTS * LENGTHS, room)
     value: np.ndarray  # (SLOTS * LENGTHS, room)
+    margins: np.ndarray  # (SLOTS * LENGTHS,): how many a mode has; these come first in the following
     fed: np.ndarray  # (SLOTS * LENGTHS, margins): whether a row has entries of external inputs
-    owner: np.ndarray  # (SLOTS * LENGTHS, margins): margin of a row, -1 where the mode has none
+    owner: np.ndarray  # (SLOTS * LENGTHS, margins): margin of a row
     curved: np.ndarray  # (SLOTS * LENGTHS, margins, nz): limits of curvature, times h^2/8, for each bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
+    source: np.ndarray  # (margins,): rows of `Memory.rows` that a mode has, while its propagator is made
     here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
     matrix: np.ndarray  # (5, nz, nz)
@@ -66,9 +68,9 @@ def glide_memory(memory: Memory, affine: bool, ny: int) -> Glide:
     return Glide(
         np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
         np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
-        np.zeros((used, margins), np.int64), np.zeros((used, margins), np.int64),
-        np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins), np.zeros(nz), np.zeros(nz),
-        np.zeros((5, nz, nz)),
+        np.zeros(used, np.int64), np.zeros((used, margins), np.int64), np.zeros((used, margins), np.int64),
+        np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins), np.zeros(margins, np.int64),
+        np.zeros(nz), np.zeros(nz), np.zeros((5, nz, nz)),
     )  # fmt: skip
 
 
@@ -81,7 +83,6 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
     of the next tick, and whether a controller ticked at the end of the last step.
     """
     n, nr, ny = x.shape[0], prog.ints[L.H_NR], prog.ints[L.H_NY]
-    margins = store.rows.shape[1]
     time, nt = drive.time, drive.time.shape[0]
     here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
     at, one = n + 2 * nr, n + 2 * nr + 1
@@ -113,6 +114,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             _make(store, tracks, place, slot, tracks.length[which], n, nr, ny)
         if store.ready[place] == USELESS:
             break
+        margins = tracks.margins[place]
         if place != before:
             stale, before = True, place
         # --- the inputs, and the bounds of all
@@ -143,10 +145,8 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         # --- margins at the start, where they are not those at the end of the step before
         first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
         for m in range(margins):
-            if tracks.owner[place, m] >= 0 and (stale or (jumped and tracks.fed[place, m] == 1)):
-                if not _row(first, column, values, n + m, here) > slack[m]:
-                    clear = False
-                    break
+            if stale or (jumped and tracks.fed[place, m] == 1):
+                clear = clear and _row(first, column, values, n + m, here) > slack[m]
         if not clear:
             break
         stale = False
@@ -155,13 +155,11 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             ahead[j] = _row(first, column, values, j, here)
             clear = clear and abs(ahead[j]) < math.inf
         for m in range(margins):
-            owner = tracks.owner[place, m]
-            if owner >= 0:
-                value = _row(first, column, values, n + m, ahead)
-                if not value > slack[m]:
-                    clear = False
-                    break
-                scale[0, owner] = max(scale[0, owner], value)
+            owner, value = tracks.owner[place, m], _row(first, column, values, n + m, ahead)
+            if not value > slack[m]:
+                clear = False
+                break
+            scale[0, owner] = max(scale[0, owner], value)
         if not clear:
             break
         for j in range(n):
@@ -255,7 +253,7 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
 @part
 def _make(store, tracks, place, slot, h, n, nr, ny):
     """Compute the propagator of a mode over `h` seconds."""
-    nz, margins = n + 2 * nr + 2, store.rows.shape[1]
+    nz = n + 2 * nr + 2
     at, one = nz - 2, nz - 1
     m, absolute, power, scratch = tracks.matrix[0], tracks.matrix[1], tracks.matrix[2], tracks.matrix[3]
     whole = tracks.matrix[4]
@@ -279,15 +277,12 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
         halvings += 1
     usable = halvings <= HALVINGS
     # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
-    for row in range(margins):
-        tracks.fed[place, row] = 0
-        tracks.owner[place, row] = store.owners[row] if store.rows[slot, row, n + nr + 1] < math.inf else -1
-        for j in range(nz):
-            tracks.curved[place, row, j] = 0.0
-        if not usable or tracks.owner[place, row] < 0:
+    count = 0
+    for row in range(store.rows.shape[1]):
+        if not usable or store.rows[slot, row, n + nr + 1] == math.inf:
             continue
         for j in range(nz):
-            power[0, j] = power[1, j] = 0.0
+            tracks.curved[place, count, j] = power[0, j] = power[1, j] = 0.0
         for i in range(nz):
             c = _entry(store.rows[slot, row], i, n, nr)
             if c != 0.0:
@@ -301,31 +296,37 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
             bend = abs(power[1, i]) * h * h / 8.0
             if bend > 0.0:
                 for j in range(nz):
-                    tracks.curved[place, row, j] += bend * whole[i, j]
+                    tracks.curved[place, count, j] += bend * whole[i, j]
         for j in range(nz):
-            usable = usable and tracks.curved[place, row, j] < math.inf
+            usable = usable and tracks.curved[place, count, j] < math.inf
+        tracks.owner[place, count] = store.owners[row]
+        tracks.source[count] = row
+        count += 1
     if not usable:
         store.ready[place] = USELESS
         return
+    tracks.margins[place] = count
     _exponential(m, h, halvings, whole, power, scratch)
-    # --- the rows, zeros left out
-    count = 0
+    # --- the rows, zeros left out: states, margins, outputs
+    entries = 0
     tracks.first[place, 0] = 0
-    for row in range(n + margins + ny):
+    for row in range(n + count + ny):
         for j in range(nz):
-            value = 0.0
             if row < n:
                 value = whole[row, j]
-            elif row >= n + margins:
-                value = _entry(store.outs[slot, row - n - margins], j, n, nr)
-            elif tracks.owner[place, row - n] >= 0:
-                value = _entry(store.rows[slot, row - n], j, n, nr)
-                if value != 0.0 and n <= j < n + nr:
-                    tracks.fed[place, row - n] = 1
+            elif row < n + count:
+                value = _entry(store.rows[slot, tracks.source[row - n]], j, n, nr)
+            else:
+                value = _entry(store.outs[slot, row - n - count], j, n, nr)
             if value != 0.0:
-                tracks.column[place, count], tracks.value[place, count] = j, value
-                count += 1
-        tracks.first[place, row + 1] = count
+                tracks.column[place, entries], tracks.value[place, entries] = j, value
+                entries += 1
+        tracks.first[place, row + 1] = entries
+    for k in range(count):
+        tracks.fed[place, k] = 0
+        for j in range(n, n + nr):
+            if _entry(store.rows[slot, tracks.source[k]], j, n, nr) != 0.0:
+                tracks.fed[place, k] = 1
     store.ready[place] = USABLE
 
 

@@ -70,15 +70,13 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     def rows(from_s, from_r):
         """Append the rows of a block of inputs; returns the position of their pointers."""
         pointers = []
-        for row_s, row_r in zip(from_s, from_r, strict=True):
+        for weights in np.hstack([from_s, from_r]).tolist():
             pointers.append(len(ints))
-            entries = [(i, row_s[i]) for i in np.flatnonzero(row_s)] + [
-                (ns + i, row_r[i]) for i in np.flatnonzero(row_r)
-            ]
+            entries = [(index, weight) for index, weight in enumerate(weights) if weight]
             ints.append(len(entries))
             for index, weight in entries:
-                ints.extend((int(index), len(par)))
-                par.append(float(weight))
+                ints.extend((index, len(par)))
+                par.append(weight)
         ints.extend(pointers)
         return len(ints) - len(pointers)
 
