@@ -4,7 +4,7 @@ Two flows run through the package::
 
     physics block --> describing function family --> predicted limit cycles --> exact orbit --> verdict
        Mass             describing_function_            describing_function_       find_limit_    verify
-       TwoMass          family                          response, ..._plot         cycle
+       TwoMass, Inertia family                          response, ..._plot         cycle
 
     measurement --> compare --> diagnose --> add the effect --> refit --> compare again
     Measurement     compare     diagnose     block.with_effect   refit    improve (the whole ladder)
@@ -37,6 +37,7 @@ from .blocks.memoryless import (
 )
 from .blocks.parameter import Parameter, parameter
 from .blocks.pid import pid
+from .blocks.rotary import Inertia, TwoInertias
 from .status import Status
 
 # Names loaded on first use, so that importing the package stays cheap.
@@ -69,10 +70,12 @@ _LAZY = {
 __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     "DescribingFunctionNonlinearity",
     "Effect",
+    "Inertia",
     "Mass",
     "Mechanism",
     "Parameter",
     "Status",
+    "TwoInertias",
     "TwoMass",
     "backlash_masses",
     "cubic",

@@ -15,12 +15,13 @@ import numpy as np
 from .blocks.effect import Effect, effect_class
 from .blocks.mechanism import Mass, Mechanism, TwoMass
 from .blocks.pid import pid
+from .blocks.rotary import Inertia, TwoInertias
 from .checks import choice, is_number, number, path_of, shown
-from .identify.units import si_unit
+from .units import si_unit
 
 EXAMPLE = """\
 [plant]
-kind = "mass"              # or "two_mass" (then motor_mass and load_mass)
+kind = "mass"              # "two_mass" (then motor_mass, load_mass), "inertia", "two_inertias"
 mass = 9.0                 # kg
 
 [effects.coulomb]          # any effect id, parameters by name, SI units; several: one table each
@@ -53,7 +54,9 @@ MOST_POINTS = 1_000_000
 """Grid points of a box: some 200 MB, and more than any search for cycles needs."""
 
 _GAINS = ("kp", "ki", "kd", "tf", "dt")
-_PLANTS: dict[str, type[Mechanism]] = {"mass": Mass, "two_mass": TwoMass}
+_PLANTS: dict[str, type[Mechanism]] = {
+    "mass": Mass, "two_mass": TwoMass, "inertia": Inertia, "two_inertias": TwoInertias,
+}  # fmt: skip
 _SECTIONS = ("plant", "effects", "controller", "box", "data")
 _COLUMNS = ("time", "input", "output", "velocity", "channels", "delimiter", "decimal")
 _DATA = (
@@ -131,7 +134,7 @@ def read_model(path) -> ModelFile:
 
 def _plant(table) -> Mechanism:
     if "plant" not in table:
-        raise ValueError('a model needs a section [plant] with kind = "mass" or "two_mass".')
+        raise ValueError(f"a model needs a section [plant] with kind = {' or '.join(map(repr, _PLANTS))}.")
     given = dict(_mapping(table["plant"], "plant"))
     kind = given.pop("kind", "mass")
     if not isinstance(kind, str) or kind not in _PLANTS:

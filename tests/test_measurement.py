@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ctrl_df.identify.measurement import FrequencyMeasurement, Measurement
-from ctrl_df.identify.units import si_unit
+from ctrl_df.units import si_unit
 
 
 def run(n=400, dt=1e-3, seed=0):

@@ -54,6 +54,11 @@ class Core:
         return len(self.masses)
 
     @property
+    def motions(self) -> tuple[str, ...]:
+        """Names of the positions and speeds, the first states."""
+        return ("x", "v", "x_motor", "v_motor")[: 2 * self.bodies]
+
+    @property
     def driven(self) -> int:
         """Index of the body the force acts on."""
         return self.bodies - 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..checks import known_name, mapping, number, shown, system_name
 from . import compliant
+from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Stribeck, Viscous
@@ -29,12 +31,15 @@ class Mechanism(ct.NonlinearIOSystem):
     """
 
     _inertias: tuple[str, ...] = ()
+    _coordinates: Coordinates = LINE
 
     def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
         owner = type(self).__name__
         system_name(owner, name)
+        unit, self._given_name = self._coordinates.unit_of("kg"), name
         self._values = {
-            k: checked(owner, k, v, {**_MASS, "meaning": k.replace("_", " ")}) for k, v in inertias.items()
+            k: checked(owner, k, v, {**_MASS, "unit": unit, "meaning": k.replace("_", " ")})
+            for k, v in inertias.items()
         }
         self._effects = _as_effects(effects)
         if measured not in ("load", "motor"):
@@ -45,14 +50,14 @@ class Mechanism(ct.NonlinearIOSystem):
         self._keys = _effect_keys(self._effects)
         _check_levels(self._effects)
         self._core = self._build(self._values, self._effects)
-        core = self._core
-        out = ["x", "v"] + (["x_motor", "v_motor"] if core.bodies == 2 else [])
+        core, called = self._core, self._coordinates.name
+        out = [called(signal) for signal in core.motions]
         super().__init__(
             self._updfcn,
             self._outfcn,
-            inputs=["F"],
+            inputs=[called("F")],
             outputs=out,
-            states=list(core.state_names),
+            states=[*out, *core.state_names[len(out) :]],
             dt=0,
             name=name,
             params={key: p.value for key, p in self.parameters.items()},
@@ -75,6 +80,18 @@ class Mechanism(ct.NonlinearIOSystem):
         return self._core
 
     @property
+    def coordinates(self) -> Coordinates:
+        """How it moves: words and units of its quantities."""
+        return self._coordinates
+
+    @property
+    def signals(self) -> Mapping[str, str]:
+        """Unit of its input and of each output, by label."""
+        units = {"F": "N", "x": "m", "v": "m/s", "x_motor": "m", "v_motor": "m/s"}
+        mine = self._coordinates
+        return {mine.name(k): mine.unit_of(units[k]) for k in ("F", *self._core.motions)}
+
+    @property
     def measured(self) -> str:
         """The body whose position is the output `x` where a joint separates two: ``load`` or ``motor``."""
         return self._measured
@@ -83,14 +100,20 @@ class Mechanism(ct.NonlinearIOSystem):
     def parameters(self) -> Mapping[str, Parameter]:
         """Ordered mapping of name (``mass``, ``coulomb.level``, ...) to `Parameter` (value, unit, bounds)."""
         table = {
-            k: Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}) for k, v in self._values.items()
+            k: self._own(Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}))
+            for k, v in self._values.items()
         }
         for key, effect in zip(self._keys, self._effects, strict=True):
             for name, p in effect.parameters.items():
                 if name == "load_fraction" and len(self._inertias) == 2:
                     continue
-                table[f"{key}.{name}"] = p
+                table[f"{key}.{name}"] = self._own(p)
         return MappingProxyType(table)
+
+    def _own(self, parameter: Parameter) -> Parameter:
+        """Return a parameter in the units of this machine."""
+        unit = self._coordinates.unit_of(parameter.unit)
+        return parameter if unit == parameter.unit else replace(parameter, unit=unit)
 
     def with_effect(self, effect: Effect) -> Mechanism:
         """Return the block with one more effect."""
@@ -112,11 +135,11 @@ class Mechanism(ct.NonlinearIOSystem):
 
     def with_measured(self, measured: str) -> Mechanism:
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""
-        return type(self)._make(self._values, self._effects, measured)
+        return self._make(self._values, self._effects, measured, self._given_name)
 
     def _named(self, name) -> Mechanism:
         """Return the same block under another name."""
-        return _unpickle(type(self), self._values, self._effects, self._measured, name)
+        return self._make(self._values, self._effects, self._measured, name)
 
     def _changed(self, values: Mapping[str, float]):
         known = self.parameters
@@ -130,11 +153,11 @@ class Mechanism(ct.NonlinearIOSystem):
         return inertias, tuple(effects)
 
     def _remade(self, inertias, effects) -> Mechanism:
-        return type(self)._make(inertias, effects, self._measured)
+        return self._make(inertias, effects, self._measured, self._given_name)
 
     @classmethod
-    def _make(cls, inertias, effects, measured) -> Mechanism:
-        return cls(**inertias, effects=effects, measured=measured)  # type: ignore[call-arg]
+    def _make(cls, inertias, effects, measured, name=None) -> Mechanism:
+        return cls(**inertias, effects=effects, measured=measured, name=name)  # type: ignore[call-arg]
 
     def __reduce__(self):
         return _unpickle, (type(self), self._values, self._effects, self._measured, self.name)
@@ -287,7 +310,7 @@ def backlash_masses(motor_mass, load_mass, gap, restitution=0.0, *, name=None) -
 
 
 def _unpickle(cls, inertias, effects, measured, name):
-    return cls(**inertias, effects=effects, measured=measured, name=name)
+    return cls._make(inertias, effects, measured, name)
 
 
 @lru_cache(maxsize=64)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..checks import CHECK_VALUE, number
+from ..units import dimension
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Parameter:
         Whether a refit moves it unless told otherwise.
     meaning : str
         What it is, in a few words.
+    line_unit : str
+        Unit of the same parameter in a machine on a line, `unit` by default; its size follows from that.
     """
 
     value: float
@@ -37,6 +40,11 @@ class Parameter:
     strict: bool = False
     free: bool = True
     meaning: str = ""
+    line_unit: str = ""
+
+    def __post_init__(self):
+        if not self.line_unit:
+            object.__setattr__(self, "line_unit", self.unit)
 
     def __float__(self) -> float:
         return self.value
@@ -52,7 +60,14 @@ def parameter(
     default: Any = dataclasses.MISSING,
     meaning="",
 ) -> Any:
-    """Declare a dataclass field that is a physical parameter (unit, bounds, what it means)."""
+    """Declare a dataclass field that is a physical parameter (unit, bounds, what it means).
+
+    Raises
+    ------
+    ValueError
+        The unit is unknown: the sizes that a fit begins with follow from it.
+    """
+    dimension(unit)
     bounds = dict(unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning)
     return dataclasses.field(default=default, metadata={"parameter": bounds})
 

@@ -44,7 +44,7 @@ _SAME = 1e-3  # relative distance of n between a motion found and a curve known:
 
 def backlash_branches(block, A, omega, near_A, near_omega) -> list[Branch]:
     """Return the branches of N of two masses with a gap; see `Method.branches`."""
-    joint, motor, load = block.effects[0], block.motor_mass, block.load_mass
+    joint, motor, load = block.effects[0], *reversed(block.core.masses)
     unit = motor * joint.gap
     highest = float(np.max(A) / (unit * np.min(omega) ** 2))
     given = motor, load, joint.gap, joint.restitution

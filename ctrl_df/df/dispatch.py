@@ -12,7 +12,7 @@ from control import descfcn
 
 from ..blocks.element import Element
 from ..blocks.hysteresis import play, relay_with_hysteresis
-from ..blocks.mechanism import Mass, Mechanism, TwoMass
+from ..blocks.mechanism import Mechanism
 from ..blocks.memoryless import saturation
 from ..checks import shown
 from ..status import Status
@@ -140,7 +140,7 @@ class Method:
 
             levels = {e.id: e.values[0] for e in block.effects}
             y, code, residual = friction_family(
-                block.mass,
+                block.core.masses[0],
                 levels.get("coulomb", 0.0),
                 levels.get("viscous", 0.0),
                 levels.get("stiction"),
@@ -154,8 +154,8 @@ class Method:
 
             joint = block.effects[0]
             y, code, residual = backlash.backlash_family(
-                block.motor_mass,
-                block.load_mass,
+                block.core.masses[1],
+                block.core.masses[0],
                 joint.gap,
                 joint.restitution,
                 A,
@@ -265,12 +265,12 @@ def translated(F):
 
 def _for_mechanism(block, output, options) -> Method:
     ids = [e.id for e in block.effects]
-    order = {"x": 0, "v": 1}.get(output)
+    order = {label: i for i, label in enumerate(block.output_labels[:2])}.get(output)
     unique = len(ids) == len(set(ids))
     if order is not None and unique:
-        if type(block) is Mass and set(ids) in FRICTION_IDS:
+        if block.core.bodies == 1 and set(ids) in FRICTION_IDS:
             return Method("friction", block, output, order)
-        if type(block) is TwoMass and ids == ["backlash"] and block.measured == "load":
+        if ids == ["backlash"] and block.core.measured == 0:
             return Method("backlash", block, output, order)
     return Method("orbit", block, output, options=options)
 

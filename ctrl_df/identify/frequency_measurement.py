@@ -8,9 +8,9 @@ import control as ct
 import numpy as np
 
 from ..checks import positive, real_array, shown
+from ..units import si_unit
 from . import readers
 from .text_table import refuse_text
-from .units import si_unit
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..checks import choice, count, mapping, number, shown, unknown_keywords
+from ..units import si_unit, to_si
 from . import derivatives, readers
 from .checks import as_channel, check_input, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
-from .units import si_unit, to_si
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
 

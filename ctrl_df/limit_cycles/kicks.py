@@ -45,7 +45,7 @@ class Kicks:
         self.straight = 0.0
         if self.core is not None:
             self.pace = corner_frequency(self.parts)
-            self.scale, self.unit = self._length_scale(), "m"
+            self.scale, self.unit = self._length_scale(), self.block.coordinates.unit
         elif self.parts is not None:
             self.pace = _pole_frequency(self._controller())
             self.scale, self.unit = self._corner(), "at the block's input"
@@ -70,7 +70,7 @@ class Kicks:
         x[offset] = size
         if core.bodies == 2:
             x[offset + 2] = size + 0.5 * core.gap
-        if self.loop.output_labels[0].startswith("v"):
+        if self.parts.block.output_labels.index(self.loop.output_labels[0]) % 2:
             # nothing drives a loop closed on the velocity back to a place
             x[offset + 1 : offset + 2 * core.bodies : 2] = size * self.pace
         if core.stop is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import ticker
 
 from ..blocks.mechanism import Mechanism
+from ..units import over
 
 AMPLITUDE_COLOR, OMEGA_COLOR, NYQUIST_COLOR, CROSSING_COLOR = "#1f5a99", "#b3541e", "#222222", "#a3123a"
 
@@ -24,8 +25,9 @@ def units(family) -> tuple[str, str, str]:
     """Units of A, of N and of -1/N, each with a space before it; empty where the block does not tell."""
     if not isinstance(family.block, Mechanism):
         return "", "", ""
-    motion = "m/s" if family.output.startswith("v") else "m"
-    return " N", f" {motion}/N" if motion == "m" else " m/(N s)", " N/m" if motion == "m" else " N s/m"
+    units = family.block.signals
+    force, motion = units[family.block.input_labels[0]], units[family.output]
+    return f" {force}", f" {over(motion, force)}", f" {over(force, motion)}"
 
 
 def in_brackets(unit) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 
 _MARKS = {"impact": "x", "stick": "s", "breakaway": "o", "reversal": "|", "contact": "v", "release": "^"}
-_SMALL = 0.1  # [m]: below it lengths are drawn in millimetres
+_SMALL = 0.1  # [m, rad]: below it motions are drawn in thousandths
 
 
 def orbit_plot(orbit, *, ax=None, title=None, **line) -> ct.ControlPlot:
@@ -79,9 +79,10 @@ def _units(orbit, names) -> tuple[float, str, str]:
     parts = getattr(orbit.loop, "parts", None)
     if parts is None or not isinstance(parts.block, Mechanism):
         return 1.0, "", ""
-    suffix = "/s" if names[0].startswith("v") else ""
+    units = parts.block.signals
     small = np.max(np.abs(orbit.outputs[0])) < _SMALL
-    return (1e3, "mm" + suffix, "N") if small else (1.0, "m" + suffix, "N")
+    scale, prefix = (1e3, "m") if small else (1.0, "")
+    return scale, prefix + units[names[0]], units[names[-1]]
 
 
 def _mark(axis, orbit, y, marks):

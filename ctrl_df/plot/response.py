@@ -1,4 +1,4 @@
-"""Force and displacement of a simulated loop over time, as the paper draws them."""
+"""Force and position of a simulated loop over time, as the paper draws them."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..blocks.coordinates import AXIS, LINE
+
 
 def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None) -> ct.ControlPlot:
-    """Draw the force above and the displacement [mm] below, over time.
+    """Draw the force above and the position [mm] below (torque and angle [mrad] of what turns), over time.
 
     Parameters
     ----------
     runs : EventResponse or sequence of them
-        Of closed loops: first output the position [m], last the force [N].
+        Of closed loops: first output the position, last the force.
     labels : sequence of str
         One a run, written at its end.
     window : (start, stop) [s], optional
         What is shown.
     title : str, optional
     ax : pair of Axes, optional
-        Force, displacement.
+        Force, position.
 
     Returns
     -------
@@ -43,8 +45,9 @@ def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None) -> 
         style = styles[i % len(styles)]
         lines[0, 0] += axes[0].plot(t[seen], y[-1, seen], label=label, **style)
         lines[1, 0] += axes[1].plot(t[seen], 1e3 * y[0, seen], **style)
-    axes[0].set_ylabel("force F [N]")
-    axes[1].set_ylabel("displacement x [mm]")
+    moves = next((c for c in (LINE, AXIS) if c.name("F") in (runs[0].output_labels or ())), LINE)
+    axes[0].set_ylabel(f"{moves.force} [{moves.force_unit}]")
+    axes[1].set_ylabel(f"{moves.position} [m{moves.unit}]")
     axes[1].set_xlabel("time [s]")
     for axis in axes:
         axis.grid(True, color="0.92", lw=0.7)

@@ -89,7 +89,8 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     fed_back = block.output_labels[0] if output is None else _label(block, output)
     force = block.input_labels[0]
     kd, proper = split_improper(controller)
-    if kd != 0 and "v" not in block.output_labels:
+    rate = block.output_labels[1] if isinstance(block, Mechanism) else "v"
+    if kd != 0 and rate not in block.output_labels:
         raise ValueError(
             "an improper controller needs a block with a velocity output v for its derivative; "
             f"{block.name} has {', '.join(block.output_labels)}. Filter the derivative: pid(..., tf=...)."
@@ -103,7 +104,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     plant = block._named("plant") if isinstance(block, Mechanism) else block.copy(name="plant")
     connections = [["controller.e", f"-plant.{fed_back}"], [f"plant.{force}", f"controller.{force}"]]
     if kd != 0:
-        connections.append(["controller.v", "plant.v"])
+        connections.append(["controller.v", f"plant.{rate}"])
     loop = ct.interconnect(
         [control, plant],
         connections=connections,

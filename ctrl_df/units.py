@@ -1,0 +1,158 @@
+"""Units: what is written of a channel or a parameter, as a factor to SI and a dimension.
+
+A unit is a product of symbols with powers, a solidus before those in the denominator: ``N s^2/m^2``,
+``deg/s``, ``mN*m``, ``m/(N s)``. Angles and forces count as dimensions of their own here: a drive that turns
+has sizes of angle and of torque that follow from nothing else, which libraries of physical units take for
+plain numbers and for kg m^2/s^2. That, and a dozen symbols, is why this is done here.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+_PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
+_SYMBOLS: dict[str, tuple[float, dict[str, int]]] = {}
+
+
+def _define(symbol: str, factor: float, dimension: dict[str, int], prefixes: str = ""):
+    for prefix in ("", *prefixes):
+        _SYMBOLS.setdefault(prefix + symbol, (_PREFIXES.get(prefix, 1.0) * factor, dimension))
+
+
+_TURN = 2 * math.pi
+_define("m", 1.0, {"m": 1}, "nuµμmck")
+_define("in", 0.0254, {"m": 1})
+_define("inch", 0.0254, {"m": 1})
+_define("N", 1.0, {"N": 1}, "uµμmkM")
+_define("lbf", 4.4482216152605, {"N": 1})
+_define("kgf", 9.80665, {"N": 1})
+_define("Nm", 1.0, {"N": 1, "m": 1}, "uµμmk")
+_define("rad", 1.0, {"rad": 1}, "uµμm")
+_define("deg", math.pi / 180, {"rad": 1})
+_define("°", math.pi / 180, {"rad": 1})
+_define("arcmin", math.pi / 10_800, {"rad": 1})
+_define("arcsec", math.pi / 648_000, {"rad": 1})
+_define("rev", _TURN, {"rad": 1})
+_define("turn", _TURN, {"rad": 1})
+_define("rpm", _TURN / 60, {"rad": 1, "s": -1})
+_define("s", 1.0, {"s": 1}, "nuµμm")
+_define("min", 60.0, {"s": 1})
+_define("h", 3600.0, {"s": 1})
+_define("Hz", 1.0, {"s": -1}, "kM")
+_define("g", 1e-3, {"kg": 1}, "k")
+_define("g0", 9.80665, {"m": 1, "s": -2})
+_define("V", 1.0, {"V": 1}, "mk")
+_define("A", 1.0, {"A": 1}, "mk")
+_define("%", 0.01, {})
+for _plain in ("", "1", "-"):
+    _define(_plain, 1.0, {})
+
+BASE = ("kg", "N", "V", "A", "m", "s", "rad")
+"""Dimensions, in the order in which units of SI are written."""
+
+_ON_A_LINE = {"N": ("N", "m"), "m": ("rad",), "kg": ("kg", "m", "m")}  # and what stands for it when turning
+_PRODUCT = re.compile(r"(?<!\*)\*(?!\*)|[·.]|(?<=[^\W\d])-(?=[^\W\d])")  # *, ·, ., and the hyphen of N-m
+_FACTOR = re.compile(
+    r"(?P<symbol>[^\s^*·./()\d²³][^\s^*·./()²³]*|1)(?:(?:\^|\*\*)(?P<power>-?\d+)|(?P<mark>[²³]))?"
+)
+
+
+@functools.cache
+def _parsed(unit: str) -> tuple[float, tuple[tuple[str, int], ...]]:
+    factor = 1.0
+    total: dict[str, int] = {}
+    above, *below = unit.strip().split("/")
+    if any(not part.strip() for part in below):
+        raise _unknown(unit)
+    for sign, part in ((1, above), *((-1, b) for b in below)):
+        text = part.strip()
+        text = text[1:-1] if text.startswith("(") and text.endswith(")") else text
+        if text in _SYMBOLS:  # also those that are no factor: nothing, %
+            found = [(text, 1)]
+        else:
+            found = [_factor(unit, word) for word in _PRODUCT.sub(" ", text).split()]
+        for symbol, power in found:
+            size, dimension = _SYMBOLS[symbol]
+            factor *= size ** (sign * power)
+            for base, exponent in dimension.items():
+                total[base] = total.get(base, 0) + sign * power * exponent
+    return factor, tuple((base, total[base]) for base in BASE if total.get(base))
+
+
+def _factor(unit: str, word: str) -> tuple[str, int]:
+    match = _FACTOR.fullmatch(word)
+    if match is None or match["symbol"] not in _SYMBOLS:
+        raise _unknown(unit)
+    return match["symbol"], int(match["power"] or {"²": 2, "³": 3}.get(match["mark"] or "", 1))
+
+
+def _unknown(unit: str) -> ValueError:
+    known = ", ".join(k for k in _SYMBOLS if k and k not in "μ1-")
+    return ValueError(f"a unit must be one of {known}, or made of these (mm/s, N s^2/m^2); got {unit!r}.")
+
+
+def dimension(unit: str) -> dict[str, int]:
+    """Return the powers of a unit over `BASE`, those that are zero left out.
+
+    Raises
+    ------
+    ValueError
+        For an unknown unit; the message lists the symbols known.
+    """
+    if not isinstance(unit, str):
+        raise TypeError(f"a unit must be a string such as 'mm' or 'N'; got {unit!r}.")
+    return dict(_parsed(unit)[1])
+
+
+def written(powers: Mapping[str, int]) -> str:
+    """Return the SI unit of a dimension."""
+    above = [_power(base, powers[base]) for base in BASE if powers.get(base, 0) > 0]
+    below = [_power(base, -powers[base]) for base in BASE if powers.get(base, 0) < 0]
+    if not below:
+        return " ".join(above)
+    last = below[0] if len(below) == 1 else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{last}"
+
+
+def _power(base: str, exponent: int) -> str:
+    return base if exponent == 1 else f"{base}^{exponent}"
+
+
+def si_unit(unit: str) -> tuple[float, str]:
+    """Return the factor to SI and the SI unit.
+
+    Raises
+    ------
+    ValueError
+        For an unknown unit; the message lists the symbols known.
+    """
+    powers = dimension(unit)
+    return _parsed(unit)[0], written(powers)
+
+
+def to_si(values, unit: str) -> tuple[np.ndarray, str]:
+    """Return `values` in SI as floats, and the SI unit."""
+    factor, name = si_unit(unit)
+    return np.asarray(values, dtype=float) * factor, name
+
+
+def over(above: str, below: str) -> str:
+    """Return the SI unit of a quotient."""
+    powers = dimension(above)
+    for base, exponent in dimension(below).items():
+        powers[base] = powers.get(base, 0) - exponent
+    return written(powers)
+
+
+def turning(unit: str) -> str:
+    """Return the unit that a machine that turns has in the place of one on a line: N m for N, rad for m."""
+    powers: dict[str, int] = {}
+    for base, exponent in dimension(unit).items():
+        for other in _ON_A_LINE.get(base, (base,)):
+            powers[other] = powers.get(other, 0) + exponent
+    return written(powers)

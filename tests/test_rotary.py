@@ -1,0 +1,111 @@
+"""A machine that turns is the same machine, in words and units of rotation."""
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.blocks.coordinates import AXIS
+from ctrl_df.units import dimension, over, si_unit, turning
+
+EFFECTS = [
+    cdf.Coulomb(5.0),
+    cdf.Viscous(0.5),
+    cdf.Stribeck(6.0, 0.05),
+    cdf.CubicSpring(30.0),
+    cdf.HardStop(2.0),
+]
+T = np.linspace(0, 2, 400)
+U = 20 * np.sin(7 * T)
+
+
+def test_same_motion_other_words():
+    line, axis = cdf.Mass(2.0, EFFECTS), cdf.Inertia(2.0, EFFECTS)
+    a, b = (cdf.event_response(m, T, U) for m in (line, axis))
+    assert np.array_equal(a.outputs, b.outputs) and a.events[0].kind == b.events[0].kind
+    assert (axis.input_labels, axis.output_labels) == (["torque"], ["angle", "speed"])
+    assert axis.signals == {"torque": "N m", "angle": "rad", "speed": "rad/s"}
+    assert list(axis.parameters)[1:] == list(line.parameters)[1:]
+
+
+def test_every_parameter_of_the_library_has_its_unit():
+    units = {
+        "N": "N m", "m": "rad", "m/s": "rad/s", "N/m": "N m/rad", "N s/m": "N m s/rad", "s": "s", "": "",
+        "N/m^3": "N m/rad^3", "N s^2/m^2": "N m s^2/rad^2", "kg": "kg m^2", "rad": "rad",
+    }  # fmt: skip
+    for k, p in cdf.Mass(1.0, EFFECTS).parameters.items():
+        if k != "mass":
+            assert cdf.Inertia(1.0, EFFECTS).parameters[k].unit == units[p.unit]
+    for cls in cdf.effect_library().values():
+        for field in cls.__dataclass_fields__.values():
+            if "parameter" in field.metadata:
+                assert AXIS.unit_of(field.metadata["parameter"]["unit"]) in units.values()
+    assert cdf.Inertia(1.0).parameters["inertia"].unit == "kg m^2"
+
+
+def test_limit_cycle_and_families_are_those_of_the_line():
+    gains = cdf.pid(2000, 44250, 130)
+    line, axis = cdf.friction_mass(9, 5, 0.5), cdf.Inertia(9, [cdf.Coulomb(5), cdf.Viscous(0.5)])
+    a, b = (cdf.find_limit_cycle(cdf.closed_loop(gains, m), (11, 13.8)) for m in (line, axis))
+    assert (
+        a.omega == b.omega
+        and a.loop.output_labels == ["x", "F"]
+        and b.loop.output_labels == ["angle", "torque"]
+    )
+    family = cdf.describing_function_family(axis, [20.0, 30.0], [9.0, 10.0])
+    assert np.array_equal(family.N, cdf.describing_function_family(line, [20.0, 30.0], [9.0, 10.0]).N)
+
+
+def test_two_inertias():
+    gap = cdf.Backlash(0.01, 0.2)
+    line, axis = cdf.TwoMass(1.0, 8.0, [gap]), cdf.TwoInertias(1.0, 8.0, [gap])
+    assert axis.output_labels == ["angle", "speed", "angle_motor", "speed_motor"]
+    a, b = (cdf.describing_function_family(m, [20.0], [9.0]) for m in (line, axis))
+    assert np.array_equal(a.N, b.N)
+    assert axis.parameters["load_inertia"].unit == "kg m^2" and axis.parameters["backlash.gap"].unit == "rad"
+
+
+def test_names_stay():
+    for block in (cdf.Mass(1.0, name="axis"), cdf.Inertia(1.0, name="axis")):
+        changed = block.with_effect(cdf.Coulomb(1.0)).with_parameters({"coulomb.level": 2.0})
+        assert changed.name == changed.without_effect("coulomb").with_measured("motor").name == "axis"
+
+
+def test_refusals_speak_of_rotation():
+    with pytest.raises(ValueError, match=r"inertia.*kg m\^2"):
+        cdf.Inertia(0.0)
+
+
+@pytest.mark.parametrize("unit", ["furlong", "N//m", "N/", "N/m^x", "(m", "m s)", "5", "m^"])
+def test_unknown_units_are_refused(unit):
+    with pytest.raises(ValueError, match="a unit must be one of"):
+        si_unit(unit)
+    with pytest.raises(ValueError, match="a unit must be one of"):
+        cdf.parameter(unit)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "si"),
+    [
+        ("N m s/rad", 1.0, "N m s/rad"), ("mN·m/A", 1e-3, "N m/A"), ("N-m", 1.0, "N m"),
+        ("N*s**2/m**2", 1.0, "N s^2/m^2"),
+        ("V/(rad/s)", None, None), ("V s/rad", 1.0, "V s/rad"), ("m/(N s)", 1.0, "m/(N s)"),
+        ("1/s", 1.0, "1/s"),
+        ("N/mm^3", 1e9, "N/m^3"), ("ozf", None, None), ("kHz", 1e3, "1/s"), ("m/s/s", 1.0, "m/s^2"),
+    ],
+)  # fmt: skip
+def test_products_of_units(unit, factor, si):
+    if si is None:
+        with pytest.raises(ValueError, match="a unit must be one of"):
+            si_unit(unit)
+    else:
+        assert si_unit(unit) == (pytest.approx(factor), si)
+        assert si_unit(si) == (1.0, si)
+
+
+def test_dimensions():
+    assert dimension("N s^2/m^2") == {"N": 1, "s": 2, "m": -2}
+    assert (
+        over("m", "N s") == "m/(N s)"
+        and over("rad", "N m") == "rad/(N m)"
+        and turning("m/(N s)") == "rad/(N m s)"
+    )
