@@ -59,6 +59,9 @@ class Effect:
         The body it acts on in a two-mass block: ``motor`` or ``load``.
     states : int
         Internal states of a force law.
+    affine : bool
+        Whether a force or friction law is an affine function of place and speed as long as the direction of
+        motion stays: such laws run on constant propagators, exactly.
     """
 
     id: ClassVar[str] = ""
@@ -68,6 +71,7 @@ class Effect:
     rank: ClassVar[int] = 0
     side: ClassVar[str] = "motor"
     states: ClassVar[int] = 0
+    affine: ClassVar[bool] = False
     law: ClassVar[Callable | None] = None
 
     def __init_subclass__(cls, **kwargs):

@@ -10,23 +10,12 @@ import control as ct
 import numpy as np
 
 from ..blocks.core import ELASTIC, IMPACT, RIGID, Core
-from ..blocks.effects import (
-    AsymmetricCoulomb,
-    ConstantForce,
-    Coulomb,
-    LinearSpring,
-    LoadFriction,
-    Stiction,
-    Viscous,
-)
 from ..blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
 from ..checks import returned, shown
 from . import layout as L
 from .pointers import address, callback, gave_nan
 
 _JOINT = {None: L.J_NONE, RIGID: L.J_RIGID, IMPACT: L.J_IMPACT, ELASTIC: L.J_ELASTIC}
-# between events these are affine in place and speed; of a law not known here nothing is assumed
-_AFFINE = (AsymmetricCoulomb, ConstantForce, Coulomb, LinearSpring, LoadFriction, Stiction, Viscous)
 
 
 @dataclass
@@ -202,7 +191,7 @@ def core_node(core: Core, x0: int) -> Node:
         feed=0,
         laws=laws,
         start=mode,
-        affine=core.bristle is None and all(type(e) in _AFFINE for e in effects),
+        affine=core.bristle is None and all(e.affine for e in effects),
     )
 
 

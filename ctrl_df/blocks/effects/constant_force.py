@@ -22,6 +22,7 @@ class ConstantForce(Effect):
     force: float = parameter("N", lower=-math.inf, meaning="constant force along +x")
 
     role: ClassVar[str] = "force"
+    affine: ClassVar[bool] = True
     shows: ClassVar[str] = "an error of constant sign, in motion and at rest"
     source: ClassVar[str] = "Newton"
 

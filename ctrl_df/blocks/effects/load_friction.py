@@ -21,6 +21,7 @@ class LoadFriction(Effect):
     level: float = parameter("N", meaning="Coulomb level on the load")
 
     role: ClassVar[str] = "friction"
+    affine: ClassVar[bool] = True
     side: ClassVar[str] = "load"
     shows: ClassVar[str] = "a step in the error when the load reverses, later than the motor does"
     source: ClassVar[str] = "Azenha & Machado (1997), eq. (6), on mass M1"

@@ -21,6 +21,7 @@ class Stiction(Effect):
     level: float = parameter("N", meaning="breakaway level")
 
     role: ClassVar[str] = "friction"
+    affine: ClassVar[bool] = True
     rank: ClassVar[int] = 1
     shows: ClassVar[str] = "error just after standstill: the real mass stays longer at rest, then jumps off"
     source: ClassVar[str] = "Karnopp (1985)"
