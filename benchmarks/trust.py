@@ -22,7 +22,7 @@ from independent import lap_error  # noqa: E402
 from trust_loops import FAMILIES, Units, draw  # noqa: E402
 
 import ctrl_df as cdf  # noqa: E402
-from ctrl_df.limit_cycles.closing import NoClosure  # noqa: E402
+from ctrl_df.limit_cycles.exact.closing import NoClosure  # noqa: E402
 from ctrl_df.limit_cycles.finder import SAME_CYCLE, OrbitFinder  # noqa: E402
 from ctrl_df.limit_cycles.forced_start import harmonic_start  # noqa: E402
 

@@ -85,7 +85,7 @@ def _warm_up(options) -> int:
 
 
 def _limit_cycles(options) -> int:
-    from .limit_cycles.predict import describing_function_response
+    from .limit_cycles.predicted.predict import describing_function_response
     from .limit_cycles.verify import verify
     from .simulate.loop import closed_loop
 

@@ -14,8 +14,8 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.df.work import require_room
-from ctrl_df.limit_cycles import crossings
-from ctrl_df.limit_cycles.crossings import find_crossings
+from ctrl_df.limit_cycles.predicted import crossings
+from ctrl_df.limit_cycles.predicted.crossings import find_crossings
 
 FRICTION = cdf.friction_mass(9, 5, 0.5)
 PID = cdf.pid(2000, 44250, 130)

@@ -18,7 +18,7 @@ from ctrl_df.blocks.mechanism import backlash_masses, friction_mass
 from ctrl_df.blocks.memoryless import relay, saturation
 from ctrl_df.blocks.pid import pid
 from ctrl_df.df.describing import describing_function, describing_function_family
-from ctrl_df.limit_cycles.predict import describing_function_response
+from ctrl_df.limit_cycles.predicted.predict import describing_function_response
 from ctrl_df.plot.describing import describing_function_plot
 
 H3 = ct.tf([8], [1, 2, 2, 1])

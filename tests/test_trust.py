@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.limit_cycles import swings
-from ctrl_df.limit_cycles.closing import Closing
+from ctrl_df.limit_cycles.exact import swings
+from ctrl_df.limit_cycles.exact.closing import Closing
+from ctrl_df.limit_cycles.exact.orbit import NoOrbit
+from ctrl_df.limit_cycles.exact.swings import Lap
 from ctrl_df.limit_cycles.finder import OrbitFinder
-from ctrl_df.limit_cycles.orbit import NoOrbit
-from ctrl_df.limit_cycles.path import End
 from ctrl_df.limit_cycles.pieces import by_pieces
-from ctrl_df.limit_cycles.swings import Lap
+from ctrl_df.limit_cycles.predicted.path import End
 from ctrl_df.status import Status
 
 FRICTION = cdf.pid(2000, 44250, 130)

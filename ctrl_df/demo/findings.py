@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..limit_cycles.predict import DescribingFunctionResponse, describing_function_response
+from ..limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
 from ..limit_cycles.verify import NONE, NOT_FOUND, Check, verify
 from ..simulate.loop import closed_loop
 from ..simulate.response import EventResponse, event_response

@@ -14,17 +14,17 @@ from ..df.dispatch import method_for
 from ..simulate.engine import Engine
 from ..simulate.loop import answers_at_once
 from ..status import Status
-from .answer import responder
 from .arguments import check_search, checked_guess
-from .closing import Centre, Closing, NoClosure
-from .fate import Explorer
+from .exact.closing import Centre, Closing, NoClosure
+from .exact.fate import Explorer
+from .exact.orbit import NoOrbit, Orbit, Try
+from .exact.shrinking import Merged, trace
+from .exact.swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
 from .forced_start import harmonic_start, path_starts
-from .linear import LinearPart
-from .orbit import NoOrbit, Orbit, Try
-from .path import End, Path, corrected_near, follow_path
 from .pieces import by_pieces
-from .shrinking import Merged, trace
-from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
+from .predicted.answer import responder
+from .predicted.linear import LinearPart
+from .predicted.path import End, Path, corrected_near, follow_path
 
 # A prediction and an orbit within these factors of frequency and amplitude are taken for one cycle.
 SAME_CYCLE = (1.25, 2.0)

@@ -11,8 +11,8 @@ from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
-from .answer import responder
-from .path import Path
+from .predicted.answer import responder
+from .predicted.path import Path
 
 _PERIODS = 40  # of forced motion before it is measured
 

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from ..blocks.primitives import PiecewiseAffine, Quantizer
-from .path import Path
+from .predicted.path import Path
 
 _SAMPLES = 1 << 15  # of the waveform, among which visits are looked for
 _MOST = 60  # pieces of a cycle

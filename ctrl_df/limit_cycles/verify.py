@@ -12,11 +12,11 @@ from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
 from .arguments import check_search
-from .fate import Fate
+from .exact.fate import Fate
+from .exact.known import KnownOrbits
+from .exact.orbit import NoOrbit, Orbit
 from .finder import SAME_CYCLE, OrbitFinder
-from .grade import LimitCycle
-from .known import KnownOrbits
-from .orbit import NoOrbit, Orbit
+from .predicted.grade import LimitCycle
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"

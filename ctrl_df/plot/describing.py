@@ -7,7 +7,7 @@ import warnings
 import control as ct
 import numpy as np
 
-from ..limit_cycles.predict import DescribingFunctionResponse, describing_function_response
+from ..limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
 from .curves import (
     CROSSING_COLOR,
     NYQUIST_COLOR,

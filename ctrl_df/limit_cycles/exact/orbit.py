@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import control as ct
 import numpy as np
 
-from ..drawing import draw
-from ..simulate.engine import Event
-from ..status import Status
+from ...drawing import draw
+from ...simulate.engine import Event
+from ...status import Status
 
 
 @dataclass(frozen=True, eq=False)

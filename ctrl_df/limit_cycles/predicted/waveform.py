@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..blocks.mechanism import Mechanism
-from ..df.symmetries import Sizes, find_symmetries
-from ..simulate import layout
-from ..simulate.engine import Engine, harmonic_drive
+from ...blocks.mechanism import Mechanism
+from ...df.symmetries import Sizes, find_symmetries
+from ...simulate import layout
+from ...simulate.engine import Engine, harmonic_drive
 
 # Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..df.family import Family
+from ...df.family import Family
 from .answer import jumps, responder
 from .bound import mees_bergen
 from .branches import BranchCrossing

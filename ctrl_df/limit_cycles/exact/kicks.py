@@ -7,9 +7,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..blocks.core import level
-from ..blocks.element import Element
-from ..simulate.sampled import Sampled
+from ...blocks.core import level
+from ...blocks.element import Element
+from ...simulate.sampled import Sampled
 
 FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)  # of the scale, in the order tried
 _DECADES = np.arange(-40.0, 41.0)  # over which a smooth law is asked where it bends

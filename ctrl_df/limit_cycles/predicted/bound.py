@@ -7,7 +7,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..blocks.primitives import PiecewiseAffine
+from ...blocks.primitives import PiecewiseAffine
 
 _HARMONICS = np.arange(3, 62, 2)
 _WINDOWS = (0.1, 0.4, 1.2)  # half widths tried, in ln a and ln omega

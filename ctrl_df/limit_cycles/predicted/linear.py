@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import is_number, number, real_array, shown
+from ...checks import is_number, number, real_array, shown
 
 _SMOOTH_STEP = 0.5 * math.pi  # largest phase step between data points for which their phase is followed [rad]
 

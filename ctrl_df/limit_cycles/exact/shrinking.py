@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arclength import correction, tangent
+from ...arclength import correction, tangent
 from .closing import CLOSED, Closing, NoClosure
 from .orbit import Orbit
 from .symmetry import shift_directions

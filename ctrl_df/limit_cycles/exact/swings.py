@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..blocks.element import Element
-from ..simulate import driver
-from ..simulate.engine import Engine, State
-from ..simulate.layout import DELAY, H_OUT, KIND, X
-from ..status import Status
+from ...blocks.element import Element
+from ...simulate import driver
+from ...simulate.engine import Engine, State
+from ...simulate.layout import DELAY, H_OUT, KIND, X
+from ...status import Status
 from .kicks import Kicks
 
 _WORK = 300_000  # integration steps of one simulation

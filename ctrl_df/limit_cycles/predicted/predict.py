@@ -8,11 +8,11 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
-from ..df.describing import _amplitudes, describing_function_family, quiet_describing_function
-from ..df.dispatch import method_for
-from ..df.family import Family, minus_inverse
-from ..df.work import progress_bar
-from ..drawing import draw
+from ...df.describing import _amplitudes, describing_function_family, quiet_describing_function
+from ...df.dispatch import method_for
+from ...df.family import Family, minus_inverse
+from ...df.work import progress_bar
+from ...drawing import draw
 from .assess import Assessor
 from .branches import branch_crossings
 from .crossings import Scan, find_crossings, merged, real_crossings

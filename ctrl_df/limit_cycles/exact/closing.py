@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..simulate.engine import Engine, Event
-from ..simulate.layout import AUX, KIND, MECHANISM, MODE
-from ..status import Status
+from ...simulate.engine import Engine, Event
+from ...simulate.layout import AUX, KIND, MECHANISM, MODE
+from ...status import Status
 from .monodromy import RTOL, Tracer
 from .multiple_shooting import shoot
 from .orbit import Orbit

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ..df.dispatch import Method
-from ..df.family import Family
-from ..df.points import points
+from ...df.dispatch import Method
+from ...df.family import Family
+from ...df.points import points
 from .linear import LinearPart
 
 _AMPLITUDES = {"element": 480, "law": 160}  # at least: steps of a quantizer put two crossings within 4 %

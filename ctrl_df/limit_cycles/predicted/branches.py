@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..df.branch import Branch
-from ..df.points import points
+from ...df.branch import Branch
+from ...df.points import points
 from .crossings import Crossing, find_crossings
 from .scan_grid import refined_omega
 

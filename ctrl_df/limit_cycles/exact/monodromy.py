@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ..simulate import driver, layout
-from ..simulate.engine import Drive, Engine, State, constant_drive
-from ..simulate.look import jump, look
-from ..status import Status
+from ...simulate import driver, layout
+from ...simulate.engine import Drive, Engine, State, constant_drive
+from ...simulate.look import jump, look
+from ...status import Status
 
 RTOL = 1e-11
 _REACH = 1e-6  # of a lap: the time over which rates of inputs are taken

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import control as ct
 import numpy as np
 
-from ..blocks.element import Element
-from ..blocks.primitives import PiecewiseAffine, Play, Quantizer
-from ..df.dispatch import Method
+from ...blocks.element import Element
+from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
+from ...df.dispatch import Method
 from .waveform import WaveformOrbit
 
 SAMPLES = 2048

@@ -21,8 +21,8 @@ from enum import Enum
 
 import numpy as np
 
-from ..simulate.engine import State
-from .arclength import correction, tangent
+from ...arclength import correction, tangent
+from ...simulate.engine import State
 
 _CLOSED = 1e-7  # defect, relative to the fundamental, of a point on the curve
 _NUDGE = 1e-5  # of the difference quotients; all unknowns are relative
@@ -84,7 +84,7 @@ def follow_path(respond: Callable, harmonics: int, linear, amplitude, omega) -> 
     Parameters
     ----------
     respond : callable
-        As `ctrl_df.limit_cycles.answer.responder` returns it.
+        As `ctrl_df.limit_cycles.predicted.answer.responder` returns it.
     harmonics : int
         Highest harmonic kept.
     linear : LinearPart
