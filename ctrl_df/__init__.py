@@ -65,6 +65,7 @@ _LAZY = {
     "diagnose": "identify.diagnose",
     "improve": "identify.improve",
     "warm_up": "warm",
+    "show_versions": "versions",
 }
 
 __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
@@ -104,6 +105,8 @@ __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name):
+    if name == "__version__":
+        return _import_module(".versions", __name__).version()
     if name in _LAZY:
         value = getattr(_import_module(f".{_LAZY[name]}", __name__), name)
         globals()[name] = value

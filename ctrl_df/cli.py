@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 
 from .checks import place_to_write
 from .model_file import EXAMPLE, ModelFile, read_model
+from .versions import version
 
 BAD_INPUT = 2
 
@@ -20,7 +22,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, or 2 for unusable input (one line on stderr)."""
     options = _parser().parse_args(argv)
     try:
-        return options.run(options)
+        code = options.run(options)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # whoever reads has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except (ValueError, TypeError, OSError, RuntimeError) as error:
         print(f"ctrl-df: error: {' '.join(str(error).split())}", file=sys.stderr)
         return BAD_INPUT
@@ -36,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog="MODEL.toml, all sections:\n\n" + EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="version", version=f"ctrl-df {version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     shape: dict[str, Any] = dict(epilog=parser.epilog, formatter_class=argparse.RawDescriptionHelpFormatter)
 

@@ -12,6 +12,7 @@ import control as ct
 import numpy as np
 
 from ..checks import known_name, mapping, number, shown, system_name
+from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
@@ -174,6 +175,17 @@ class Mechanism(ct.NonlinearIOSystem):
     def __repr__(self) -> str:
         inertias = ", ".join(f"{k}={v:g}" for k, v in self._values.items())
         return f"{type(self).__name__}({inertias})" + "".join(f".with_effect({e})" for e in self._effects)
+
+    def __str__(self) -> str:
+        signals = ", ".join(f"{name} [{unit}]" for name, unit in self.signals.items())
+        return f"{type(self).__name__} {self.name}: {signals}\n{self._table()}"
+
+    def _repr_html_(self) -> str:
+        return self._table()._repr_html_()
+
+    def _table(self) -> Table:
+        rows = ((k, f"{p.value:g}", p.unit, p.meaning) for k, p in self.parameters.items())
+        return Table(("parameter", "value", "unit", "meaning"), tuple(rows))
 
     # --- the dialect of python-control -------------------------------------------------------------------
 

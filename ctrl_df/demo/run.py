@@ -8,9 +8,9 @@ from pathlib import Path
 
 import matplotlib
 
+from ..table import Table
 from .findings import Finding, find
 from .systems import paper_loops
-from .table import wrapped_table
 
 WIDTHS = (22, 36, 36, 34)
 
@@ -44,7 +44,7 @@ def run(folder: Path) -> list[Path]:
         claim, predicted, exact, simulated = finding.cells()
         rows.append((f"{loop.title}:\n{claim}", predicted, exact, simulated))
     head = ("paper's claim", "describing function", "exact", "simulated")
-    print(wrapped_table(head, rows, WIDTHS))
+    print(Table(head, tuple(rows), WIDTHS))
     print("\nWhere the paper holds, and where it does not:")
     lessons: dict[str, list[str]] = {}
     for loop in paper_loops():

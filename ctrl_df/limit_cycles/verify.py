@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
-
 import numpy as np
 
 from ..checks import unknown_keywords
@@ -12,6 +9,7 @@ from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
 from .arguments import check_search
+from .check import Check, Row, in_band
 from .exact.fate import Fate
 from .exact.known import KnownOrbits
 from .exact.orbit import NoOrbit, Orbit
@@ -29,137 +27,6 @@ _UNHELD = "Newton from the motion it stands on closes no orbit near"
 # Within 5 % in frequency and amplitude a prediction is called confirmed; beyond that it is the same cycle,
 # shifted.
 CONFIRMED_WITHIN = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """One cycle: predicted, exact, simulated.
-
-    Attributes
-    ----------
-    predicted : LimitCycle or None
-        None for a cycle the describing function missed.
-    exact : Orbit or None
-        The orbit found from the prediction, or by the search; None for loops with a pure delay. Of a sampled
-        loop it holds averages (its ``stable`` is None).
-    simulated : tuple of (omega, output amplitude) or None
-        What a simulation started beside the orbit settles to; None where it leaves (an unstable orbit).
-    verdict : str
-        ``confirmed``, ``shifted``, ``no such orbit`` (shown), ``not found`` (which shows nothing), ``missed
-        by the describing function``, ``not tested``.
-    why : str
-        What the verdict rests on where there is no exact orbit to rest on: with which prediction this one
-        merges, or what was tried and how each try ended.
-    motion : Orbit or None
-        Where the simulation alone judges (a pure delay): the motion it settles to, averaged over its swings.
-    """
-
-    predicted: LimitCycle | None
-    exact: Orbit | None
-    simulated: tuple[float, float] | None
-    verdict: str
-    why: str = ""
-    motion: Orbit | None = None
-
-    @property
-    def omega_error(self) -> float:
-        """Relative error of the predicted frequency; nan without a pair."""
-        return self._error("omega")
-
-    @property
-    def amplitude_error(self) -> float:
-        """Relative error of the predicted amplitude at the block's input; nan without a pair."""
-        return self._error("amplitude")
-
-    @property
-    def in_band(self) -> bool | None:
-        """Whether the stated error bands hold the true answer; None without a pair."""
-        truth = self.exact or self.motion
-        if self.predicted is None or truth is None:
-            return None
-        return _in_band(self.predicted, truth)
-
-    def _error(self, name):
-        truth = self.exact or self.motion
-        if self.predicted is None or truth is None:
-            return float("nan")
-        return getattr(self.predicted, name) / getattr(truth, name) - 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Check:
-    """Predictions of one loop beside the truth.
-
-    Attributes
-    ----------
-    rows : tuple of Row
-        One a cycle, predicted ones first.
-    orbits : list of Orbit
-        All exact orbits found, those the prediction missed included; none for loops with a pure delay.
-    note : str
-        What could not be tested, and why.
-    fate : Fate
-        What the loop does from the starts simulated: a row a start, ``rests``, ``cycles`` (on which orbit) or
-        ``diverges``, and the sizes at which that changes.
-    """
-
-    rows: tuple[Row, ...]
-    orbits: list[Orbit]
-    note: str = ""
-    loop: Any = field(repr=False, default=None)
-    fate: Fate = field(default_factory=Fate)
-
-    def table(self) -> str:
-        """Return the rows as text: predicted | exact | simulated, errors and verdict."""
-        head = (
-            "predicted a @ w",
-            "exact a @ w",
-            "multiplier",
-            "simulated y @ w",
-            "error a",
-            "error w",
-            "grade",
-            "verdict",
-            "why",
-        )
-        lines: list[tuple[str, ...]] = [head]
-        for row in self.rows:
-            p, e, s = row.predicted, row.exact, row.simulated
-            lines.append(
-                (
-                    f"{p.amplitude:.6g} @ {p.omega:.6g}" if p else "-",
-                    f"{e.amplitude:.7g} @ {e.omega:.7g}" if e else "-",
-                    _multiplier(e),
-                    f"{s[1]:.4g} @ {s[0]:.6g}"
-                    if s
-                    else ("leaves" if e is not None and e.stable is False else "-"),
-                    _percent(row.amplitude_error),
-                    _percent(row.omega_error),
-                    p.grade if p else "-",
-                    row.verdict,
-                    row.why,
-                )
-            )
-        if len(lines) == 1:
-            lines.append(
-                ("no cycle", "no orbit found", "-", "-", "-", "-", "-", "none predicted, none found", "")
-            )
-        if not any(row.why for row in self.rows):
-            lines = [line[:-1] for line in lines]
-        widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
-        text = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in lines]
-        text.insert(1, "  ".join("-" * w for w in widths))
-        fate = [f"simulated {self.fate}."] if len(self.fate) else []
-        return "\n".join(text + fate + ([self.note] if self.note else []))
-
-    def __str__(self) -> str:
-        return self.table()
-
-    def __iter__(self):
-        return iter(self.rows)
-
-    def __len__(self) -> int:
-        return len(self.rows)
 
 
 def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Check:
@@ -289,7 +156,7 @@ def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
     for cycle in cycles:
         for orbit in orbits:
             own = led.get(id(cycle)) is orbit
-            if own or _close(cycle, orbit) or _in_band(cycle, orbit):
+            if own or _close(cycle, orbit) or in_band(cycle, orbit):
                 distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(
                     np.log(cycle.amplitude / orbit.amplitude)
                 )
@@ -338,21 +205,3 @@ def simulated(
 def _close(cycle: LimitCycle, orbit: Orbit) -> bool:
     ratio_w, ratio_a = cycle.omega / orbit.omega, cycle.amplitude / orbit.amplitude
     return max(ratio_w, 1 / ratio_w) <= SAME_CYCLE[0] and max(ratio_a, 1 / ratio_a) <= SAME_CYCLE[1]
-
-
-def _in_band(cycle: LimitCycle, orbit: Orbit) -> bool:
-    low_w, high_w = cycle.omega_band
-    low_a, high_a = cycle.amplitude_band
-    return bool(low_w <= orbit.omega <= high_w and low_a <= orbit.amplitude <= high_a)
-
-
-def _multiplier(orbit) -> str:
-    if orbit is None:
-        return "-"
-    if orbit.stable is None:
-        return "irregular"
-    return f"{orbit.multiplier:.5g} {'stable' if orbit.stable else 'unstable'}"
-
-
-def _percent(value) -> str:
-    return "-" if np.isnan(value) else f"{100 * value:+.2f} %"

@@ -38,6 +38,16 @@ class EventResponse(ct.TimeResponseData):
     status: Status
     propagated: int = 0
 
+    def __repr__(self) -> str:
+        """Return what was simulated: signals, span, events."""
+        signals = ", ".join(map(str, self.output_labels or ()))
+        span = (
+            f"{self.time[0]:g} to {self.time[-1]:g} s, {len(self.time)} times"
+            if len(self.time)
+            else "no time"
+        )
+        return f"<EventResponse of {signals}: {span}, {self.event_count} events, {self.status.name.lower()}>"
+
 
 def event_response(
     sys,

@@ -62,6 +62,11 @@ class Orbit:
     loop: Any = field(repr=False, default=None)
     note: str = ""
 
+    def __repr__(self) -> str:
+        """Return amplitude, frequency and stability."""
+        stable = {True: "stable", False: "unstable", None: "irregular"}[self.stable]
+        return f"<Orbit: {self.amplitude:.7g} @ {self.omega:.7g} rad/s, {stable}>"
+
     @property
     def peak(self) -> float:
         """Half of the peak-to-peak swing of the first output."""

@@ -103,6 +103,11 @@ class LimitCycle:
     forced_multiplier: float = math.nan
     motion: ForcedMotion | None = field(default=None, repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        """Return amplitude, frequency, stability and grade."""
+        stable = {True: "stable", False: "unstable", None: "stability unknown"}[self.stable]
+        return f"<LimitCycle: {self.amplitude:.5g} @ {self.omega:.5g} rad/s, {stable}, {self.grade}>"
+
     @property
     def period(self) -> float:
         """2 pi / omega [s]."""

@@ -13,6 +13,7 @@ from ...df.dispatch import method_for
 from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
 from ...drawing import draw
+from ...table import Table, frame, without_empty
 from .assess import Assessor
 from .branches import branch_crossings
 from .crossings import Scan, find_crossings, merged, real_crossings
@@ -74,6 +75,32 @@ class DescribingFunctionResponse(_PythonControlResponse):
     def plot(self, **kwargs) -> ct.ControlPlot:
         """Draw the Nyquist plot with the -1/N curves; see `describing_function_plot`."""
         return draw("analysis", self, **kwargs)
+
+    def table(self) -> Table:
+        """Return the predicted limit cycles, a row each."""
+        return without_empty(
+            ("amplitude", "omega", "corrected", "stable", "grade", "why"),
+            [
+                (
+                    f"{c.amplitude:.5g}",
+                    f"{c.omega:.5g}",
+                    "{:.5g} @ {:.5g}".format(*c.corrected) if c.corrected else "",
+                    {True: "yes", False: "no", None: "unknown"}[c.stable],
+                    c.grade,
+                    c.why,
+                )
+                for c in self.limit_cycles
+            ],
+        )
+
+    def to_pandas(self):
+        """Return the predicted limit cycles as a pandas DataFrame."""
+        names = ("amplitude", "output_amplitude", "omega", "stable", "corrected", "distortion", "omega_band")
+        names += ("amplitude_band", "grade", "why", "regime", "branch")
+        return frame({name: getattr(c, name) for name in names} for c in self.limit_cycles)
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_()
 
     def __repr__(self) -> str:
         """Return the status."""
