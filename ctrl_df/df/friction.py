@@ -127,7 +127,7 @@ def _require(name, value, lower, strict=False, upper=math.inf, remedy="Check the
         raise ValueError(f"a family needs {rule}; got {name}={value!r}. {remedy}")
 
 
-@njit(cache=True)
+@njit(nogil=True)
 def _family(M, K, B, Ks, amplitudes, frequencies, harmonics, regime, residual):
     nw = frequencies.size
     half = np.empty((nw, 3))

@@ -15,7 +15,7 @@ from .shooting import CLOSED, close
 from .shot import coordinates, place
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def sweep(
     shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
     rtol, hmax, budget, out, ends, miss, kinds, still,

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..checks import executor as checked_executor
+from ..simulate.runs import processors
 from .dispatch import Method, _Guarded
 from .executors import by_executor, check_picklable
 from .family import FORMAT, Family, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
+from .threads import Threads
 
 LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
@@ -95,8 +97,10 @@ class Work:
             self._take(part, values)
             bar.update(len(part))
 
-        method = self.method
+        method, threads = self.method, None
         try:
+            if executor is None:
+                executor = threads = self._threads(len(parts))
             if executor is None or (method.name == "memory" and copied(method) is method):
                 for part in parts:
                     take(part, compute_part(method, *self._grid(part), self.orders))
@@ -104,12 +108,21 @@ class Work:
                 tasks = ((part, (copied(method), *self._grid(part), self.orders)) for part in parts)
                 by_executor(executor, compute_part, tasks, take, self._kept)
         except BaseException:
+            if threads is not None:
+                threads.stop()
             if self.journal is not None and not self.done.any():
                 self.journal.close()
                 self.journal.path.unlink(missing_ok=True)  # nothing in it
             raise
         finally:
             bar.close()
+
+    def _threads(self, parts: int) -> Threads | None:
+        """Return threads for compiled work of so many parts; None where it is soon done, or calls Python."""
+        count = min(processors(), parts)
+        if count < 2 or not self.method.compiled():
+            return None
+        return Threads(count)
 
     def _parts(self, spread) -> list[np.ndarray]:
         """Lines still to do, in parts; the numbers do not depend on how they are cut.
