@@ -15,12 +15,11 @@ import numpy as np
 
 from ..blocks.mechanism import Mechanism
 from ..simulate import layout
-from ..simulate.engine import State, harmonic_drive
+from ..simulate.engine import State
 from ..status import Status
 from .far_newton import close_far
+from .line import Line
 from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
-from .sweep import sweep
-from .threads import go_on
 
 ORBIT_REGIMES = (
     "slip",
@@ -48,7 +47,6 @@ wider (NaN)."""
 _WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 _EVEN = 1e-2  # a motion that repeats so much better after two half periods than after one is not symmetric
-_AT_ONCE = 64  # points of a line between two chances to interrupt it
 
 
 def orbit_family(
@@ -152,11 +150,7 @@ class OrbitSolver(OrbitSearch):
         """Solve consecutive points, compiled as long as they close, one by one where they do not."""
         orders, n = harmonics.shape[-1] - 1, len(A)
         self._acquaint(A[n // 2], omega[n // 2], whatever_before=True)
-        out = np.zeros((n, self.row + 1, orders + 1), complex)
-        ends, miss = np.zeros((n, 2, self.row + 1)), np.zeros(n)
-        kinds, still = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        samples, scratch = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros((1, 2), complex)
-        power, past = self.symmetries.power, np.zeros((4, max(self.engine.nstates, 1)))
+        line, power = Line(self, A, omega, orders), self.symmetries.power
         p = 0
         if self.previous is not None and self.first is not None:  # the line before starts where this one does
             x, mode, units = self.first
@@ -174,39 +168,23 @@ class OrbitSolver(OrbitSearch):
             p += 1
             if p == n or self.previous is None or not self.simple:
                 continue
-            units = A[p - 1] / omega[p - 1] ** power
-            past[0, : len(units)] = self.previous.x / units
-            past[3, 0] = 0.02
-            mode = self.previous.mode.copy()
-            done, known, goes_on = 0, 1, True
-            while goes_on and p + done < n:  # compiled code hears no Ctrl-C: some points at a time
-                one, end = p + done, min(p + done + _AT_ONCE, n)
-                more, _, known = sweep(
-                    self.shot, samples, scratch, A[one:end], omega[one:end], power, past, mode, known,
-                    self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end], ends[one:end],
-                    miss[one:end], kinds[one:end], still[one:end],
-                )  # fmt: skip
-                go_on()
-                self._raise_if_raised()
-                done, goes_on = done + more, one + more == end
+            done = line.close(p)
             some = slice(p, p + done)
             y = self._coefficients(
-                out[some, self.row], ends[some, :, self.row], 1, self.mirrored, omega[some]
+                line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]
             )
             finished = self._turned(y, omega[some]) / A[some, None]
             for q in range(p, p + done):
-                self.kinds, self.still = int(kinds[q]), bool(still[q])
-                name = self._name(y[q - p], ends[q, :, self.row], miss[q])
+                self.kinds, self.still = int(line.kinds[q]), bool(line.still[q])
+                name = self._name(y[q - p], line.ends[q, :, self.row], line.miss[q])
                 if name in ("stuck", "free"):  # these need a second look
                     done = q - p
                     break
                 harmonics[row[q], column[q]] = finished[q - p]
-                regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], miss[q]
+                regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], line.miss[q]
             if done:
                 p += done
-                self.previous = State(
-                    0.0, past[0, : len(units)] * A[p - 1] / omega[p - 1] ** power, mode.copy()
-                )
+                self.previous = line.state(p - 1)
 
     def solve_from(self, state, A: float, omega: float, orders: int):
         """`solve`, from a state of the caller's, or from rest (None), whatever was solved before."""
@@ -313,9 +291,9 @@ class OrbitSolver(OrbitSearch):
 
     def _apart(self, y, shots):
         """Changes over so many shots of the coordinates that have to repeat, in their sizes."""
-        s = self.symmetries
-        steps, wrap = y[shots:] - y[:-shots], np.where(s.wrap > 0, s.wrap, np.inf)
-        steps[:, s.wrap > 0] -= (np.round(steps / wrap) * wrap)[:, s.wrap > 0]
+        s, steps = self.symmetries, y[shots:] - y[:-shots]
+        wrap = np.where(s.wrap > 0, s.wrap, 1.0)
+        steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)
         return (steps / np.maximum(np.max(np.abs(y), axis=0), 1e-300))[:, s.free]
 
     def _slow(self, y):

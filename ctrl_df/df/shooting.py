@@ -23,6 +23,7 @@ CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
 
 TOLERANCE = 3e-10  # error of an orbit's state, relative to its size
+SHOTS = 20  # for one orbit, beside those for Jacobians: while it comes nearer, no other start is cheaper
 NOISE = 4.0  # errors in tolerances of a shot below which it is the shots that differ, not the states
 ROUGHLY = 1e-7  # tolerance of shots far from the orbit
 
@@ -165,9 +166,10 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
             if y0[i] != y1[i]:
                 moved = False  # clipped
         # errors shrink by the same ratio once more, or faster
-        expected = miss * min(miss / previous, 0.1) if previous < math.inf else 1e-2 * miss
+        ratio = min(miss / previous, 0.1) if previous < math.inf else 0.01
+        take = take or ratio * miss < TOLERANCE
+        expected = miss * min(ratio, 0.01)
         previous = miss
-        take = take or expected < TOLERANCE
     return OPEN, best
 
 

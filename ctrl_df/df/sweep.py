@@ -11,7 +11,7 @@ from ..simulate.compiled import njit, part
 from ..simulate.driver import copy
 from ..simulate.layout import Drive
 from ..simulate.views import lean
-from .shooting import CLOSED, close
+from .shooting import CLOSED, SHOTS, close
 from .shot import coordinates, place
 
 
@@ -55,7 +55,7 @@ def sweep(
         shot.tally[0] = 0
         outcome, miss[p] = close(
             shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol, 0.0,
-            hmax * period, out[p], budget, 12, eager,
+            hmax * period, out[p], budget, SHOTS, eager,
         )  # fmt: skip
         past[3, 0] = min(shot.clock[2] / period, 0.1)
         if outcome != CLOSED:
