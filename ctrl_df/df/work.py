@@ -56,9 +56,9 @@ class Work:
         require_room(*shape, orders)
         self.save = None if save is None else place_for(save)
         self.fingerprint = "" if save is None else self._fingerprint()
-        self.harmonics = np.empty((*shape, orders + 1), dtype=complex)
-        self.regime = np.empty(shape, dtype=_REGIME)
-        self.residual = np.empty(shape)
+        self._shape = shape
+        self.harmonics = np.empty((0, 0, orders + 1), dtype=complex)  # until the first part is there
+        self.regime, self.residual = np.empty((0, 0), dtype=_REGIME), np.empty((0, 0))
         # along amplitudes one orbit starts the next: keep columns whole
         self.by_omega = method.name == "orbit"
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
@@ -140,11 +140,17 @@ class Work:
         return (self.A, self._omega[part]) if self.by_omega else (self.A[part], self.omega)
 
     def _take(self, part, values):
-        where = (slice(None), part) if self.by_omega else part
         y, regime, residual = values
-        if regime.dtype.itemsize > self.regime.dtype.itemsize:
-            self.regime = self.regime.astype(regime.dtype)
-        self.harmonics[where], self.regime[where], self.residual[where] = y, regime, residual
+        if len(part) == self.done.size and all(array.flags.writeable for array in values):
+            self.harmonics, self.regime, self.residual = values  # all of it: nothing to put together
+        else:
+            if not self.residual.size:
+                self.harmonics = np.empty((*self._shape, self.orders + 1), dtype=complex)
+                self.regime, self.residual = np.empty(self._shape, _REGIME), np.empty(self._shape)
+            where = (slice(None), part) if self.by_omega else part
+            if regime.dtype.itemsize > self.regime.dtype.itemsize:
+                self.regime = self.regime.astype(regime.dtype)
+            self.harmonics[where], self.regime[where], self.residual[where] = y, regime, residual
         self.done[part] = True
         if self.journal is not None:
             self.journal.append(lines=part, harmonics=y, regime=regime, residual=residual)
