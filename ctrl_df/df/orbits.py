@@ -290,7 +290,7 @@ class OrbitSolver(OrbitSearch):
         return bool(twice < _EVEN * once and once > _EVEN)
 
     def _apart(self, y, shots):
-        """Changes over so many shots of the coordinates that have to repeat, in their sizes."""
+        """Return changes over so many shots of the coordinates that have to repeat, in their sizes."""
         s, steps = self.symmetries, y[shots:] - y[:-shots]
         wrap = np.where(s.wrap > 0, s.wrap, 1.0)
         steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)

@@ -78,7 +78,11 @@ def strides(
     none, counts, drive = np.zeros(1), np.zeros(1, np.int64), constant_drive(np.zeros(engine.ninputs))
     times, seen = np.zeros(_PEEKS), (np.zeros((_PEEKS, n)), np.zeros((_PEEKS, engine.noutputs)))
     spectrum, last = np.zeros((engine.noutputs, 0), complex), np.array([0.0, 0.0, 0.0, float(now.fresh)])
-    ends, states, numbers = np.zeros((together, 2)), np.zeros((together, n)), np.zeros((together, 2), np.int64)
+    ends, states, numbers = (
+        np.zeros((together, 2)),
+        np.zeros((together, n)),
+        np.zeros((together, 2), np.int64),
+    )
     budget = max(int(_AT_ONCE / (1 + (n / 6) ** 2)), 10)
     while clock[0] < limit:
         pointers.raised.clear()
@@ -96,9 +100,7 @@ def strides(
             if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < FAR:
                 raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
             passed = reason == driver.SECTION
-            yield Stride(
-                float(ends[i, 0]), x, passed, float(ends[i, 1]), int(numbers[i, 1]), STATUS[reason]
-            )
+            yield Stride(float(ends[i, 0]), x, passed, float(ends[i, 1]), int(numbers[i, 1]), STATUS[reason])
 
 
 @njit(error_model="numpy", nogil=True)
