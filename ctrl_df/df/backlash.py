@@ -246,7 +246,7 @@ def _same(one, other, tol):
 # --- the family in dimensionless form ---------------------------------------------------------------------
 
 
-@njit(cache=True)
+@njit(nogil=True)
 def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
     """Fill X_k/a in units of 1/((M1 + M2) omega^2) for a row of A."""
     mean = np.zeros(harmonics.shape[1], dtype=np.complex128)

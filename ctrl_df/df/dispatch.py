@@ -86,6 +86,15 @@ class Method:
             y = y * (1j * np.arange(orders + 1) * omega[:, None]) ** self.order
         return y, regime, residual
 
+    def compiled(self) -> bool:
+        """Whether all the work is compiled code, fit for threads; what it needs is compiled thereafter."""
+        if self.name != "orbit":
+            return self.name in ("friction", "backlash")
+        from . import orbits
+
+        engine = orbits.solver_for(self.subject, self.output, **self.options).engine
+        return not engine.calls_python
+
     def brief(self) -> Method:
         """Return the method with short averages over irregular motion, for who has no use for them."""
         return replace(self, options={"periods": 8}) if self.name == "backlash" else self

@@ -15,12 +15,16 @@ from ..status import Status
 from . import shooting
 from .linear_orbit import linear_orbit
 from .shooting import CLOSED, SPENT, close_orbit
-from .shot import make_shot, set_state, shoot
+from .shot import follow, make_shot, set_state, shoot
 from .symmetries import Probe, Sizes, find_symmetries
+from .threads import go_on
 
 RTOL = 5e-10
 _FAMILIAR = 1e3  # factor between sizes of motion for which laws need not be asked anew
+_BINS = 2  # decades of force and of frequency: within them sizes, up to A / omega^2, differ by _FAMILIAR
 _COARSE = 1e-7  # tolerance while a transient is followed
+_AT_ONCE = 64  # shots between two chances to interrupt them
+_START = 0.02  # of a period: first step of a shot
 LONGEST = 12  # periods of a subharmonic motion that is recognised
 BLOCKS = 8  # an average's spread is estimated from that many parts
 BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
@@ -74,36 +78,50 @@ class OrbitSearch:
         self.atol = 0.0
         self.previous: State | None = None
         self._given: State | None = None
-        self._ask(Sizes.ones(self.engine.nstates))
+        self._about: tuple | None = None
+        self._answers: dict[tuple, tuple] = {}
+        self.sizes = Sizes.ones(self.engine.nstates)
+        self._ask(self.sizes)
+        self.forget()
 
     def _ask(self, sizes: Sizes):
         """Find the symmetries of the laws for motions of such sizes, and what follows from them."""
-        self.sizes = sizes
         self.symmetries = s = find_symmetries(self.engine, self.block, sizes)
         self._check(s)
         self.symmetric = s.odd
         self.shot = make_shot(self.engine, s, self.row + 1)
-        self.free_row = self._row_is_free(s)
+        self.free_row = self._row_is_free(s, sizes)
         self.linear = linear_orbit(self.engine, s, self.row, self.free_row)
-        self.forget()
 
-    def _acquaint(self, A, omega):
-        """Ask the laws again where a motion is of another size than the one they were asked about."""
-        states = self._motion(A, omega)
-        sizes = Sizes(states, float(A), float(omega))
-        if sizes.near(self.sizes, _FAMILIAR):
+    def _acquaint(self, A, omega, whatever_before=False):
+        """Ask the laws about motions of this size, unless they were asked about ones not far from it.
+
+        With `whatever_before` what they were asked before makes no difference: answers do not depend on it.
+        """
+        if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), _FAMILIAR):
             return
-        # states that belong to no mechanism are as large as they get in a few periods
-        run = self.engine.run(
-            self.engine.start(), 6 * np.pi / omega, harmonic_drive([[0.0, A]], omega), max_steps=20_000
-        )
-        seen = np.maximum(np.abs(run.state.x), self.shot.space.size)
-        pointers.raised.clear()
-        if np.all(np.isfinite(seen)):
-            states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
-        sizes = Sizes(states, float(A), float(omega))
-        if not sizes.near(self.sizes, _FAMILIAR):
-            self._ask(sizes)
+        about = tuple(_BINS * np.round(np.log10([A, omega]) / _BINS))
+        if about == self._about:
+            return
+        self._about = about
+        if about not in self._answers:
+            force, rate = (float(10.0**x) for x in about)
+            states = self._motion(force, rate)
+            # states that belong to no mechanism are as large as they get in a few periods
+            run = self.engine.run(
+                self.engine.start(), 6 * np.pi / rate, harmonic_drive([[0.0, force]], rate), max_steps=20_000
+            )
+            seen = np.maximum(np.abs(run.state.x), self.shot.space.size)
+            pointers.raised.clear()
+            if np.all(np.isfinite(seen)):
+                states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
+            self._ask(Sizes(states, force, rate))
+            kept = (self.symmetries, self.symmetric, self.shot, self.free_row, self.linear)
+            self._answers[about] = (Sizes(self._motion(force, rate), force, rate), *kept)
+        self.sizes, self.symmetries, self.symmetric, self.shot, self.free_row, self.linear = self._answers[
+            about
+        ]
+        self.forget()
 
     def _motion(self, A, omega):
         """Return the size of each state in the motion of a free inertia under the force."""
@@ -147,11 +165,11 @@ class OrbitSearch:
     def _rates(self, x, force=0.0):
         return Probe(self.engine).at(x, force)[0]
 
-    def _row_is_free(self, s):
+    def _row_is_free(self, s, sizes):
         """Whether the output described shifts with a free position."""
         probe, x = Probe(self.engine), np.zeros(self.engine.nstates)
         at_zero = probe.at(x, 0.0)[2][self.row]
-        size = self.sizes.states
+        size = sizes.states
         return any(probe.at(x + 3.7 * size * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
 
     def forget(self):
@@ -211,24 +229,40 @@ class OrbitSearch:
     def _follow(self, state, periods, rtol=_COARSE):
         """Return the state after some periods (twice as many shots where mirrored)."""
         state = state.copy()
-        for _ in range(periods * 2 if self.mirrored else periods):
-            self._shoot(state, rtol)
+        self._trail(state, periods * 2 if self.mirrored else periods, rtol)
         return state
+
+    def _trail(self, state, shots, rtol=RTOL):
+        """Coordinates before each of some shots of the state, in place."""
+        trail = np.empty((shots, len(state.x)))
+        for first in range(0, shots, _AT_ONCE):
+            reason, spent = follow(
+                self.shot, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
+                self._hmax(1) * self.period, _START * self.period, self.budget,
+                trail[first : first + _AT_ONCE],
+            )  # fmt: skip
+            self.budget -= spent
+            self._checked(reason, state)
+        return trail
+
+    def _checked(self, reason, state):
+        go_on()
+        self._raise_if_raised()
+        if reason != driver.DONE or self.budget <= 0 or not np.all(np.isfinite(state.x)):
+            raise self._stopped(reason, state)
 
     def _shoot(self, state, rtol=RTOL, periods=1, spectrum=None):
         """One shot of the state, in place."""
         shot = self.shot
         orders = 1 if spectrum is None else spectrum.shape[1] - 1
-        if not shot.clock[2] > 0.0 or shot.clock[2] > 0.1 * self.period:
-            shot.clock[2] = 0.02 * self.period
+        if not 0.0 < shot.clock[2] <= 5 * _START * self.period:
+            shot.clock[2] = _START * self.period
         reason = shoot(
             shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
             self._hmax(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum, self.budget,
         )  # fmt: skip
         self.budget -= int(shot.clock[3])
-        self._raise_if_raised()
-        if reason != driver.DONE or self.budget <= 0 or not np.all(np.isfinite(state.x)):
-            raise self._stopped(reason, state)
+        self._checked(reason, state)
         return int(shot.tally[2])
 
     def _span(self, periods):
@@ -239,12 +273,13 @@ class OrbitSearch:
         state, shot = state.copy(), self.shot
         spectrum = np.zeros((self.row + 1, orders + 1), complex)
         shot.jacobian[:] = np.nan
-        shot.clock[2] = 0.02 * self.period
+        shot.clock[2] = _START * self.period
         outcome, miss = close_orbit(
             shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, RTOL, self.atol,
             self._hmax(orders) * self.period, spectrum, self.budget, 24, False,
         )  # fmt: skip
         self.budget -= int(shot.clock[3]) * 4
+        go_on()
         self._raise_if_raised()
         if outcome == SPENT or outcome == shooting.FAILED:
             raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)

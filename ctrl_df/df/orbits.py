@@ -15,11 +15,11 @@ import numpy as np
 
 from ..blocks.mechanism import Mechanism
 from ..simulate import layout
-from ..simulate.engine import State, harmonic_drive
+from ..simulate.engine import State
 from ..status import Status
 from .far_newton import close_far
+from .line import Line
 from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
-from .sweep import sweep
 
 ORBIT_REGIMES = (
     "slip",
@@ -46,7 +46,7 @@ a load never touched; an undamped linear mechanism driven at its natural frequen
 wider (NaN)."""
 _WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
-_AT_ONCE = 64  # points of a line between two chances to interrupt it
+_EVEN = 1e-2  # a motion that repeats so much better after two half periods than after one is not symmetric
 
 
 def orbit_family(
@@ -97,7 +97,7 @@ def orbit_family(
     harmonics = np.full((len(A), len(omega), orders + 1), np.nan + 0j)
     regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int16)
     residual = np.full((len(A), len(omega)), np.nan)
-    solver = solver_for(block, output, transient=transient, averages=averages, max_steps=max_steps)
+    solver = solver_for(block, output, transient, averages, max_steps)
     a_order = np.argsort(A)[::-1]  # downwards: large motions are the simple ones
     w_order = np.argsort(omega)
     along_a = len(A) > 1
@@ -128,15 +128,16 @@ def _steady(means, sizes) -> bool:
 _kept = threading.local()
 
 
-def solver_for(block, output=None, **options) -> OrbitSolver:
+def solver_for(block, output=None, transient=4, averages=64, max_steps=1_000_000) -> OrbitSolver:
     """Return a solver, the one of the last call in this thread where it is for an equal block."""
-    key = (block, output, tuple(sorted(options.items())))
+    key = (block, output, transient, averages, max_steps)
     last = getattr(_kept, "last", None)
     if last is not None and last[0][1:] == key[1:]:
         known = last[0][0]
         if known is block or (isinstance(block, Mechanism) and known == block):
             return last[1]
-    _kept.last = (key, OrbitSolver(block, output, **options))
+    solver = OrbitSolver(block, output, transient=transient, averages=averages, max_steps=max_steps)
+    _kept.last = (key, solver)
     return _kept.last[1]
 
 
@@ -148,12 +149,8 @@ class OrbitSolver(OrbitSearch):
     def line(self, A, omega, harmonics, regime, residual, row, column):
         """Solve consecutive points, compiled as long as they close, one by one where they do not."""
         orders, n = harmonics.shape[-1] - 1, len(A)
-        self._acquaint(A[n // 2], omega[n // 2])
-        out = np.zeros((n, self.row + 1, orders + 1), complex)
-        ends, miss = np.zeros((n, 2, self.row + 1)), np.zeros(n)
-        kinds, still = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        samples, scratch = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros((1, 2), complex)
-        power, past = self.symmetries.power, np.zeros((4, max(self.engine.nstates, 1)))
+        self._acquaint(A[n // 2], omega[n // 2], whatever_before=True)
+        line, power = Line(self, A, omega, orders), self.symmetries.power
         p = 0
         if self.previous is not None and self.first is not None:  # the line before starts where this one does
             x, mode, units = self.first
@@ -171,39 +168,28 @@ class OrbitSolver(OrbitSearch):
             p += 1
             if p == n or self.previous is None or not self.simple:
                 continue
-            units = A[p - 1] / omega[p - 1] ** power
-            past[0, : len(units)] = self.previous.x / units
-            past[3, 0] = 0.02
-            mode = self.previous.mode.copy()
-            done, known, goes_on = 0, 1, True
-            while goes_on and p + done < n:  # compiled code hears no Ctrl-C: some points at a time
-                one, end = p + done, min(p + done + _AT_ONCE, n)
-                more, _, known = sweep(
-                    self.shot, samples, scratch, A[one:end], omega[one:end], power, past, mode, known,
-                    self.mirrored, RTOL, self._hmax(orders), self.max_steps, out[one:end], ends[one:end],
-                    miss[one:end], kinds[one:end], still[one:end],
-                )  # fmt: skip
-                self._raise_if_raised()
-                done, goes_on = done + more, one + more == end
+            done = line.close(p)
+            some = slice(p, p + done)
+            y = self._coefficients(
+                line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]
+            )
+            finished = self._turned(y, omega[some]) / A[some, None]
             for q in range(p, p + done):
-                self._aim(A[q], omega[q])
-                y = self._coefficients(out[q, self.row], ends[q, :, self.row], 1, self.mirrored)
-                self.kinds, self.still = int(kinds[q]), bool(still[q])
-                name = self._name(y, ends[q, :, self.row], miss[q])
+                self.kinds, self.still = int(line.kinds[q]), bool(line.still[q])
+                name = self._name(y[q - p], line.ends[q, :, self.row], line.miss[q])
                 if name in ("stuck", "free"):  # these need a second look
                     done = q - p
                     break
-                harmonics[row[q], column[q]] = self._finished(y, name)
-                regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], miss[q]
+                harmonics[row[q], column[q]] = finished[q - p]
+                regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], line.miss[q]
             if done:
                 p += done
-                self.previous = State(
-                    0.0, past[0, : len(units)] * A[p - 1] / omega[p - 1] ** power, mode.copy()
-                )
+                self.previous = line.state(p - 1)
 
     def solve_from(self, state, A: float, omega: float, orders: int):
         """`solve`, from a state of the caller's, or from rest (None), whatever was solved before."""
         self.previous = None
+        self._acquaint(A, omega, whatever_before=True)
         self._given = state
         try:
             return self.solve(A, omega, orders)
@@ -239,10 +225,14 @@ class OrbitSolver(OrbitSearch):
             orbit = self._periodic(self._follow(state, self.transient), orders=orders)
         if orbit is None:
             state = self._follow(state, 27)
-            slow = self._slow(self._trail(state, 5))
+            trail = self._trail(state, 5)
             orbit = self._periodic(state, orders=orders)
+            if orbit is None and self.symmetric and self._alternates(trail):
+                self.mirrored = False
+                orbit = self._periodic(state, orders=orders)
+                self.mirrored = orbit is None
             if orbit is None:
-                orbit = close_far(self, state, orders=orders, patient=slow)
+                orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
         if orbit is None and self.symmetric:
             self.mirrored = False
             state = self._follow(self._nudged(state), 40)
@@ -294,21 +284,21 @@ class OrbitSolver(OrbitSearch):
         error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
         return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
 
-    def _trail(self, state, shots):
-        """Coordinates before each of some shots of the state, in place."""
-        trail = []
-        for _ in range(shots):
-            trail.append(self.symmetries.transform @ state.x)
-            self._shoot(state)
-        return np.array(trail)
+    def _alternates(self, y):
+        """Whether a motion repeats after two of the shots it is followed by, and not after one."""
+        once, twice = (np.max(np.abs(self._apart(y, k)[-1]), initial=0.0) for k in (1, 2))
+        return bool(twice < _EVEN * once and once > _EVEN)
+
+    def _apart(self, y, shots):
+        """Return changes over so many shots of the coordinates that have to repeat, in their sizes."""
+        s, steps = self.symmetries, y[shots:] - y[:-shots]
+        wrap = np.where(s.wrap > 0, s.wrap, 1.0)
+        steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)
+        return (steps / np.maximum(np.max(np.abs(y), axis=0), 1e-300))[:, s.free]
 
     def _slow(self, y):
         """Whether a motion changes little, and steadily, from shot to shot: a transient, not chaos."""
-        s = self.symmetries
-        size = np.maximum(np.max(np.abs(y), axis=0), 1e-300)
-        steps = np.diff(y, axis=0)
-        steps -= np.where(s.wrap > 0, np.round(steps / np.where(s.wrap > 0, s.wrap, 1)) * s.wrap, 0)
-        steps = np.max(np.abs(steps / size)[:, s.free], axis=1, initial=0.0)[-4:]
+        steps = np.max(np.abs(self._apart(y, 1)), axis=1, initial=0.0)[-4:]
         return bool(np.max(steps) < 0.3 and np.max(steps) < 2 * np.min(steps))
 
     def _longer_period(self, state, y, orders):
@@ -350,33 +340,35 @@ class OrbitSolver(OrbitSearch):
 
     # --- what was found -------------------------------------------------------------------------------
 
-    def _coefficients(self, integrals, ends, periods, mirrored):
-        """Fourier coefficients from the integrals of a shot, free of a steady drift and of a free mean."""
-        k = np.arange(len(integrals))
+    def _coefficients(self, integrals, ends, periods, mirrored, omega=None):
+        """Fourier coefficients from the integrals of a shot, free of a steady drift and of a free mean.
+
+        The last axis of `integrals` are the harmonics, that of `ends` the start and the end; `omega`, the one
+        aimed at by default, may belong to many shots.
+        """
+        omega = np.asarray(self.omega if omega is None else omega)[..., None]
+        period, k = 2 * np.pi / omega, np.arange(integrals.shape[-1])
         if mirrored:
-            y = 4 / self.period * integrals
-            center = (ends[0] + ends[1]) / 2
+            y = 4 / period * integrals
+            center = ends.mean(axis=-1)
             # the integral of a constant over half a period is 2 / (j k omega)
-            y[1::2] -= 4 / self.period * 2 * center / (1j * k[1::2] * self.omega)
-            y[0::2] = 0.0
-            y[0] = center
+            y[..., 1::2] -= 4 / period * 2 * center[..., None] / (1j * k[1::2] * omega)
+            y[..., 0::2] = 0.0
+            y[..., 0] = center
         else:
-            y = integrals * 2 / (periods * self.period)
-            y[0] /= 2
-            y += self._ramp(ends, len(integrals) - 1, periods)
+            y = integrals * 2 / (periods * period)
+            drift = ends[..., 1] - ends[..., 0]
+            y[..., 0] = y[..., 0] / 2 - drift / 2
+            y[..., 1:] -= 1j * drift[..., None] / (np.pi * k[1:] * periods)
         if self.free_row:
-            y[0] = 0.0
+            y[..., 0] = 0.0
         return y
 
-    def _ramp(self, ends, orders, periods):
-        """Return what takes the ramp between the two ends out of the coefficients."""
-        k, drift = np.arange(1, orders + 1), ends[1] - ends[0]
-        return np.concatenate([[-drift / 2], -1j * drift / (np.pi * k * periods)])
-
-    def _turned(self, y):
+    def _turned(self, y, omega=None):
         """Delays turn the phase of every harmonic."""
-        y = y * np.exp(-1j * np.arange(len(y)) * self.omega * self.delay)
-        y[0] += 0.0 if self.free_row else self.offset
+        omega = np.asarray(self.omega if omega is None else omega)[..., None]
+        y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay)
+        y[..., 0] += 0.0 if self.free_row else self.offset
         return y
 
     def _finished(self, y, name):

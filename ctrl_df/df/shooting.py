@@ -23,9 +23,12 @@ CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
 
 TOLERANCE = 3e-10  # error of an orbit's state, relative to its size
+SHOTS = 20  # for one orbit, beside those for Jacobians: while it comes nearer, no other start is cheaper
+NOISE = 4.0  # errors in tolerances of a shot below which it is the shots that differ, not the states
+ROUGHLY = 1e-7  # tolerance of shots far from the orbit
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
     """`close`, from Python."""
     return close(
@@ -50,7 +53,7 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     fresh_jacobian = False
     moved = False  # `change` is the step that led to the present point, `last` the closing error before it
     previous, best = math.inf, math.inf
-    jacobians = 0
+    jacobians = sharp = 0
     take, centered = eager, False
     expected = 1e-2  # closing error of the shot to come
     for _ in range(shots):
@@ -58,11 +61,12 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
         copy(mode, m0)
         coordinates(shot, x, y0)
         # far from the orbit coarse shots do
-        loose = 1.0 if take else max(1.0, min(1e-3 * expected, 1e-7) / rtol)
+        tolerance = rtol if take else max(rtol, min(1e-3 * expected, ROUGHLY))
+        first = shot.clock[2]
         reason = call_native(
             shot.take,
             (
-                shot, drive, time, x, mode, mirrored, loose * rtol, atol, hmax,
+                shot, drive, time, x, mode, mirrored, tolerance, atol, hmax,
                 spectrum if take else shot.no_spectrum, budget,
             ),
         )  # fmt: skip
@@ -92,7 +96,9 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
                     error = max(error, abs(change[f]) / shot.size[shot.free[f]])
         stale = miss > 0.5 * previous
         if not rests and (
-            error < TOLERANCE or (jacobians > 1 and stale and miss < 100 * rtol and error < 1e3 * rtol)
+            error < TOLERANCE
+            or (take and stale and error < NOISE * rtol)
+            or (sharp > 1 and stale and miss < 100 * rtol and error < 1e3 * rtol)
         ):
             copy(x0, x)
             copy(m0, mode)
@@ -104,7 +110,9 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
             if known and miss > 0.0 and not _attracts(shot, jacobian):
                 if not fresh_jacobian:
                     # Broyden's matrix is no proof: differentiate before judging
-                    if not _differentiate(shot, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget):
+                    if not _differentiate(
+                        shot, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget, first
+                    ):
                         return OPEN, error
                 if not _attracts(shot, jacobian):
                     return UNSTABLE, error
@@ -114,9 +122,13 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
         if not known or (stale and not fresh_jacobian):
             if jacobians == 3:
                 return OPEN, best
-            if not _differentiate(shot, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget):
+            if not _differentiate(
+                shot, drive, time, x0, m0, y1, mirrored, tolerance, atol, hmax, budget, first
+            ):
                 return FAILED, best
             jacobians += 1
+            if tolerance == rtol:
+                sharp += 1
             fresh_jacobian = True
         elif stale and jacobians >= 2 and miss > 1.5 * previous:
             return OPEN, best
@@ -153,10 +165,11 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
             i = shot.free[f]
             if y0[i] != y1[i]:
                 moved = False  # clipped
-        # a secant's errors multiply
-        expected = miss * min(previous, 1e-2)
+        # errors shrink by the same ratio once more, or faster
+        ratio = min(miss / previous, 0.1) if previous < math.inf else 0.01
+        take = take or ratio * miss < TOLERANCE
+        expected = miss * min(ratio, 0.01)
         previous = miss
-        take = take or expected < 1e-8
     return OPEN, best
 
 
@@ -201,8 +214,12 @@ def _broyden(shot, jacobian, change, before, after):
 
 
 @part
-def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget):
-    """Difference the shot over its free coordinates; `step` is the closing error at x0."""
+def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget, first):
+    """Difference the shot over its free coordinates; `step` is the closing error at x0.
+
+    All shots are of the tolerance of that one and begin with a step `first` as it did, so that their errors
+    are nearly its own; the difference quotient balances what is left of them against curvature.
+    """
     y, end, x, base = shot.trial[8], shot.trial[9], shot.trial[10], shot.trial[11]
     mode = shot.trial_mode[1]
     kinds = shot.tally[2]
@@ -210,7 +227,7 @@ def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, 
     for c in range(shot.free.shape[0]):
         i = shot.free[c]
         copy(base, y)
-        h = 1e-5 * shot.size[i]
+        h = 0.5 * math.sqrt(rtol) * shot.size[i]
         if y[i] > 0.0:
             h = -h
         if y[i] + h < shot.lower[i] or y[i] + h > shot.upper[i]:
@@ -220,6 +237,7 @@ def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, 
         copy(m0, mode)
         if h != 0.0:
             place(shot, y, x, mode)
+            shot.clock[2] = first
             reason = call_native(
                 shot.take, (shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget)
             )

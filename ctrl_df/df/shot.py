@@ -86,7 +86,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
 # --- one shot ---------------------------------------------------------------------------------------------
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
     """`take` one shot, from Python."""
     return call_native(
@@ -96,6 +96,31 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
             budget,
         ),
     )  # fmt: skip
+
+
+@njit(error_model="numpy", nogil=True)
+def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget, trail):
+    """`take` one shot after another, as many as `trail` has rows, which receive the coordinates before each.
+
+    A step that another run has left behind is `step` [s] if it is no use here. Returns why the last one ended
+    and how many integration steps all took.
+    """
+    shot, drive, x, mode, trail = lean(shot), lean(drive), lean(x), lean(mode), lean(trail)
+    reason, spent = driver.DONE, 0
+    for k in range(trail.shape[0]):
+        coordinates(shot, x, trail[k])
+        if not 0.0 < shot.clock[2] <= 5.0 * step:
+            shot.clock[2] = step
+        reason = call_native(
+            shot.take,
+            (
+                shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget - spent,
+            ),
+        )  # fmt: skip
+        spent += int(shot.clock[3])
+        if reason != driver.DONE or spent >= budget:
+            break
+    return reason, spent
 
 
 @apart

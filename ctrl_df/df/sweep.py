@@ -11,11 +11,11 @@ from ..simulate.compiled import njit, part
 from ..simulate.driver import copy
 from ..simulate.layout import Drive
 from ..simulate.views import lean
-from .shooting import CLOSED, close
+from .shooting import CLOSED, SHOTS, close
 from .shot import coordinates, place
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def sweep(
     shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
     rtol, hmax, budget, out, ends, miss, kinds, still,
@@ -55,7 +55,7 @@ def sweep(
         shot.tally[0] = 0
         outcome, miss[p] = close(
             shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol, 0.0,
-            hmax * period, out[p], budget, 12, eager,
+            hmax * period, out[p], budget, SHOTS, eager,
         )  # fmt: skip
         past[3, 0] = min(shot.clock[2] / period, 0.1)
         if outcome != CLOSED:

@@ -94,8 +94,8 @@ class Sizes:
 
     def near(self, other: Sizes, factor: float) -> bool:
         """Whether all sizes agree within a factor."""
-        ratios = [*(self.states / other.states), self.force / other.force, self.rate / other.rate]
-        return bool(np.max(np.abs(np.log(ratios))) <= np.log(factor))
+        ratios = np.append(self.states / other.states, (self.force / other.force, self.rate / other.rate))
+        return bool(ratios.max() <= factor and ratios.min() >= 1 / factor)
 
 
 class Probe:

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..checks import executor as checked_executor
+from ..simulate.runs import processors
 from .dispatch import Method, _Guarded
 from .executors import by_executor, check_picklable
 from .family import FORMAT, Family, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
+from .threads import Threads
 
 LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
@@ -54,9 +56,9 @@ class Work:
         require_room(*shape, orders)
         self.save = None if save is None else place_for(save)
         self.fingerprint = "" if save is None else self._fingerprint()
-        self.harmonics = np.empty((*shape, orders + 1), dtype=complex)
-        self.regime = np.empty(shape, dtype=_REGIME)
-        self.residual = np.empty(shape)
+        self._shape = shape
+        self.harmonics = np.empty((0, 0, orders + 1), dtype=complex)  # until the first part is there
+        self.regime, self.residual = np.empty((0, 0), dtype=_REGIME), np.empty((0, 0))
         # along amplitudes one orbit starts the next: keep columns whole
         self.by_omega = method.name == "orbit"
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
@@ -95,8 +97,10 @@ class Work:
             self._take(part, values)
             bar.update(len(part))
 
-        method = self.method
+        method, threads = self.method, None
         try:
+            if executor is None:
+                executor = threads = self._threads(len(parts))
             if executor is None or (method.name == "memory" and copied(method) is method):
                 for part in parts:
                     take(part, compute_part(method, *self._grid(part), self.orders))
@@ -104,12 +108,21 @@ class Work:
                 tasks = ((part, (copied(method), *self._grid(part), self.orders)) for part in parts)
                 by_executor(executor, compute_part, tasks, take, self._kept)
         except BaseException:
+            if threads is not None:
+                threads.stop()
             if self.journal is not None and not self.done.any():
                 self.journal.close()
                 self.journal.path.unlink(missing_ok=True)  # nothing in it
             raise
         finally:
             bar.close()
+
+    def _threads(self, parts: int) -> Threads | None:
+        """Return threads for compiled work of so many parts; None where it is soon done, or calls Python."""
+        count = min(processors(), parts)
+        if count < 2 or not self.method.compiled():
+            return None
+        return Threads(count)
 
     def _parts(self, spread) -> list[np.ndarray]:
         """Lines still to do, in parts; the numbers do not depend on how they are cut.
@@ -127,11 +140,17 @@ class Work:
         return (self.A, self._omega[part]) if self.by_omega else (self.A[part], self.omega)
 
     def _take(self, part, values):
-        where = (slice(None), part) if self.by_omega else part
         y, regime, residual = values
-        if regime.dtype.itemsize > self.regime.dtype.itemsize:
-            self.regime = self.regime.astype(regime.dtype)
-        self.harmonics[where], self.regime[where], self.residual[where] = y, regime, residual
+        if len(part) == self.done.size and all(array.flags.writeable for array in values):
+            self.harmonics, self.regime, self.residual = values  # all of it: nothing to put together
+        else:
+            if not self.residual.size:
+                self.harmonics = np.empty((*self._shape, self.orders + 1), dtype=complex)
+                self.regime, self.residual = np.empty(self._shape, _REGIME), np.empty(self._shape)
+            where = (slice(None), part) if self.by_omega else part
+            if regime.dtype.itemsize > self.regime.dtype.itemsize:
+                self.regime = self.regime.astype(regime.dtype)
+            self.harmonics[where], self.regime[where], self.residual[where] = y, regime, residual
         self.done[part] = True
         if self.journal is not None:
             self.journal.append(lines=part, harmonics=y, regime=regime, residual=residual)

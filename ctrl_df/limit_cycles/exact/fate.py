@@ -193,7 +193,7 @@ class Explorer:
             return 1.0
         if not any(getattr(e, "corners", ()) for e, _ in core.input_channel):
             return 1.0
-        gains = np.abs(course.state.x) / self.swings.units
+        gains = np.abs(course.end) / self.swings.units
         return float(max(gains[:nc].max() / max(gains[nc:].max(), 1e-300), 1.0 + 1e-9))
 
     def _border(self, low: Start, high: Start, longest, known) -> Border:
@@ -231,7 +231,7 @@ class Explorer:
             return orbit
         near = laps[max(k - 4, 0) : k + 2]
         padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near
-        orbit = self.close(x0, Course(padded, UNDECIDED, 1.0, course.state), False)
+        orbit = self.close(x0, Course(padded, UNDECIDED, 1.0, course.end), False)
         return known.kept(orbit) if orbit is not None and orbit.stable is False else None
 
 

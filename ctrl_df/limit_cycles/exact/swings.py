@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...blocks.element import Element
-from ...simulate import driver
 from ...simulate.engine import Engine, State
 from ...simulate.layout import DELAY, H_OUT, KIND, X
+from ...simulate.passages import strides
 from ...status import Status
 from .kicks import Kicks
 
@@ -19,7 +19,6 @@ _WORK = 300_000  # integration steps of one simulation
 _FEW = 12  # swings within that work, below which it is no use
 _QUIET = 40  # strides without a passage after which a loop is called at rest
 _DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
-_PEEKS = 129  # in a stride of about four swings, from which its peaks are read
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
 _EVEN = 0.05  # spread of logarithmic growths within which a growth counts as steady
@@ -55,14 +54,24 @@ class Course:
         ``rests``, ``cycles`` (the passages repeat), ``diverges``, or ``undecided`` within the bound on work.
     growth : float
         Change of the swings over the second half, a ratio; nan with too few of them.
-    state : State
-        Where it ended.
+    end : ndarray
+        State in which it ended.
     """
 
     laps: list[Lap]
     fate: str
     growth: float
-    state: State
+    end: np.ndarray
+
+
+class _Stretch(NamedTuple):
+    """A piece of a course: its end, its work, how it ended, the laps in it."""
+
+    time: float
+    x: np.ndarray
+    steps: int
+    status: Status
+    found: list[Lap]
 
 
 class Swings:
@@ -154,29 +163,30 @@ class Swings:
         quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
         bound = _GONE * max(1.0, largest)
-        stride = self._by_samples if self.held else self._by_passage
-        fate, stopped = "", False
-        while len(laps) < count and state.time < limit and quiet <= _QUIET and work <= _WORK:
-            run, found = stride(state, laps, limit)
-            state, work = run.state, work + run.steps
-            if run.status is Status.DIVERGED or not self.size(state.x) < bound:
-                return Course(laps, DIVERGES, np.inf, state)
-            if not run.status.ok:
+        stretches = self._by_samples(state, limit) if self.held else self._by_passage(state, limit)
+        fate, stopped, time, end = "", False, state.time, state.x
+        while len(laps) < count and time < limit and quiet <= _QUIET and work <= _WORK:
+            stretch = next(stretches)
+            time, end, work = stretch.time, stretch.x, work + stretch.steps
+            if stretch.status is Status.DIVERGED or not self.size(end) < bound:
+                return Course(laps, DIVERGES, np.inf, end)
+            if not stretch.status.ok:
                 stopped = True  # by its bound on work, or a motion that no step resolves: no fate
                 break
+            found = stretch.found
             laps += found
             quiet = 0 if found else quiet + 1
             highest = max([highest, *(lap.peak for lap in found)])
             if found and laps[-1].peak < _FAINT * highest:
                 fate = RESTS
                 break
-            size = self.size(state.x)
+            size = self.size(end)
             largest = max(largest, size)
             if quiet and size < _DEAD * largest:
                 fate = RESTS
                 break
             if found and laps[-1].peak > _BEYOND and _explodes(laps):
-                return Course(laps, DIVERGES, np.inf, state)
+                return Course(laps, DIVERGES, np.inf, end)
             if found and (_creeps(laps) or self._fades(laps)):
                 fate = RESTS
                 break
@@ -192,7 +202,7 @@ class Swings:
             fate = RESTS if quiet > _QUIET else UNDECIDED if stopped else _tendency(laps)
         if (stopped or work > _WORK) and len(laps) < _FEW:
             laps = []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
-        return Course(laps, fate, growth, state)
+        return Course(laps, fate, growth, end)
 
     def start(self, x0) -> State:
         """Return a fresh state; what the engine does not move (lags that stand for delays elsewhere) is 0."""
@@ -220,40 +230,30 @@ class Swings:
         )
         return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
 
-    def _by_passage(self, state, laps, limit):
+    def _by_passage(self, state, limit):
         # ahead in bounded strides: a loop at rest never crosses again
-        ahead = 4 * (laps[-1].time - laps[-2].time) if len(laps) >= 2 else self.stride
-        times = state.time + np.linspace(0.0, ahead, _PEEKS)
-        run = self.engine.run(
-            state, min(state.time + ahead, limit), times=times, rtol=1e-8, watch=self._signal, direction=1,
-            log=1, max_steps=400_000,
-        )  # fmt: skip
-        after = run.state
-        if run.reason != driver.SECTION:
-            return run, []
-        return run, [self._lap(after.time, after.x, run.outputs[: run.recorded])]
+        for s in strides(self.engine, state, self._signal, self.row, self.stride, limit, 1e-8):
+            found = [Lap(s.time, s.x, s.peak / self._unit)] if s.passed else []
+            yield _Stretch(s.time, s.x, s.steps, s.status, found)
 
-    def _by_samples(self, state, laps, limit):
+    def _by_samples(self, state, limit):
         """Passages between the samples of a held signal, looked at between the ticks."""
         dt = self.parts.dt
-        # from the sample before on, where the last stride ended: no passage is lost between two strides
-        first = np.ceil(state.time / dt - 0.5 - 1e-6)
-        times = np.maximum((first + 0.5 + np.arange(_SAMPLES)) * dt, state.time)
-        times = times[times <= max(limit, times[1])]
-        run = self.engine.run(state, times[-1], times=times, rtol=1e-8, log=1, max_steps=400_000)
-        y = run.outputs[:, self.row]
-        ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
-        passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
-        found = []
-        for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
-            begin = ups[k - 1] if k else 0
-            found.append(self._lap(t, x, run.outputs[begin : ups[k] + 1]))
-        return run, found
-
-    def _lap(self, time, x, outputs) -> Lap:
-        return Lap(
-            float(time), np.array(x), float(np.max(np.abs(outputs[:, self.row]), initial=0.0)) / self._unit
-        )
+        while True:
+            # from the sample before on, where the last stride ended: no passage is lost between two strides
+            first = np.ceil(state.time / dt - 0.5 - 1e-6)
+            times = np.maximum((first + 0.5 + np.arange(_SAMPLES)) * dt, state.time)
+            times = times[times <= max(limit, times[1])]
+            run = self.engine.run(state, times[-1], times=times, rtol=1e-8, log=1, max_steps=400_000)
+            y = run.outputs[:, self.row]
+            ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+            passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
+            found = []
+            for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
+                swing = np.abs(y[ups[k - 1] if k else 0 : ups[k] + 1])
+                found.append(Lap(float(t), np.array(x), float(np.max(swing, initial=0.0)) / self._unit))
+            state = run.state
+            yield _Stretch(state.time, state.x, run.steps, run.status, found)
 
 
 def _growth(laps, ago: int = 0) -> float:

@@ -1,0 +1,51 @@
+"""Parts of a family on threads of this process: compiled code, which leaves the interpreter to the others."""
+
+from __future__ import annotations
+
+import functools
+import os
+import threading
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+
+_here = threading.local()
+
+
+@functools.lru_cache(maxsize=4)
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    """Threads for all families of one process (those of its parent do not survive a fork)."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="ctrl_df family")
+
+
+class Threads:
+    """An executor whose work, once begun, can be asked to stop.
+
+    Parameters
+    ----------
+    count : int
+        How many work at once.
+    """
+
+    def __init__(self, count: int):
+        self._pool, self._stop = _pool(os.getpid(), count), threading.Event()
+
+    def submit(self, function, *arguments) -> Future:
+        """As `concurrent.futures.Executor.submit`."""
+        return self._pool.submit(self._run, function, arguments)
+
+    def stop(self) -> None:
+        """Let what has begun end at its next `go_on`."""
+        self._stop.set()
+
+    def _run(self, function, arguments):
+        _here.stop = self._stop
+        try:
+            return function(*arguments)
+        finally:
+            _here.stop = None
+
+
+def go_on() -> None:
+    """Raise CancelledError where this thread's work is no longer wanted."""
+    stop = getattr(_here, "stop", None)
+    if stop is not None and stop.is_set():
+        raise CancelledError

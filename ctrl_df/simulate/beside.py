@@ -1,0 +1,66 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""States beside one another, in one call: where the flow of a mode takes them, and what rates and margins are."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import driver, pointers
+from .compiled import njit
+from .engine import Engine, State
+from .layout import H_NG, Drive
+from .native import call_native
+from .views import lean
+
+_AT_ONCE = 100_000  # steps after which a run is begun anew from where it is, as it would be alone
+_MOST = 20_000_000  # steps of one state
+
+
+def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float) -> np.ndarray:
+    """Return where states `x` (k, n) are a time `span` [s] later, in the mode of `state`, events ignored."""
+    x = np.array(x, dtype=float, order="C")
+    scale = np.zeros((4, int(engine.program.ints[H_NG]) + 1)) if state.scale is None else state.scale
+    clock = np.array(
+        [state.time, 0, state.step, 0, 0, 0, state.segment, float(state.on_section), -1, 0], float
+    )
+    pointers.raised.clear()
+    with pointers.interruptible():
+        _flow(
+            driver.address(), engine.program, drive, clock, x, state.mode, state.time + span, rtol,
+            max(rtol, 1e-10), scale, int(state.fresh), engine._space, np.zeros(0), np.zeros((0, engine.nstates)),
+            np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64), np.zeros(1, np.int64),
+            np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex), clock.copy(),
+            state.mode.copy(), scale.copy(),
+        )  # fmt: skip
+    pointers.raise_kept()
+    return x
+
+
+@njit(error_model="numpy", nogil=True)
+def _flow(
+    engine, prog, drive, clock, x, mode, end, rtol, height, scale, fresh, space, none, none_x, none_y,
+    log_t, log_n, log_k, before, spectrum, my_clock, my_mode, my_scale,
+):  # fmt: skip
+    """Run every row of `x`, in place, from the same clock, mode and scale."""
+    prog, drive, x, space = lean(prog), lean(drive), lean(x), lean(space)
+    for row in range(x.shape[0]):
+        my_clock[:], my_mode[:], my_scale[:] = clock, mode, scale
+        begin = fresh
+        space.memo[2] = 0.0
+        while True:
+            reason = call_native(
+                engine,
+                (
+                    prog, drive, lean(my_clock), x[row], lean(my_mode), end, lean(none), lean(none_x),
+                    lean(none_y), 8, rtol, 0.0, math.inf, False, False, -1, 0.0, -1, height,
+                    min(_MOST - int(my_clock[3]), _AT_ONCE), lean(log_t), lean(log_n), lean(log_k),
+                    lean(before), lean(my_scale), begin, space, lean(spectrum), 0.0,
+                ),
+            )  # fmt: skip
+            begin = 0
+            if reason != driver.STEPS or int(my_clock[3]) >= _MOST:
+                break
+            space.memo[2] = 1.0

@@ -1,0 +1,164 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""Passages of a signal upwards through zero, one after another, without the interpreter between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..status import Status
+from . import driver, history, pointers
+from .compiled import njit
+from .engine import FAR, STATUS, Engine, State, constant_drive
+from .layout import H_NG
+from .native import call_native
+from .views import lean
+
+_PEEKS = 129  # in a stride of about four passages, from which the peak of an output is read
+_TOGETHER = 64  # strides at once
+_AT_ONCE = 100_000  # steps of a small system after which the interpreter is asked whether to go on
+_MOST = 400_000  # steps of a stride
+
+
+class Stride(NamedTuple):
+    """A run from one passage to the next, or over some time without any.
+
+    Attributes
+    ----------
+    time : float
+        Its end [s].
+    x : (n,) array
+        State there.
+    passed : bool
+        Whether it ended at a passage.
+    peak : float
+        Largest magnitude of the output on the way.
+    steps : int
+    status : Status
+    """
+
+    time: float
+    x: np.ndarray
+    passed: bool
+    peak: float
+    steps: int
+    status: Status
+
+
+def strides(
+    engine: Engine, state: State, signal: int, row: int, first: float, limit: float, rtol: float
+) -> Iterator[Stride]:
+    """Run an engine without inputs from passage to passage of a signal, until nobody asks for more.
+
+    Parameters
+    ----------
+    engine : Engine
+    state : State
+        Where to begin.
+    signal, row : int
+        Signal whose upward passages through zero count, and output whose peaks are taken.
+    first : float
+        Longest stride while fewer than two passages are known [s]; then four times what the last one took.
+    limit : float
+        Time at which the last stride ends [s].
+    rtol : float
+        As in `Engine.run`.
+    """
+    n, program = engine.nstates, engine.program
+    space, now = driver.workspace(program, delays=True), state.copy()
+    if engine.delayed and now.history is not None:
+        history.stored(program, space.work[0])[:] = now.history
+    scale = np.zeros((4, int(program.ints[H_NG]) + 1)) if now.scale is None else now.scale
+    clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
+    together = 1 if engine.calls_python else _TOGETHER
+    none, counts, drive = np.zeros(1), np.zeros(1, np.int64), constant_drive(np.zeros(engine.ninputs))
+    times, seen = np.zeros(_PEEKS), (np.zeros((_PEEKS, n)), np.zeros((_PEEKS, engine.noutputs)))
+    spectrum, last = np.zeros((engine.noutputs, 0), complex), np.array([0.0, 0.0, 0.0, float(now.fresh)])
+    ends, states, numbers = (
+        np.zeros((together, 2)),
+        np.zeros((together, n)),
+        np.zeros((together, 2), np.int64),
+    )
+    budget = max(int(_AT_ONCE / (1 + (n / 6) ** 2)), 10)
+    while clock[0] < limit:
+        pointers.raised.clear()
+        pointers.gave_nan.clear()
+        with pointers.interruptible():
+            done = _pass_on(
+                driver.address(), program, drive, clock, now.x, now.mode, times, *seen, rtol, signal, row,
+                max(rtol, 1e-10), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space, spectrum,
+                first, limit, last, ends, states, numbers, budget,
+            )  # fmt: skip
+        pointers.raise_kept()
+        for i in range(done):
+            reason = int(numbers[i, 0])
+            x = states[i].copy()
+            if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < FAR:
+                raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
+            passed = reason == driver.SECTION
+            yield Stride(float(ends[i, 0]), x, passed, float(ends[i, 1]), int(numbers[i, 1]), STATUS[reason])
+
+
+@njit(error_model="numpy", nogil=True)
+def _pass_on(
+    engine, prog, drive, clock, x, mode, times, xout, yout, rtol, signal, row, height, log_t, log_n, log_k,
+    before, scale, space, spectrum, first, limit, last, ends, states, numbers, budget,
+):  # fmt: skip
+    """Make as many strides as there are rows in `ends`, or fewer; return how many.
+
+    ``last``: times of the last two passages, their number, whether the state is a fresh one. ``ends``: time
+    and peak of each stride; ``numbers``: why it ended, its steps.
+    """
+    prog, drive, clock, x, mode, times = (
+        lean(prog), lean(drive), lean(clock), lean(x), lean(mode), lean(times),
+    )  # fmt: skip
+    xout, yout, log_t, log_n, log_k, before = (
+        lean(xout), lean(yout), lean(log_t), lean(log_n), lean(log_k), lean(before),
+    )  # fmt: skip
+    scale, space, spectrum = lean(scale), lean(space), lean(spectrum)
+    peeks, spent = times.shape[0], 0
+    for i in range(ends.shape[0]):
+        begin = clock[0]
+        ahead = 4.0 * (last[0] - last[1]) if last[2] >= 2.0 else first
+        for k in range(peeks):
+            times[k] = begin + k * (ahead / (peeks - 1))
+        times[peeks - 1] = begin + ahead
+        until = min(begin + ahead, limit)
+        clock[1] = clock[3] = clock[4] = clock[9] = 0.0
+        clock[8] = -1.0
+        space.memo[2] = 0.0
+        while True:
+            reason = call_native(
+                engine,
+                (
+                    prog, drive, clock, x, mode, until, times, xout, yout, 8, rtol, 0.0, math.inf, True,
+                    False, signal, 0.0, -1, height, min(_MOST - int(clock[3]), budget), log_t, log_n, log_k,
+                    before, scale, int(last[3]), space, spectrum, 0.0,
+                ),
+            )  # fmt: skip
+            last[3] = 0.0
+            if reason != driver.STEPS or int(clock[3]) >= _MOST:
+                break
+            space.memo[2] = 1.0
+        peak = 0.0
+        for k in range(int(clock[1])):
+            value = abs(yout[k, row])
+            if not value <= peak:
+                peak = value
+        ends[i, 0], ends[i, 1] = clock[0], peak
+        numbers[i, 0], numbers[i, 1] = reason, int(clock[3])
+        for j in range(x.shape[0]):
+            states[i, j] = x[j]
+        spent += int(clock[3])
+        if reason == driver.SECTION:
+            last[1], last[0] = last[0], clock[0]
+            last[2] += 1.0
+        elif reason != driver.DONE:
+            return i + 1
+        if clock[0] >= limit or spent > budget:
+            return i + 1
+    return ends.shape[0]
