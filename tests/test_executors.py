@@ -105,8 +105,7 @@ def test_any_executor_gives_bitwise_the_same(kind, processes):
 def test_pieces_are_bitwise_the_same_as_the_whole(kind, monkeypatch):
     block, grid = SUBJECTS[kind]
     whole = cdf.describing_function_family(block, **grid)
-    monkeypatch.setattr(work, "_HERE", 3)
-    monkeypatch.setattr(work, "_IRREGULAR", 3)
+    monkeypatch.setattr(type(method_for(block)), "at_once", 3)
     pieces = cdf.describing_function_family(block, **grid)
     assert pieces.harmonics.tobytes() == whole.harmonics.tobytes() and (pieces.regime == whole.regime).all()
 

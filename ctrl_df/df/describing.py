@@ -235,5 +235,5 @@ def _check_omega(method, omega):
 
 
 def _check_options(method, options):
-    if options and method.name != "orbit":
+    if options and not method.takes_options:
         raise TypeError(f"unrecognized keywords: {', '.join(options)}")

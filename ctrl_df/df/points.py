@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .dispatch import Method
+from .methods import Method, Quadrature
 from .work import compute_part
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
@@ -66,9 +66,9 @@ def _slope_at_zero(method, largest, zero_check):
             "a dynamic block has no describing function at A = 0; got A=0. Leave zero out, or use "
             "ct.linearize."
         )
-    if method.own_method is not None:
+    if isinstance(method, Quadrature) and method.own_method is not None:
         return complex(method.own_method(0.0))
-    if zero_check and method.name != "element":
+    if zero_check and isinstance(method, Quadrature):
         at_zero = np.squeeze(np.asarray(method.subject(0.0), dtype=float))
         if at_zero != 0:
             raise ValueError(

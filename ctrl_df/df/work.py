@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import copy
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..checks import executor as checked_executor
 from ..simulate.runs import processors
-from .dispatch import Method, _Guarded
 from .executors import by_executor, check_picklable
 from .family import FORMAT, Family, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
+from .methods import Guarded, Method
 from .threads import Threads
 
 LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
-_HERE = 1 << 15  # points of a closed form computed at a time: some tenths of a second
+_HERE = 1 << 15  # points of a quick method in one part
 _LAW_ROWS = 64  # amplitudes of a static law computed together: its corners are looked for once for them
-_BRIEF = ("linear",)  # computed sooner than sent
-_IRREGULAR = 64  # points of backlash at a time: each takes up to 10 ms where its motion has no period
 
 
 class Work:
@@ -60,7 +56,7 @@ class Work:
         self.harmonics = np.empty((0, 0, orders + 1), dtype=complex)  # until the first part is there
         self.regime, self.residual = np.empty((0, 0), dtype=_REGIME), np.empty((0, 0))
         # along amplitudes one orbit starts the next: keep columns whole
-        self.by_omega = method.name == "orbit"
+        self.by_omega = method.along_amplitudes
         self.done = np.zeros(shape[1] if self.by_omega else A.size, dtype=bool)
         self.journal: Journal | None = None
         self.written = False
@@ -71,7 +67,7 @@ class Work:
         """Compute what is still to do; `executor` and `progress` as in `describing_function_family`."""
         if executor is not None:
             checked_executor("a family", executor)
-            if self.method.name in _BRIEF:
+            if self.method.light:
                 executor = None
             else:
                 check_picklable(executor, (self.method, self.orders))
@@ -101,11 +97,11 @@ class Work:
         try:
             if executor is None:
                 executor = threads = self._threads(len(parts))
-            if executor is None or (method.name == "memory" and copied(method) is method):
+            if executor is None or method.copied() is None:
                 for part in parts:
                     take(part, compute_part(method, *self._grid(part), self.orders))
             else:
-                tasks = ((part, (copied(method), *self._grid(part), self.orders)) for part in parts)
+                tasks = ((part, (method.copied(), *self._grid(part), self.orders)) for part in parts)
                 by_executor(executor, compute_part, tasks, take, self._kept)
         except BaseException:
             if threads is not None:
@@ -130,10 +126,9 @@ class Work:
         A static law's corners are looked for over the amplitudes of a part: these are always the same.
         """
         lines = np.nonzero(~self.done)[0]
-        if self.method.name in ("law", "element"):
+        if self.method.static:
             return [p for p in np.split(lines, np.searchsorted(lines, _multiples(self.A.size))) if p.size]
-        quick = self.method.name in ("friction", "linear", "rate")
-        most = max(1, _HERE // self._omega.size) if quick and not spread else 1
+        most = max(1, _HERE // self._omega.size) if self.method.quick and not spread else 1
         return [lines[i : i + most] for i in range(0, lines.size, most)]
 
     def _grid(self, part):
@@ -215,9 +210,8 @@ class Work:
     def _fingerprint(self) -> str:
         method, labels = self.method, list(getattr(self.F, "output_labels", []))
         output = labels.index(method.output) if method.output in labels else method.output
-        law = method.subject.law if isinstance(method.subject, _Guarded) else method.subject
-        how = (method.name, output, method.order, method.own_method, method.samples, method.options)
-        return fingerprint(FORMAT, law, how, self.A, self._omega, self.orders)
+        law = method.subject.law if isinstance(method.subject, Guarded) else method.subject
+        return fingerprint(FORMAT, law, output, method.identity(), self.A, self._omega, self.orders)
 
     @property
     def _omega(self):
@@ -256,9 +250,9 @@ def compute_part(method: Method, A, omega, orders):
 
     Compiled closed forms hear no Ctrl-C: they are asked for some points at a time.
     """
-    most = {"friction": _HERE, "backlash": _IRREGULAR}.get(method.name)
+    most = method.at_once
     if most is None or A.size * omega.size <= most:
-        return copied(method).harmonics(A, omega, orders)
+        return (method.copied() or method).harmonics(A, omega, orders)
     rows = max(1, most // omega.size)
     pieces = [
         _row_of_pieces(method, A[i : i + rows], omega, orders, max(1, most // rows))
@@ -270,16 +264,6 @@ def compute_part(method: Method, A, omega, orders):
 def _row_of_pieces(method, A, omega, orders, most):
     pieces = [method.harmonics(A, omega[k : k + most], orders) for k in range(0, omega.size, most)]
     return [np.concatenate(p, axis=1) for p in zip(*pieces, strict=True)]
-
-
-def copied(method: Method) -> Method:
-    """Return the method with its law copied if that keeps a memory: parts must not disturb each other."""
-    if method.name != "memory":
-        return method
-    try:
-        return replace(method, subject=copy.deepcopy(method.subject))
-    except Exception:  # whatever cannot be copied: one part after the other, then
-        return method
 
 
 def _multiples(size):

@@ -47,7 +47,7 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     omega = np.geomspace(0.5 * min(r.omega[0] for r in tables), 2 * max(r.omega[-1] for r in tables), 11)
     found = []
     for m in models:
-        options: dict[str, Any] = dict(QUICK) if method_for(m).name == "orbit" else {}
+        options: dict[str, Any] = dict(QUICK) if method_for(m).takes_options else {}
         found.append(np.asarray(describing_function(m, A[:, None], omega[None], **options)))
     size = np.max(np.abs(np.nan_to_num(found)), axis=0)
     far = A[:, None] * size

@@ -132,7 +132,7 @@ def _described(model, A, omega, work) -> np.ndarray:
     from ..df.describing import quiet_describing_function as describing_function
     from ..df.dispatch import method_for
 
-    options: dict[str, Any] = dict(work) if method_for(model).name == "orbit" else {}
+    options: dict[str, Any] = dict(work) if method_for(model).takes_options else {}
     return np.asarray(describing_function(model, A, omega, **options))
 
 

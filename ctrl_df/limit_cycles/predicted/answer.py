@@ -9,7 +9,7 @@ import numpy as np
 
 from ...blocks.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
-from ...df.dispatch import Method
+from ...df.methods import ElementIntegrals, Method
 from .waveform import WaveformOrbit
 
 SAMPLES = 2048
@@ -23,12 +23,13 @@ def responder(F, method: Method) -> tuple[Callable, int] | None:
     those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic answer. A block
     with dynamics may have several: it goes on from the one before (see `WaveformOrbit`).
     """
-    if method.name == "element":
+    if isinstance(method, ElementIntegrals):
         cells = _element_cells(method.subject)
         return None if cells is None else (_sampled(cells), STATIC_HARMONICS)
-    if method.name == "law" and callable(method.subject):
-        return _sampled(_cell_means(_pointwise(method.subject))), STATIC_HARMONICS
-    if method.name in ("friction", "backlash", "orbit") and isinstance(F, ct.NonlinearIOSystem):
+    law = method.law()
+    if law is not None:
+        return _sampled(_cell_means(_pointwise(law))), STATIC_HARMONICS
+    if method.dynamic and isinstance(F, ct.NonlinearIOSystem):
         return WaveformOrbit(F, method.output), DYNAMIC_HARMONICS
     return None
 
@@ -59,9 +60,10 @@ def jumps(method: Method, amplitude: float) -> bool:
         return True
     law = getattr(primitive, "value", None)
     if law is None:
-        law = _pointwise(method.subject) if method.name == "law" and callable(method.subject) else None
-    if law is None:
-        return False
+        law = method.law()
+        if law is None:
+            return False
+        law = _pointwise(law)
     coarse, fine = (
         np.abs(np.diff(np.asarray(law(amplitude * np.cos(np.linspace(0, 2 * np.pi, n))), dtype=float))).max()
         for n in (SAMPLES, 4 * SAMPLES)

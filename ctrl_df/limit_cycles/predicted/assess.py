@@ -14,9 +14,8 @@ from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros
 from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
 from .path import End, follow_path
-from .scan_grid import FAST, grid_slope, noisy
+from .scan_grid import grid_slope, noisy
 
-DYNAMIC = ("friction", "backlash", "orbit")
 # On the shift that the returned harmonics cause, by whether the block has dynamics: of an impact's harmonics,
 # which fall slowly, fewer are kept (worst of benchmarks/trust.py: 3.1 for a gap).
 SAFETY = {False: 1.5, True: 4.0}
@@ -51,7 +50,7 @@ class Assessor:
     def _irregular(self) -> list[LimitCycle]:
         """Crossings among averages over irregular motion: the interpolant's zeros, one a neighbourhood."""
         irregular = noisy(self.family.regime, self.family.residual)
-        if self.method.name in FAST or not irregular.any() or min(irregular.shape) < 2:
+        if self.method.quick or not irregular.any() or min(irregular.shape) < 2:
             return []
         log_a, log_w = np.log(self.family.amplitudes), np.log(self.family.omega)
         with np.errstate(all="ignore"):
@@ -128,8 +127,8 @@ class Assessor:
         spread = tuple(one + s * self._late(a, w) for one, s in zip(spread, sense, strict=True))
         notes += remark
         stable = loeb(crossing.jacobian) if attracts else False
-        if self.method.name == "memory":
-            notes.append((1, "the block keeps its own memory and could only be sampled"))
+        if self.method.caveat:
+            notes.append((1, self.method.caveat))
         bound, remark = mees_bergen(self.method, self.linear, crossing, self.scan.crossings)
         notes.append((0, remark))
         grade, why = graded(
@@ -178,7 +177,7 @@ class Assessor:
     def _spread(self, crossing, distortion, sense, regime, named):
         """Logarithmic half widths of the bands, the corrected solution where there is one, and notes."""
         a, w = crossing.amplitude, crossing.omega
-        c1, c2 = DYNAMIC_ERROR if self.method.name in DYNAMIC else MEMORYLESS_ERROR
+        c1, c2 = DYNAMIC_ERROR if self.method.dynamic else MEMORYLESS_ERROR
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
         if self.answer is None or not named or regime.startswith(("aperiodic", "subharmonic")):
@@ -196,7 +195,7 @@ class Assessor:
             return spread, path, [(2, path.end.value)]
         shift = [abs(math.log(path.solution[0] / a)), abs(math.log(path.solution[1] / w))]
         notes = [(2, "it passes a fold as its harmonics are fed back")] if path.folds else []
-        safety = SAFETY[self.method.name in DYNAMIC]
+        safety = SAFETY[self.method.dynamic]
         return tuple(safety * s + FLOOR for s in shift), path, notes
 
 

@@ -8,6 +8,7 @@ import control as ct
 import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine
+from ...df.methods import ElementIntegrals
 
 _HARMONICS = np.arange(3, 62, 2)
 _WINDOWS = (0.1, 0.4, 1.2)  # half widths tried, in ln a and ln omega
@@ -65,7 +66,7 @@ def mees_bergen(method, linear, crossing, others):
 def slope_bounds(method) -> tuple[float, float] | None:
     """Least and greatest slope of an odd, continuous, memoryless broken line; None for anything else."""
     line = getattr(method.subject, "primitive", None)
-    if method.name != "element" or not isinstance(line, PiecewiseAffine) or line.hysteretic:
+    if not isinstance(method, ElementIntegrals) or not isinstance(line, PiecewiseAffine) or line.hysteretic:
         return None
     corners = np.array(line.corners)
     left = np.array(line.intercept[:-1]) + np.array(line.slope[:-1]) * np.array(line.high[:-1])

@@ -201,7 +201,7 @@ def describing_function_response(
     with progress_bar(None, progress, "refining crossings", "point") as bar:
         D = defect(method, linear, bar)
         scan = find_crossings(D, log_a, log_w, values, refine)
-        if refine and method.name in ("element", "law") and not method.needs_omega and log_a.size > 1:
+        if refine and method.static and log_a.size > 1:
             N: Any = method.harmonics(np.exp(log_a), None, 1)[0][:, 0, 1]
             if (np.abs(N.imag) <= 1e-12 * np.abs(N)).all():
                 more = real_crossings(D, log_a, log_w, N.real, lambda w: linear.clamped(w)[0])

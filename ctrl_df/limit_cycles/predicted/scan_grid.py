@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 
-from ...df.dispatch import Method
 from ...df.family import Family
+from ...df.methods import ElementIntegrals, Method
 from ...df.points import points
 from .linear import LinearPart
 
-_AMPLITUDES = {"element": 480, "law": 160}  # at least: steps of a quantizer put two crossings within 4 %
-FAST = ("element", "law", "rate", "linear", "friction")
 _LEVELS = 200  # of a quantizer, whose corners enter the grid: beyond N differs from 1 by less than 1e-3
 _BEYOND = 4.0 ** np.arange(-10.0, -3.0)  # relative, from a corner on
 _AT_ONCE = 1 << 16  # points of a closed form between two chances to interrupt it
@@ -24,7 +22,7 @@ def defect(method: Method, linear: LinearPart, bar=None):
 
     `bar`, a progress bar, counts the points asked.
     """
-    method = method.brief()
+    method = method.with_short_averages()
 
     def D(p, q):
         a, w = np.exp(p), np.exp(q)
@@ -41,10 +39,10 @@ def defect(method: Method, linear: LinearPart, bar=None):
 def scan_grid(method: Method, linear: LinearPart, family: Family):
     """Return the grid to search: the family's, finer where that costs little or H varies fast."""
     w = refined_omega(linear, family.omega)
-    if method.name in FAST:
+    if method.quick:
         coarse = family.amplitudes
-        a = _refined(coarse, _AMPLITUDES.get(method.name, 60))
-        if method.name == "element":
+        a = _refined(coarse, method.amplitudes)
+        if isinstance(method, ElementIntegrals):
             a = _with_corners(a, method.subject.primitive)
         if method.needs_omega and a.size * w.size > 60_000:
             a = coarse
