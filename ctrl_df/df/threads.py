@@ -44,6 +44,20 @@ class Threads:
             _here.stop = None
 
 
+def on_threads(function, tasks, count: int) -> list:
+    """Return ``function(*task)`` for every task, in order, so many at once."""
+    count = min(count, len(tasks))
+    if count < 2:
+        return [function(*task) for task in tasks]
+    threads = Threads(count)
+    try:
+        futures = [threads.submit(function, *task) for task in tasks]
+        return [future.result() for future in futures]
+    except BaseException:
+        threads.stop()
+        raise
+
+
 def go_on() -> None:
     """Raise CancelledError where this thread's work is no longer wanted."""
     stop = getattr(_here, "stop", None)

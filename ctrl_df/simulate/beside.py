@@ -1,6 +1,6 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""States beside one another, in one call: where the flow of a mode takes them, and what rates and margins are."""
+"""States beside one another, in one call: where the flow of a mode takes them."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float
     with pointers.interruptible():
         _flow(
             driver.address(), engine.program, drive, clock, x, state.mode, state.time + span, rtol,
-            max(rtol, 1e-10), scale, int(state.fresh), engine._space, np.zeros(0), np.zeros((0, engine.nstates)),
-            np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64), np.zeros(1, np.int64),
-            np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex), clock.copy(),
-            state.mode.copy(), scale.copy(),
+            max(rtol, 1e-10), scale, int(state.fresh), engine._space, np.zeros(0),
+            np.zeros((0, engine.nstates)), np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64),
+            np.zeros(1, np.int64), np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex),
+            clock.copy(), state.mode.copy(), scale.copy(),
         )  # fmt: skip
     pointers.raise_kept()
     return x
