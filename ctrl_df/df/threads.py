@@ -23,9 +23,15 @@ class Threads:
     ----------
     count : int
         How many work at once.
+
+    Attributes
+    ----------
+    ahead : int
+        Parts to submit before the first is taken: none waits for work, few for being taken.
     """
 
     def __init__(self, count: int):
+        self.ahead = count + 1
         self._pool, self._stop = _pool(os.getpid(), count), threading.Event()
 
     def submit(self, function, *arguments) -> Future:
