@@ -11,6 +11,7 @@ import os
 for _name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+import contextlib  # noqa: E402
 import platform  # noqa: E402
 import shutil  # noqa: E402
 import statistics  # noqa: E402
@@ -23,6 +24,7 @@ from pathlib import Path  # noqa: E402
 
 import control as ct  # noqa: E402
 import numpy as np  # noqa: E402
+from numba.core import config  # noqa: E402
 
 import ctrl_df as cdf  # noqa: E402
 from ctrl_df.identify.simulator import Simulator  # noqa: E402
@@ -196,6 +198,144 @@ def family_times() -> None:
     A, omega = np.geomspace(8, 60, 20), np.geomspace(3, 30, 20)
     t = seconds(lambda: cdf.describing_function_family(four, A, omega), 3) / 400
     row("mass with four effects through the engine", f"{1e6 * t:.0f} µs a point", "300 µs", t <= 300e-6)
+
+
+def lightly_damped():
+    """Return a loop with resonances, and the grid on which it is described."""
+    springs = [cdf.LinearSpring(200.0), cdf.CubicSpring(1e5)]
+    block = cdf.Mass(9.0, [cdf.Coulomb(5.0), cdf.Viscous(0.5), *springs])
+    return block, np.linspace(8, 60, 8), np.linspace(2, 30, 8)
+
+
+def general_family() -> None:
+    """Time a family with resonances through the engine, and the same on two threads."""
+    block, A, omega = lightly_damped()
+
+    def family():
+        cdf.describing_function_family(block, A, omega)
+
+    spread, points = [], A.size * omega.size
+    family()
+    one = best(family, time.process_time) / points
+    what = "mass on a hardening spring through the engine, 8 x 8"
+    row(what, f"{1e3 * one:.2f} ms a point", "0.2 ms", one <= 2e-4)
+    for _ in range(5):  # beside each other, as the machine is now
+        alone = best(family, time.perf_counter, 3)
+        with threads(2):
+            family()
+            begin, busy = time.perf_counter(), time.process_time()
+            both = best(family, time.perf_counter, 3)
+            cores = (time.process_time() - busy) / (time.perf_counter() - begin)
+            spread.append((both / alone, cores))
+    ratio, cores = sorted(spread)[len(spread) // 2]
+    what = "the same on two threads over one, wall"
+    row(what, f"{ratio:.2f} x, {cores:.1f} cores to be had", "0.65 x", ratio <= 0.65)
+
+
+@contextlib.contextmanager
+def threads(count: int):
+    """Let families and batches use so many threads."""
+    before, config.NUMBA_NUM_THREADS = config.NUMBA_NUM_THREADS, count
+    try:
+        yield
+    finally:
+        config.NUMBA_NUM_THREADS = before
+
+
+def best(work, clock, repeats: int = 9) -> float:
+    """Return the least time of `work` by a clock."""
+    times = []
+    for _ in range(repeats):
+        begin = clock()
+        work()
+        times.append(clock() - begin)
+    return min(times)
+
+
+def family_over_c() -> None:
+    """Time the friction family over the same closed form in C, compiled here if there is a compiler."""
+    what = "friction family 100 x 100, five harmonics, over C"
+    block, A, omega = cdf.friction_mass(9, 5, 0.5), np.geomspace(5.5, 60, 100), np.geomspace(2, 40, 100)
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        row(what, "no C compiler here", "1.2 x", False)
+        return
+    ratios, family = [], cdf.describing_function_family(block, A, omega, orders=5)
+    with tempfile.TemporaryDirectory() as folder:
+        program = str(Path(folder) / "family")
+        source = Path(__file__).with_name("family.c")
+        subprocess.run([compiler, "-O2", str(source), "-o", program, "-lm"], check=True)
+        for _ in range(7):  # beside each other, as the machine is now
+            done = subprocess.run([program], capture_output=True, text=True, check=True)
+            spent, total = map(float, done.stdout.split())
+            mine = best(
+                lambda: cdf.describing_function_family(block, A, omega, orders=5), time.process_time, 40
+            )
+            ratios.append(mine / spent)
+    ratio, same = statistics.median(ratios), np.abs(family.harmonics[..., 1::2]).sum() / total
+    row(what, f"{ratio:.2f} x", "1.2 x", ratio <= 1.2 and abs(same - 1) < 1e-12)
+
+
+def verification() -> None:
+    """Time predictions held against exact orbits and simulations."""
+    loops = [
+        ("friction", cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5), 5.2, 3.0),
+        ("hunting", cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5), 5.6, 0.8),
+        ("backlash", cdf.pid(1800, 19500, 100), cdf.backlash_masses(1, 8, 0.018, 0.2), 5.0, 0.3),
+    ]
+    for name, controller, plant, least, limit in loops:
+        A, omega = np.geomspace(least, 60, 40), np.geomspace(4, 60, 40)
+        predicted = cdf.describing_function_response(controller, plant, A, omega)
+        cdf.verify(predicted)
+        spent = best(lambda predicted=predicted: cdf.verify(predicted), time.process_time, 3)
+        row(f"verify, {name} loop", f"{spent:.2f} s", f"{limit:g} s", spent <= limit)
+
+
+def memory() -> None:
+    """Measure memory over ten times the runs, the time, or the points, few outputs asked for."""
+    rng = np.random.default_rng(3)
+    block = cdf.friction_mass(9, 5, 0.5)
+    loop = cdf.closed_loop(cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5))
+    starts = rng.normal(size=(10_000, 2)) * [1e-3, 0.1]
+    less, more = (
+        peak(lambda n=n: cdf.batch_response(block, [0.0, 0.5], 10.0, starts[:n])) for n in (1_000, 10_000)
+    )
+    each = (more - less) / 9_000
+    row(
+        "memory of batch_response for each further run, two outputs",
+        f"{each:.0f} bytes",
+        "1000",
+        each <= 1000,
+    )
+    begin = np.full((20, 3), 1e-3) * np.linspace(0.1, 1, 20)[:, None] * [0, 1, 0]
+    ratio = np.divide(
+        *(peak(lambda t=t: cdf.batch_response(loop, [0.0, t], 0, begin)) for t in (200.0, 20.0))
+    )
+    row("memory of batch_response, 10 times the simulated time", f"{ratio:.2f} x", "flat", ratio < 1.2)
+    block, _, _ = lightly_damped()
+    spare = []
+    for count in (20, 63):
+        A, omega = np.geomspace(20, 60, count), np.geomspace(14, 30, count)
+        family = cdf.describing_function_family(block, A, omega)
+        result = family.harmonics.nbytes + family.regime.nbytes + family.residual.nbytes
+        spare.append(peak(lambda A=A, w=omega: cdf.describing_function_family(block, A, w)) / result)
+    row(
+        "memory of a family over its result, 10 times the points",
+        f"{spare[1]:.2f} x",
+        "1.5 x",
+        spare[1] < 1.5,
+    )
+
+
+def peak(work) -> int:
+    """Return the most memory that `work` holds at once [bytes], what it compiles or imports left out."""
+    work()
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def peers(block, per_point: float) -> None:
@@ -387,6 +527,10 @@ def main() -> int:
         accuracy_engine,
         exact_orbits,
         family_times,
+        general_family,
+        family_over_c,
+        verification,
+        memory,
         simulation,
         records,
         against_c,

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .orbits import OrbitSolver
+from ..simulate.runs import processors
+from .orbits import solver_for
+from .threads import on_threads
+
+_TOGETHER = 4  # starts that one thread takes at a time
 
 
 @dataclass(frozen=True)
@@ -56,19 +60,16 @@ def orbit_attractors(block, A, omega, *, starts=24, orders=9, output=None, seed=
     -------
     list of OrbitAttractor
     """
-    solver = OrbitSolver(block, output, **options)
-    rng = np.random.default_rng(seed)
+    solver = solver_for(block, output, **options)
+    point = float(A), float(omega), int(orders)
+    first = _answers(solver, [None], *point)
+    size = np.maximum(solver.shot.size, A / solver.inertia / omega**solver.symmetries.power)
+    tried = 3 * np.random.default_rng(seed).uniform(-1, 1, size=(int(starts) - 1, len(size))) * size
+    shares = np.array_split(tried, max(len(tried) // _TOGETHER, 1))
+    tasks = [(block, output, options, share, *point) for share in shares]
+    threads = 1 if solver.engine.calls_python else processors()
     found: list[list] = []
-    size = np.zeros(0)
-    for k in range(int(starts)):
-        state = None
-        if k:
-            y = 3 * rng.uniform(-1, 1, size=len(size)) * size
-            state = solver._state(y)
-        solver.forget()
-        harmonics, regime, residual = solver.solve_from(state, float(A), float(omega), int(orders))
-        if k == 0:
-            size = np.maximum(solver.shot.size, A / solver.inertia / omega**solver.symmetries.power)
+    for harmonics, regime, residual in first + sum(on_threads(_share, tasks, threads), []):
         for entry in found:
             if _same(entry, harmonics, regime, residual, tol):
                 entry[3] += 1
@@ -77,6 +78,20 @@ def orbit_attractors(block, A, omega, *, starts=24, orders=9, output=None, seed=
             found.append([regime, harmonics, residual, 1])
     found.sort(key=lambda entry: -entry[3])
     return [OrbitAttractor(r, h, e, n / starts) for r, h, e, n in found]
+
+
+def _share(block, output, options, tried, *point):
+    """Answers from some starts, in the coordinates of the symmetries."""
+    solver = solver_for(block, output, **options)
+    return _answers(solver, [solver._state(y) for y in tried], *point)
+
+
+def _answers(solver, states, A, omega, orders):
+    answers = []
+    for state in states:
+        solver.forget()
+        answers.append(solver.solve_from(state, A, omega, orders))
+    return answers
 
 
 def _same(entry, harmonics, regime, residual, tol):

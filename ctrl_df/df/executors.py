@@ -21,7 +21,12 @@ def check_picklable(executor, example) -> None:
 
 
 def by_executor(
-    executor: Any, function: Callable, tasks: Iterable[tuple[Any, tuple]], take: Callable, kept: Callable
+    executor: Any,
+    function: Callable,
+    tasks: Iterable[tuple[Any, tuple]],
+    take: Callable,
+    kept: Callable,
+    ahead: int | None = None,
 ):
     """Call ``take(key, function(*arguments))`` for every task, in order.
 
@@ -36,6 +41,8 @@ def by_executor(
     take : callable
     kept : callable
         Says in a sentence what of the work is kept, for the errors.
+    ahead : int, optional
+        Parts submitted before the first is taken.
 
     Raises
     ------
@@ -45,12 +52,12 @@ def by_executor(
         The work cannot be sent to the workers.
     """
     waiting: deque = deque()
-    tasks = iter(tasks)
+    tasks, ahead = iter(tasks), _AHEAD if ahead is None else ahead
     try:
         while True:
             for key, arguments in tasks:
                 waiting.append((key, executor.submit(function, *arguments)))
-                if len(waiting) >= _AHEAD:
+                if len(waiting) >= ahead:
                     break
             if not waiting:
                 return

@@ -272,7 +272,7 @@ class FrictionClosedForm(_OfPosition):
     """A mass with dry and viscous friction: Azenha & Machado (1997), eq. (6), exact with stiction as well."""
 
     quick = True
-    at_once = 1 << 15  # some tenths of a second
+    at_once = 1 << 14  # some milliseconds
 
     @staticmethod
     def fits(block) -> bool:

@@ -23,9 +23,15 @@ class Threads:
     ----------
     count : int
         How many work at once.
+
+    Attributes
+    ----------
+    ahead : int
+        Parts to submit before the first is taken: none waits for work, few for being taken.
     """
 
     def __init__(self, count: int):
+        self.ahead = count + 1
         self._pool, self._stop = _pool(os.getpid(), count), threading.Event()
 
     def submit(self, function, *arguments) -> Future:
@@ -42,6 +48,20 @@ class Threads:
             return function(*arguments)
         finally:
             _here.stop = None
+
+
+def on_threads(function, tasks, count: int) -> list:
+    """Return ``function(*task)`` for every task, in order, so many at once."""
+    count = min(count, len(tasks))
+    if count < 2:
+        return [function(*task) for task in tasks]
+    threads = Threads(count)
+    try:
+        futures = [threads.submit(function, *task) for task in tasks]
+        return [future.result() for future in futures]
+    except BaseException:
+        threads.stop()
+        raise
 
 
 def go_on() -> None:

@@ -14,11 +14,11 @@ from .family import FORMAT, Family, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
 from .methods import Guarded, Method
-from .threads import Threads
+from .threads import Threads, go_on
 
 LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
-_HERE = 1 << 15  # points of a quick method in one part
+_HERE = 1 << 14  # points of a quick method in one part: some milliseconds
 _LAW_ROWS = 64  # amplitudes of a static law computed together: its corners are looked for once for them
 
 
@@ -102,7 +102,8 @@ class Work:
                     take(part, compute_part(method, *self._grid(part), self.orders))
             else:
                 tasks = ((part, (method.copied(), *self._grid(part), self.orders)) for part in parts)
-                by_executor(executor, compute_part, tasks, take, self._kept)
+                ahead = {} if threads is None else {"ahead": threads.ahead}
+                by_executor(executor, compute_part, tasks, take, self._kept, **ahead)
         except BaseException:
             if threads is not None:
                 threads.stop()
@@ -262,7 +263,10 @@ def compute_part(method: Method, A, omega, orders):
 
 
 def _row_of_pieces(method, A, omega, orders, most):
-    pieces = [method.harmonics(A, omega[k : k + most], orders) for k in range(0, omega.size, most)]
+    pieces = []
+    for k in range(0, omega.size, most):
+        go_on()
+        pieces.append(method.harmonics(A, omega[k : k + most], orders))
     return [np.concatenate(p, axis=1) for p in zip(*pieces, strict=True)]
 
 

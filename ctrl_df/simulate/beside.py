@@ -1,6 +1,6 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""States beside one another, in one call: where a mode's flow takes them, their rates and margins."""
+"""States beside one another, in one call: where the flow of a mode takes them."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float
         _flow(
             driver.address(), engine.program, drive, clock, x, state.mode, state.time + span, rtol,
             max(rtol, 1e-10), scale, int(state.fresh), engine._space, np.zeros(0),
-            np.zeros((0, engine.nstates)), np.zeros((0, engine.noutputs)), np.zeros(1),
-            np.zeros(1, np.int64), np.zeros(1, np.int64),
-            np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex), clock.copy(),
-            state.mode.copy(), scale.copy(),
+            np.zeros((0, engine.nstates)), np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64),
+            np.zeros(1, np.int64), np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex),
+            clock.copy(), state.mode.copy(), scale.copy(),
         )  # fmt: skip
     pointers.raise_kept()
     return x
