@@ -120,6 +120,10 @@ class Mechanism(ct.NonlinearIOSystem):
         """Return the block with one more effect."""
         return self._remade(self._values, (*self._effects, *_as_effects([effect])))
 
+    def with_effects(self, effects: Iterable[Effect]) -> Mechanism:
+        """Return the block with these effects in the place of its own."""
+        return self._remade(self._values, _as_effects(effects))
+
     def without_effect(self, id: str) -> Mechanism:
         """Return the block without the effect of that id; ValueError if it has none."""
         if id not in self._keys:

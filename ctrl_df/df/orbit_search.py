@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control as ct
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
+from ..blocks.transparent import without_shifts
 from ..simulate import driver, layout, pointers
 from ..simulate.engine import Engine, State, harmonic_drive
 from ..simulate.layout import EVENT_KINDS
@@ -58,7 +57,13 @@ class OrbitSearch:
             )
         self.row = _row(block, output)
         self.delay, self.offset = 0.0, 0.0
-        self.engine = Engine(self._without_transparent(block))
+        inner = ct.ss(block) if isinstance(block, ct.TransferFunction) else block
+        if isinstance(block, Mechanism):
+            # delays turn the phase, offset and drift move the mean: all exactly, outside the simulation
+            inner, self.delay, late, offset = without_shifts(block)
+            if self.row == 0:
+                self.delay, self.offset = self.delay + late, offset
+        self.engine = Engine(inner)
         prog = self.engine.program
         if np.any(prog.nodes[:, layout.KIND] == layout.SAMPLED):
             raise ValueError(
@@ -127,30 +132,6 @@ class OrbitSearch:
         """Return the size of each state in the motion of a free inertia under the force."""
         power = self.symmetries.power
         return A / (np.where(power > 0, self.inertia, 1.0) * omega**power)
-
-    def _without_transparent(self, block):
-        """Delays turn the phase, offset and drift move the mean: all exactly, outside the simulation."""
-        if isinstance(block, ct.TransferFunction):
-            return ct.ss(block)
-        if not isinstance(block, Mechanism):
-            return block
-        rounded = any(e.id == "sensor_quantization" for e in block.effects)
-        kept = []
-        effect: Any
-        for effect in block.effects:
-            if effect.id == "input_delay":
-                self.delay += effect.delay
-            elif effect.id == "sensor_delay":
-                self.delay += effect.delay if self.row == 0 else 0.0
-            elif effect.id == "sensor_offset" and not rounded:
-                self.offset += effect.offset if self.row == 0 else 0.0
-            elif effect.id != "drift":
-                kept.append(effect)
-        return (
-            type(block)._make(block._values, kept, block.measured)
-            if len(kept) < len(block.effects)
-            else block
-        )
 
     def _check(self, s):
         if not s.autonomous:

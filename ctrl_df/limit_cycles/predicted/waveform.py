@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
+from ...blocks.transparent import without_delays
 from ...df.symmetries import Sizes, find_symmetries
 from ...simulate import layout
 from ...simulate.engine import Engine, harmonic_drive
@@ -44,7 +45,11 @@ class WaveformOrbit:
         self.max_steps = max_steps
         self.motion = None
         self.core = block.core if isinstance(block, Mechanism) else None
-        block, self.delay = _undelayed(block, self.row)
+        self.delay = 0.0
+        if isinstance(block, Mechanism):
+            # a pure delay only shifts a periodic answer; of the sensor's the position alone knows
+            block, self.delay, late, _ = without_delays(block)
+            self.delay += late if self.row == 0 else 0.0
         self.engine = Engine(block)
         kinds = self.engine.program.nodes[:, layout.KIND]
         self.suited = not np.isin(kinds, _UNSUITED).any()
@@ -235,15 +240,3 @@ class WaveformOrbit:
         Y[1:] -= 1j * travel / (np.pi * np.arange(1, count))  # coefficients of the ramp travel t / period
         Y[0] = 0.0 if self.adrift else Y[0] / 2
         return Y * np.exp(-1j * self.omega * self.delay * np.arange(count))
-
-
-def _undelayed(block, row):
-    """Take the pure delays out of a mechanism's channels: all they do to a periodic answer is to shift it."""
-    if not isinstance(block, Mechanism):
-        return block, 0.0
-    late = [e for e in block.effects if e.id == "input_delay" or (e.id == "sensor_delay" and row == 0)]
-    kept = [e for e in block.effects if e.id not in ("input_delay", "sensor_delay")]
-    if len(kept) == len(block.effects):
-        return block, 0.0
-    # of the x of a mechanism alone the sensor's delay is felt; its v is measured apart
-    return type(block)._make(block._values, kept, block.measured), sum(e.values[0] for e in late)
