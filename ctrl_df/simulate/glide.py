@@ -20,9 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from . import layout as L
-from .affine import LENGTHS, Memory, recall
+from .affine import LENGTHS, RANKS, Memory, entry, recall
 from .compiled import part
-from .matrices import multiply
+from .exponential import MOST, PATIENCE, Bend, bend_memory, bent_step, make_bent, narrow, parts, renew
+from .matrices import multiply, row_times
 from .modes import settle
 from .outputs import next_sample, record, tick
 
@@ -32,50 +33,59 @@ HALVINGS = 12  # of the step, at most, before its series is summed
 NEAR = 1e-3  # times the tolerance: how far a step may be from a known length, relative to it
 ALIKE = 1e-6  # relative difference of two steps below which they count as the same length
 
+SHARE = 0.2  # of the tolerance of a step that one between samples may have
+
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
+RANK, LEFT = 2, 3  # entries of `Bend.state`
 
 
 class Glide(NamedTuple):
-    """Propagators of the modes a `Memory` knows, one for each length, and scratch.
+    """Propagators of the modes a `Memory` knows, one for each length (where laws are curved, and rank), and scratch.
 
-    Rows: states, margins, outputs.
+    Rows: states (where laws are curved, at the nodes of a step), margins, outputs.
     """
 
     length: np.ndarray  # (LENGTHS,): known steps [s]; 0: none
     newest: np.ndarray  # (1,): which was learnt last
-    first: np.ndarray  # (SLOTS * LENGTHS, rows + 1): where a row begins in `column` and `value`
-    column: np.ndarray  # (SLOTS * LENGTHS, room)
-    value: np.ndarray  # (SLOTS * LENGTHS, room)
-    fed: np.ndarray  # (SLOTS * LENGTHS, margins): whether a row has entries of external inputs
-    owner: np.ndarray  # (SLOTS * LENGTHS, margins): margin of a row, -1 where the mode has none
-    curved: np.ndarray  # (SLOTS * LENGTHS, margins, nz): limits of curvature, times h^2/8, for each bound
+    first: np.ndarray  # (SLOTS * LENGTHS * RANKS, rows + 1): where a row begins in `column` and `value`
+    column: np.ndarray  # (SLOTS * LENGTHS * RANKS, room)
+    value: np.ndarray  # (SLOTS * LENGTHS * RANKS, room)
+    fed: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): whether a row has entries of external inputs
+    owner: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): margin of a row, -1 where the mode has none
+    curved: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins, nz): limits of curvature, times h^2/8, for each bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
     here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
     matrix: np.ndarray  # (5, nz, nz)
+    bend: Bend
 
 
-def glide_memory(memory: Memory, affine: bool, ny: int) -> Glide:
-    """Allocate the propagators that go with a memory; small where its modes are not affine."""
+def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
+    """Allocate the propagators that go with a memory; small where none can be used."""
     slots, n, nr = memory.b.shape
-    used = slots * LENGTHS
-    margins = memory.rows.shape[1] if affine else 0
-    nz = n + 2 * nr + 2 if affine else 0
-    rows = n + margins + ny if affine else 0
+    used = slots * LENGTHS * RANKS
+    nq = memory.acting.shape[0]
+    margins = memory.rows.shape[1] if usable else 0
+    nz = n + 2 * nr + 2 if usable else 0
+    rows = (MOST * n if nq > 0 else n) + margins + ny if usable else 0
+    room = rows * (nz + (MOST + 1) * nq)
     return Glide(
         np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
-        np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
+        np.zeros((used, room), np.int64), np.zeros((used, room)),
         np.zeros((used, margins), np.int64), np.zeros((used, margins), np.int64),
         np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins), np.zeros(nz), np.zeros(nz),
-        np.zeros((5, nz, nz)),
+        np.zeros((5, nz, nz)), bend_memory(memory),
     )  # fmt: skip
 
 
 @part
 def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
-          size, scale, rtol, next_tick, x1, xi, dx, g):  # fmt: skip
+          size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
+
+    `long` is a step that error control allowed before: where laws are curved, many short steps may not err more
+    than the one long step they stand for.
 
     Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
     of the next tick, and whether a controller ticked at the end of the last step.
@@ -83,7 +93,8 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
     n, nr, ny = x.shape[0], prog.ints[L.H_NR], prog.ints[L.H_NY]
     margins = store.rows.shape[1]
     time, nt = drive.time, drive.time.shape[0]
-    here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
+    here, ahead, bound = tracks.here, tracks.ahead, tracks.bound
+    curved = store.acting.shape[0] > 0
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
     done, ticked = 0, False
@@ -108,13 +119,6 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             which = _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick)
         if which < 0 or t1 > t_end or t1 - t > hmax:
             break
-        place = slot * LENGTHS + which
-        if store.ready[place] == 0:
-            _make(store, tracks, place, slot, tracks.length[which], n, nr, ny)
-        if store.ready[place] == USELESS:
-            break
-        if place != before:
-            stale, before = True, place
         # --- the inputs, and the bounds of all
         for k in range(nr):
             value = drive.harmonics[k, 0].real if drive.harmonics.shape[1] > 0 else 0.0
@@ -129,41 +133,25 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 ahead[n + k] = value + slope * (t1 - time[segment])
                 here[n + nr + k] = ahead[n + nr + k] = slope
         here[at], ahead[at] = t, t1
-        for j in range(at + 1):
-            if abs(here[j]) > bound[j]:
-                bound[j] = 2.0 * abs(here[j])
-                stale = True
-        clear = True
-        if stale:
-            for m in range(margins):
-                value = 0.0
-                for j in range(one + 1):
-                    value += tracks.curved[place, m, j] * bound[j]
-                slack[m] = value
-        # --- margins at the start, where they are not those at the end of the step before
-        first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
-        for m in range(margins):
-            if tracks.owner[place, m] >= 0 and (stale or (jumped and tracks.fed[place, m] == 1)):
-                if not _row(first, column, values, n + m, here) > slack[m]:
-                    clear = False
-                    break
-        if not clear:
-            break
-        stale = False
         # --- over the step
-        for j in range(n):
-            ahead[j] = _row(first, column, values, j, here)
-            clear = clear and abs(ahead[j]) < math.inf
-        for m in range(margins):
-            owner = tracks.owner[place, m]
-            if owner >= 0:
-                value = _row(first, column, values, n + m, ahead)
-                if not value > slack[m]:
-                    clear = False
-                    break
-                scale[0, owner] = max(scale[0, owner], value)
-        if not clear:
-            break
+        if curved:
+            share = min(tracks.length[which] / long, SHARE) if long > 0.0 else SHARE
+            place = _bent(
+                prog, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny
+            )
+            if place < 0 or not _clear(store, tracks, slot, place, scale, n, nr):
+                break
+        else:
+            place = (slot * LENGTHS + which) * RANKS
+            if store.ready[place] == 0:
+                _make(store, tracks, place, slot, tracks.length[which], n, nr, ny)
+            if store.ready[place] == USELESS:
+                break
+            stale = stale or place != before
+            if not _straight(tracks, place, stale, jumped, scale, n, margins):
+                break
+            stale = False
+        before = place
         for j in range(n):
             x[j] = here[j] = ahead[j]
             size[j] = max(abs(ahead[j]), 0.98 * size[j])
@@ -178,12 +166,14 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 settle(prog, drive, segment, t, x, mode, work, dx)
                 record(prog, drive, segment, t, x, mode, work, yout[index])
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
-            stale = True
+            stale, before = True, -1
             for j in range(n):
                 here[j] = x[j]
         elif due:
+            first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
+            row = parts(store, place % RANKS) * n + margins
             for i in range(ny):
-                yout[index, i] = _row(first, column, values, n + margins + i, ahead)
+                yout[index, i] = row_times(first, column, values, row + i, ahead)
         if due:
             for j in range(n):
                 xout[index, j] = x[j]
@@ -192,12 +182,120 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
 
 
 @part(inline=True)
-def _row(first, column, values, row, z):
-    """One row times z."""
-    value = 0.0
-    for i in range(first[row], first[row + 1]):
-        value += values[i] * z[column[i]]
-    return value
+def _straight(tracks, place, stale, jumped, scale, n, margins):
+    """Take an affine step from `here` to `ahead`; whether no event lies inside.
+
+    `stale`: bounds, slack and the margins here are to be taken anew; `jumped`: the inputs have.
+    """
+    here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
+    for j in range(here.shape[0] - 1):
+        if abs(here[j]) > bound[j]:
+            bound[j] = 2.0 * abs(here[j])
+            stale = True
+    if stale:
+        for m in range(margins):
+            value = 0.0
+            for j in range(here.shape[0]):
+                value += tracks.curved[place, m, j] * bound[j]
+            slack[m] = value
+    # margins at the start, where they are not those at the end of the step before
+    first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
+    for m in range(margins):
+        if tracks.owner[place, m] >= 0 and (stale or (jumped and tracks.fed[place, m] == 1)):
+            if not row_times(first, column, values, n + m, here) > slack[m]:
+                return False
+    for j in range(n):
+        ahead[j] = row_times(first, column, values, j, here)
+        if not abs(ahead[j]) < math.inf:
+            return False
+    for m in range(margins):
+        owner = tracks.owner[place, m]
+        if owner >= 0:
+            value = row_times(first, column, values, n + m, ahead)
+            if not value > slack[m]:
+                return False
+            scale[0, owner] = max(scale[0, owner], value)
+    return True
+
+
+@part
+def _bent(prog, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny):
+    """Take a step with curved laws from `here` to `ahead`; returns the propagator used, -1 where none will do.
+
+    `before` is that of the step before, if it ended here.
+    """
+    bend, state, h = tracks.bend, tracks.bend.state[slot], tracks.length[which]
+    n, nr = x.shape[0], store.b.shape[2]
+    rank, fresh = int(state[RANK]), False
+    if rank > 0:
+        state[LEFT] -= 1.0
+        if state[LEFT] <= 0.0:
+            rank = 0
+    while True:
+        place = (slot * LENGTHS + which) * RANKS + rank
+        if store.ready[place] == 0:
+            _make(store, tracks, place, slot, h, n, nr, ny)
+        if store.ready[place] == USABLE and bent_step(
+            prog, store, tracks, place, slot, rank, place == before, t, h, tracks.here, x, mode, rtol, atol,
+            size, grain, share, tracks.ahead,
+        ):  # fmt: skip
+            break
+        before = -1  # its nodes are lost
+        if not fresh and renew(prog, store, bend, slot, t, h, x, mode, size):
+            fresh = True
+        elif rank + 1 < RANKS:
+            rank += 1
+            state[LEFT] = PATIENCE
+        else:
+            return -1
+    state[RANK] = rank
+    return -1 if narrow(prog, x, tracks.ahead) else place
+
+
+@part
+def _clear(store, tracks, slot, place, scale, n, nr):
+    """Whether no event lies within a step with curved laws: margins at its nodes, and their bend between them.
+
+    Between two nodes a margin stays within an eighth of its second difference of the chord, if that difference
+    varies little from node to node, as the error allowed has it; twice as much is asked.
+    """
+    bend, here = tracks.bend, tracks.here
+    m = parts(store, place % RANKS)
+    margins, nq, nz = store.rows.shape[1], store.acting.shape[0], here.shape[0]
+    first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
+    sigma = tracks.length[place // RANKS % LENGTHS] / m
+    for node in range(m + 1):
+        x, gone = bend.x[node], node * sigma
+        if node == m:
+            x = tracks.ahead
+        for j in range(n):
+            bend.z[j] = x[j]
+        for k in range(nr):
+            bend.z[n + k] = here[n + k] + gone * here[n + nr + k]
+        bend.z[nz - 2] = here[nz - 2] + gone
+        for i in range(margins):
+            if tracks.owner[place, i] >= 0:
+                value = row_times(first, column, values, m * n + i, bend.z)
+                for k in range(nq):
+                    value += store.pushed[slot, i, k] * bend.q[node, k]
+                if not value > 0.0:
+                    return False
+                bend.margin[node, i] = value
+    for i in range(margins):
+        if tracks.owner[place, i] >= 0:
+            bent = 0.0
+            lowest = min(bend.margin[0, i], bend.margin[m, i])
+            for node in range(1, m):
+                lowest = min(lowest, bend.margin[node, i])
+                bent = max(
+                    bent,
+                    abs(bend.margin[node - 1, i] - 2.0 * bend.margin[node, i] + bend.margin[node + 1, i]),
+                )
+            if not lowest > 0.25 * bent:
+                return False
+            owner = tracks.owner[place, i]
+            scale[0, owner] = max(scale[0, owner], bend.margin[m, i])
+    return True
 
 
 @part(inline=True)
@@ -247,14 +345,46 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
     which = (tracks.newest[0] + 1) % LENGTHS
     tracks.newest[0] = which
     tracks.length[which] = length
-    for slot in range(store.ready.shape[0] // LENGTHS):
-        store.ready[slot * LENGTHS + which] = 0
+    for slot in range(store.ready.shape[0] // (LENGTHS * RANKS)):
+        for rank in range(RANKS):
+            store.ready[(slot * LENGTHS + which) * RANKS + rank] = 0
     return which
 
 
 @part
 def _make(store, tracks, place, slot, h, n, nr, ny):
-    """Compute the propagator of a mode over `h` seconds."""
+    """Compute the propagator of a mode over `h` seconds, and the rows of its margins and outputs."""
+    nz, margins, rank = n + 2 * nr + 2, store.rows.shape[1], place % RANKS
+    for row in range(margins):
+        tracks.fed[place, row] = 0
+        tracks.owner[place, row] = store.owners[row] if store.rows[slot, row, n + nr + 1] < math.inf else -1
+    if store.acting.shape[0] > 0:
+        count = make_bent(store, tracks, place, slot, rank, h, n, nr)
+    else:
+        count = _make_straight(store, tracks, place, slot, h, n, nr)
+    if count < 0:
+        store.ready[place] = USELESS
+        return
+    begin = parts(store, rank) * n
+    for row in range(margins + ny):
+        for j in range(nz):
+            value = 0.0
+            if row >= margins:
+                value = entry(store.outs[slot, row - margins], j, n, nr)
+            elif tracks.owner[place, row] >= 0:
+                value = entry(store.rows[slot, row], j, n, nr)
+                if value != 0.0 and n <= j < n + nr:
+                    tracks.fed[place, row] = 1
+            if value != 0.0:
+                tracks.column[place, count], tracks.value[place, count] = j, value
+                count += 1
+        tracks.first[place, begin + row + 1] = count
+    store.ready[place] = USABLE
+
+
+@part
+def _make_straight(store, tracks, place, slot, h, n, nr):
+    """Compute exp(M h), row after row, and the limits of curvature; returns their entries (-1: none)."""
     nz, margins = n + 2 * nr + 2, store.rows.shape[1]
     at, one = nz - 2, nz - 1
     m, absolute, power, scratch = tracks.matrix[0], tracks.matrix[1], tracks.matrix[2], tracks.matrix[3]
@@ -280,8 +410,6 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
     usable = halvings <= HALVINGS
     # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
     for row in range(margins):
-        tracks.fed[place, row] = 0
-        tracks.owner[place, row] = store.owners[row] if store.rows[slot, row, n + nr + 1] < math.inf else -1
         for j in range(nz):
             tracks.curved[place, row, j] = 0.0
         if not usable or tracks.owner[place, row] < 0:
@@ -289,7 +417,7 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
         for j in range(nz):
             power[0, j] = power[1, j] = 0.0
         for i in range(nz):
-            c = _entry(store.rows[slot, row], i, n, nr)
+            c = entry(store.rows[slot, row], i, n, nr)
             if c != 0.0:
                 for j in range(nz):
                     power[0, j] += c * m[i, j]
@@ -305,36 +433,18 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
         for j in range(nz):
             usable = usable and tracks.curved[place, row, j] < math.inf
     if not usable:
-        store.ready[place] = USELESS
-        return
+        return -1
     _exponential(m, h, halvings, whole, power, scratch)
     # --- the rows, zeros left out
     count = 0
     tracks.first[place, 0] = 0
-    for row in range(n + margins + ny):
+    for row in range(n):
         for j in range(nz):
-            value = 0.0
-            if row < n:
-                value = whole[row, j]
-            elif row >= n + margins:
-                value = _entry(store.outs[slot, row - n - margins], j, n, nr)
-            elif tracks.owner[place, row - n] >= 0:
-                value = _entry(store.rows[slot, row - n], j, n, nr)
-                if value != 0.0 and n <= j < n + nr:
-                    tracks.fed[place, row - n] = 1
-            if value != 0.0:
-                tracks.column[place, count], tracks.value[place, count] = j, value
+            if whole[row, j] != 0.0:
+                tracks.column[place, count], tracks.value[place, count] = j, whole[row, j]
                 count += 1
         tracks.first[place, row + 1] = count
-    store.ready[place] = USABLE
-
-
-@part
-def _entry(row, j, n, nr):
-    """Entry over z of a row of `Memory.rows` or `Memory.outs`; slopes of inputs stand beside."""
-    if j < n + nr:
-        return row[j]
-    return row[j - nr] if j >= n + 2 * nr else 0.0
+    return count
 
 
 @part
