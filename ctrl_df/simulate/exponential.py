@@ -5,12 +5,12 @@
 In such a mode dx/dt = A x + B r + c + d t + Q q(x, t), where q are the forces of the curved laws and the rates of
 their own states (`ctrl_df.simulate.affine`). With J = A + Q K and the remainder R = q - K x the affine part is
 taken exactly, inputs that are held or interpolated included, and R as a polynomial through m + 1 equal parts
-of the step: the state at node i is x_i = E_i z + sum_j W_ij R_j, z = (x, r, s, t, 1) as in
-`ctrl_df.simulate.glide`, with matrices that are the same in every step of a length. The remainder at nodes still
-ahead is foretold from the step before; each node, once known, corrects what is foretold for those behind it.
-What the last node changes is the difference between the results with polynomials of degree m - 1 and m: the error
-of the former, asked to stay within the tolerance of a step (the result is the latter). One evaluation of the
-curved laws a node, three a step (m = 3) or six where they vary fast.
+of the step, foretold from the step before. Each node, once known, changes what is foretold behind it by D_i
+u (u - 1) .. (u - i + 1) / i!, u counting nodes: the state at node k is x_k = E_k z + P_k p + sum_i G_ki D_i, i < k,
+z = (x, r, s, t, 1) as in `ctrl_df.simulate.glide`, p the parabola foretold, with matrices that are the same in
+every step of a length. What the last node changes, G_mm D_m, is the difference between the results with
+polynomials of degree m - 1 and m: the error of the former, asked to stay within the tolerance of a step (the
+result is the latter). One evaluation of the curved laws a node, three a step (m = 3) or six where they vary fast.
 
 K is zero until a law turns out stiff (a bristle: rates of 10^5 1/s): then it is the Jacobian of q at a recent
 state, taken anew when steps with it fail. It changes no result beyond the tolerance, as R has what it lacks.
@@ -23,11 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .affine import LENGTHS, RANKS, Memory, entry
+from .affine import LENGTHS, RANKS, Memory
 from .compiled import part
-from .layout import AUX, CURVED, F_ASKED, F_SIZE, H_BUMP, KIND, MECHANISM
+from .layout import CURVED, F_ASKED, F_SIZE, H_BUMP
 from .locate import bump_share
-from .matrices import multiply, row_times
+from .matrices import multiply
 from .mechanics import curved_forces
 from .views import lean
 
@@ -39,25 +39,27 @@ PATIENCE = 40  # steps of the higher rank before the lower one is tried again
 EPS = np.finfo(float).eps
 ORDER = 12  # terms of the series of an exponential
 HALVINGS = 40
-# R(tau) = sum_j R_j sum_k (tau / sigma)^k BASIS[j, k] / k! through the nodes 0, sigma, 2 sigma, ...
-BASES = np.zeros((RANKS, MOST + 1, MOST + 1))
-for _rank, _m in enumerate(PARTS):
-    _powers = np.linalg.inv(np.vander(np.arange(_m + 1.0), increasing=True))
-    BASES[_rank, : _m + 1, : _m + 1] = (_powers * [[math.factorial(k)] for k in range(_m + 1)]).T
+# u (u - 1) .. (u - i + 1) / i! = sum_k NEWTON[i, k] u^k / k!
+NEWTON = np.zeros((MOST + 1, MOST + 1))
+for _i in range(MOST + 1):
+    _powers = np.poly1d(np.poly(np.arange(_i))).coeffs[::-1] / math.factorial(_i)
+    NEWTON[_i, : _i + 1] = _powers * [math.factorial(k) for k in range(_i + 1)]
 BINOMIAL = np.array([[math.comb(k, i) for k in range(MOST + 1)] for i in range(MOST + 1)], float)
 
 
 class Bend(NamedTuple):
     """What the curved laws add to a `ctrl_df.simulate.glide.Glide`."""
 
-    last: np.ndarray  # (SLOTS * LENGTHS * RANKS, n, nq): what the last node's remainder does to the end
+    base: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): rows E_k, P_k of all nodes
+    gain: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): G_ki, as they are needed
     slope: np.ndarray  # (SLOTS, nq, n): K
     state: np.ndarray  # (SLOTS, 4): whether K is not zero, halvings, rank in use, patience
-    z: np.ndarray  # z and the remainder at all nodes, known or foretold
-    x: np.ndarray  # (MOST + 1, n): states at the nodes
+    z: np.ndarray  # z and p
+    start: np.ndarray  # states at all nodes without what they change
+    x: np.ndarray  # (MOST + 1, nz): z at the nodes
     q: np.ndarray  # (MOST + 1, nq): curved laws there
-    change: np.ndarray  # (nq,): of the last node's remainder
-    margin: np.ndarray  # (MOST + 1, margins): at the nodes
+    r: np.ndarray  # (MOST + 1, nq): remainder there
+    change: np.ndarray  # (MOST + 1, nq): D
     push: np.ndarray  # forces, see `ctrl_df.simulate.layout`
     dx: np.ndarray  # (n,)
     jacobian: np.ndarray  # (nq, n)
@@ -70,12 +72,15 @@ def bend_memory(memory: Memory) -> Bend:
     nq = memory.acting.shape[0]
     if nq == 0:
         slots = n = nr = 0
-    push = np.zeros(F_SIZE)
+    used, nz = slots * LENGTHS * RANKS, n + 2 * nr + 2
+    push, x = np.zeros(F_SIZE), np.zeros((MOST + 1, nz))
     push[F_ASKED] = CURVED
+    x[:, -1] = 1.0
     return Bend(
-        np.zeros((slots * LENGTHS * RANKS, n, nq)), np.zeros((slots, nq, n)), np.zeros((slots, 4)),
-        np.zeros(n + 2 * nr + 2 + (MOST + 1) * nq), np.zeros((MOST + 1, n)), np.zeros((MOST + 1, nq)),
-        np.zeros(nq), np.zeros((MOST + 1, memory.rows.shape[1])), push, np.zeros(n), np.zeros((nq, n)), np.zeros((2 * MOST + 7, n, n)),
+        np.zeros((used, MOST * n * (nz + 3 * nq))), np.zeros((used, (MOST * (MOST - 1) // 2 + 1) * n * nq)),
+        np.zeros((slots, nq, n)), np.zeros((slots, 4)), np.zeros(nz + 3 * nq), np.zeros(MOST * n), x,
+        np.zeros((MOST + 1, nq)), np.zeros((MOST + 1, nq)), np.zeros((MOST + 1, nq)), push, np.zeros(n),
+        np.zeros((nq, n)), np.zeros((2 * MOST + 7, n, n)),
     )  # fmt: skip
 
 
@@ -106,89 +111,97 @@ def _straighten(store, bend, slot):
     bend.state[slot, 0] = 0.0
 
 
-@part
-def ask(prog, t, x, mode, store, bend, q):
+@part(inline=True)
+def _ask(prog, node, t, x, mode, acting, push, dx, q):
     """Write the curved laws' forces and rates at one state."""
-    for node in range(prog.nodes.shape[0]):
-        if prog.nodes[node, KIND] == MECHANISM:
-            curved_forces(prog, node, t, x, mode, bend.push, bend.dx)
+    curved_forces(prog, node, t, x, mode, push, dx)
     for i in range(q.shape[0]):
-        acting = store.acting[i]
-        q[i] = bend.push[acting] if acting < 2 else bend.dx[acting - 2]
+        q[i] = push[acting[i]] if acting[i] < 2 else dx[acting[i] - 2]
 
 
 @part
-def bent_step(prog, store, tracks, place, slot, rank, goes_on, t, h, here, x, mode, rtol, atol, size, grain,
+def ask(prog, node, t, x, mode, acting, push, dx, q):
+    """Write the same; one copy of the code for all who are not in a hurry."""
+    _ask(prog, node, t, x, mode, acting, push, dx, q)
+
+
+@part(inline=True)
+def bent_step(prog, node, store, bend, place, slot, rank, goes_on, t, h, here, x, mode, rtol, atol, size, grain,
               share, ahead):  # fmt: skip
-    """One step from `here` (z) to `ahead` (its states), the nodes left in `tracks.bend`.
+    """One step from `here` (z) to `ahead` (its states), the nodes left in `bend`.
 
     With `goes_on` the step before ended here and was of the same kind. Returns whether its error is within
     `share` of the tolerance.
     """
-    bend = tracks.bend
-    n, nq, m = x.shape[0], store.acting.shape[0], lean(PARTS)[rank]
-    nz = here.shape[0]
-    z, xs, q = bend.z, bend.x, bend.q
-    slope, binomial = bend.slope[slot], lean(BINOMIAL)
+    n, nq, nz, m = x.shape[0], store.acting.shape[0], here.shape[0], lean(PARTS)[rank]
+    z, xs, q, r, change, start = bend.z, bend.x, bend.q, bend.r, bend.change, bend.start
+    slope, base, gain, binomial = bend.slope[slot], bend.base[place], bend.gain[place], lean(BINOMIAL)
     curled = bend.state[slot, 0] != 0.0
     sigma = h / m
-    first, column, value = tracks.first[place], tracks.column[place], tracks.value[place]
     for j in range(nz):
         z[j] = here[j]
     # --- the remainder here and, foretold, ahead: a parabola through the last nodes of the step before
     if goes_on:
         for i in range(nq):
-            end, before = nz + m * nq + i, nz + i
-            r0, r1, r2 = z[end], z[end - nq], z[end - 2 * nq]
-            one, two = r0 - r1, r0 - 2.0 * r1 + r2
-            for k in range(m + 1):
-                z[before + k * nq] = r0 + k * (one + 0.5 * (k + 1) * two)
+            r0, r1, r2 = r[m, i], r[m - 1, i], r[m - 2, i]
+            z[nz + 3 * i], z[nz + 3 * i + 1], z[nz + 3 * i + 2] = r0, r0 - r1, r0 - 2.0 * r1 + r2
             q[0, i] = q[m, i]
     else:
-        ask(prog, t, x, mode, store, bend, q[0])
+        ask(prog, node, t, x, mode, store.acting, bend.push, bend.dx, q[0])
         for i in range(nq):
             r0 = q[0, i]
             if curled:
                 for j in range(n):
                     r0 -= slope[i, j] * x[j]
-            for k in range(m + 1):
-                z[nz + k * nq + i] = r0
-    for j in range(n):
-        xs[0, j] = x[j]
+            z[nz + 3 * i], z[nz + 3 * i + 1], z[nz + 3 * i + 2] = r0, 0.0, 0.0
+    at = 0
+    for row in range(m * n):
+        total = 0.0
+        for j in range(nz + 3 * nq):
+            total += base[at + j] * z[j]
+        start[row] = total
+        at += nz + 3 * nq
     # --- from node to node
-    for node in range(1, m + 1):
+    at = 0
+    for k in range(1, m + 1):
         for j in range(n):
-            xs[node, j] = row_times(first, column, value, (node - 1) * n + j, z)
-        ask(prog, t + node * sigma, xs[node], mode, store, bend, q[node])
-        for i in range(nq):
-            r = q[node, i]
+            total = start[(k - 1) * n + j]
+            for i in range(1, k):
+                for f in range(nq):
+                    total += gain[at] * change[i, f]
+                    at += 1
+            xs[k, j] = total
+        _ask(prog, node, t + k * sigma, xs[k], mode, store.acting, bend.push, bend.dx, q[k])
+        for f in range(nq):
+            value = q[k, f]
             if curled:
                 for j in range(n):
-                    r -= slope[i, j] * xs[node, j]
-            at = nz + node * nq + i
-            change = r - z[at]
-            z[at] = r
-            bend.change[i] = change
-            for k in range(node + 1, m + 1):
-                z[at + (k - node) * nq] += binomial[node, k] * change
+                    value -= slope[f, j] * xs[k, j]
+            r[k, f] = value
+            value -= z[nz + 3 * f] + k * (z[nz + 3 * f + 1] + 0.5 * (k + 1) * z[nz + 3 * f + 2])
+            for i in range(1, k):
+                value -= binomial[i, k] * change[i, f]
+            change[k, f] = value
     # --- the end, and its error
     total = 0.0
     for j in range(n):
         error = 0.0
-        for i in range(nq):
-            error += bend.last[place, j, i] * bend.change[i]
+        for f in range(nq):
+            error += gain[at] * change[m, f]
+            at += 1
         ahead[j] = xs[m, j] + error
         if error != 0.0:
-            total += (error / (atol + h * grain[j] + rtol * size[j])) ** 2
+            error /= atol + h * grain[j] + rtol * size[j]
+            total += error * error
     return total <= n * share * share
 
 
 @part
-def renew(prog, store, bend, slot, t, h, x, mode, size):
+def renew(prog, node, store, bend, slot, t, h, x, mode, size):
     """Take the Jacobian of the curved laws here for K, if they are stiff beside the present one."""
     n, nq = x.shape[0], store.acting.shape[0]
     trial, q0, q1 = bend.x[1], bend.q[0], bend.q[1]
-    ask(prog, t, x, mode, store, bend, q0)
+    ask(prog, node, t, x, mode, store.acting, bend.push, bend.dx, q0)
     for j in range(n):
         trial[j] = x[j]
     for j in range(n):
@@ -196,7 +209,7 @@ def renew(prog, store, bend, slot, t, h, x, mode, size):
         trial[j] = x[j] + nudge
         nudge = trial[j] - x[j]
         if nudge != 0.0:
-            ask(prog, t, trial, mode, store, bend, q1)
+            ask(prog, node, t, trial, mode, store.acting, bend.push, bend.dx, q1)
         for i in range(nq):
             bend.jacobian[i, j] = (q1[i] - q0[i]) / nudge if nudge != 0.0 else 0.0
         trial[j] = x[j]
@@ -233,15 +246,14 @@ def narrow(prog, x, x1):
 
 
 @part
-def make_bent(store, tracks, place, slot, rank, h, n, nr):
-    """Compute the matrices E, W of a mode over `h` seconds, row after row; returns their entries (-1: none).
+def make_bent(store, bend, place, slot, rank, h, n, nr):
+    """Compute the matrices E, P, G of a mode over `h` seconds; returns whether there are any.
 
     With V_k(tau) the integral of exp((tau - s) J) s^k / k! over 0..tau, from its series and
     V_k(tau + s) = exp(s J) V_k(tau) + sum_j tau^(k - j) / (k - j)! V_j(s).
     """
-    bend = tracks.bend
-    m, nq = lean(PARTS)[rank], store.acting.shape[0]
-    basis = lean(BASES)[rank]
+    m, nq, newton = lean(PARTS)[rank], store.acting.shape[0], lean(NEWTON)
+    base, gain = bend.base[place], bend.gain[place]
     sigma = h / m
     # exp and V_0 .. V_m at tau, at sigma; J; scratch
     jacobian, scratch = bend.matrix[2 * MOST + 5], bend.matrix[2 * MOST + 6]
@@ -255,7 +267,7 @@ def make_bent(store, tracks, place, slot, rank, h, n, nr):
     while not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, scratch):
         halvings += 1
         if halvings > HALVINGS:
-            return -1
+            return False
     bend.state[slot, 1] = halvings
     tau = sigma / 2.0**halvings
     for _ in range(halvings):
@@ -263,45 +275,55 @@ def make_bent(store, tracks, place, slot, rank, h, n, nr):
         _extend(bend.matrix, tau, m, scratch)
         tau *= 2.0
     _copy(bend.matrix, m, n)
-    count = 0
-    tracks.first[place, 0] = 0
+    width, at = n + 2 * nr + 2 + 3 * nq, 0
     for node in range(1, m + 1):
         if node > 1:
             _extend(bend.matrix, (node - 1) * sigma, m, scratch)
-        exponential, v0, v1 = bend.matrix[0], bend.matrix[1], bend.matrix[2]
+        exponential, v0, v1, v2 = bend.matrix[0], bend.matrix[1], bend.matrix[2], bend.matrix[3]
         for i in range(n):
-            for column in range(n + 2 * nr + 2 + (m + 1) * nq):
-                value = 0.0
-                if column < n:
-                    value = exponential[i, column]
-                elif column < n + 2 * nr:
-                    k = (column - n) % nr
-                    for j in range(n):
-                        value += (v0[i, j] if column < n + nr else v1[i, j]) * store.b[slot, j, k]
-                elif column == n + 2 * nr:
-                    for j in range(n):
-                        value += v0[i, j] * store.d[slot, j]
-                elif column == n + 2 * nr + 1:
-                    for j in range(n):
-                        value += v0[i, j] * store.c[slot, j] + v1[i, j] * store.d[slot, j]
-                else:
-                    of, k = divmod(column - n - 2 * nr - 2, nq)
-                    scale = 1.0
-                    for power in range(m + 1):
-                        share = 0.0
-                        for j in range(n):
-                            share += bend.matrix[1 + power][i, j] * store.q[slot, j, k]
-                        value += basis[of, power] * scale * share
-                        scale /= sigma
-                    if node == m and of == m:
-                        bend.last[place, i, k] = value
-                if not abs(value) < math.inf:
-                    return -1
-                if value != 0.0:
-                    tracks.column[place, count], tracks.value[place, count] = column, value
-                    count += 1
-            tracks.first[place, (node - 1) * n + i + 1] = count
-    return count
+            row = ((node - 1) * n + i) * width
+            for j in range(width):
+                base[row + j] = 0.0
+            one = row + n + 2 * nr + 1
+            for j in range(n):
+                base[row + j] = exponential[i, j]
+                for k in range(nr):
+                    base[row + n + k] += v0[i, j] * store.b[slot, j, k]
+                    base[row + n + nr + k] += v1[i, j] * store.b[slot, j, k]
+                base[one - 1] += v0[i, j] * store.d[slot, j]
+                base[one] += v0[i, j] * store.c[slot, j] + v1[i, j] * store.d[slot, j]
+                for k in range(nq):
+                    # 1, u and u (u + 1) / 2
+                    up, bow = v1[i, j] / sigma, v2[i, j] / (sigma * sigma)
+                    to = one + 1 + 3 * k
+                    base[to] += v0[i, j] * store.q[slot, j, k]
+                    base[to + 1] += up * store.q[slot, j, k]
+                    base[to + 2] += (bow + 0.5 * up) * store.q[slot, j, k]
+            for j in range(width):
+                if not abs(base[row + j]) < math.inf:
+                    return False
+            for of in range(1, node):
+                for k in range(nq):
+                    gain[at] = _newton_gain(bend.matrix, newton, store.q[slot], i, of, k, sigma)
+                    at += 1
+    for i in range(n):
+        for k in range(nq):
+            gain[at] = _newton_gain(bend.matrix, newton, store.q[slot], i, m, k, sigma)
+            at += 1
+    return True
+
+
+@part
+def _newton_gain(matrix, newton, q, row, degree, k, sigma):
+    """What a change of remainder k that grows like the Newton polynomial of a degree does to a state."""
+    value, scale = 0.0, 1.0
+    for power in range(degree + 1):
+        total = 0.0
+        for j in range(q.shape[0]):
+            total += matrix[1 + power, row, j] * q[j, k]
+        value += newton[degree, power] * scale * total
+        scale /= sigma
+    return value
 
 
 @part

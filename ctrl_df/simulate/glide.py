@@ -22,8 +22,9 @@ import numpy as np
 from . import layout as L
 from .affine import LENGTHS, RANKS, Memory, entry, recall
 from .compiled import part
-from .exponential import MOST, PATIENCE, Bend, bend_memory, bent_step, make_bent, narrow, parts, renew
+from .exponential import PATIENCE, Bend, bend_memory, bent_step, make_bent, narrow, parts, renew
 from .matrices import multiply, row_times
+from .mechanics import mechanism
 from .modes import settle
 from .outputs import next_sample, record, tick
 
@@ -42,7 +43,7 @@ RANK, LEFT = 2, 3  # entries of `Bend.state`
 class Glide(NamedTuple):
     """Propagators of the modes a `Memory` knows, one for each length (where laws are curved, and rank), and scratch.
 
-    Rows: states (where laws are curved, at the nodes of a step), margins, outputs.
+    Rows: states (unless laws are curved), margins, outputs.
     """
 
     length: np.ndarray  # (LENGTHS,): known steps [s]; 0: none
@@ -51,6 +52,8 @@ class Glide(NamedTuple):
     column: np.ndarray  # (SLOTS * LENGTHS * RANKS, room)
     value: np.ndarray  # (SLOTS * LENGTHS * RANKS, room)
     fed: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): whether a row has entries of external inputs
+    count: np.ndarray  # (SLOTS * LENGTHS * RANKS,): margins that the mode has
+    active: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): which these are
     owner: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): margin of a row, -1 where the mode has none
     curved: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins, nz): limits of curvature, times h^2/8, for each bound
     bound: np.ndarray  # (nz,)
@@ -65,15 +68,14 @@ def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
     """Allocate the propagators that go with a memory; small where none can be used."""
     slots, n, nr = memory.b.shape
     used = slots * LENGTHS * RANKS
-    nq = memory.acting.shape[0]
     margins = memory.rows.shape[1] if usable else 0
     nz = n + 2 * nr + 2 if usable else 0
-    rows = (MOST * n if nq > 0 else n) + margins + ny if usable else 0
-    room = rows * (nz + (MOST + 1) * nq)
+    rows = n + margins + ny if usable else 0
     return Glide(
         np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
-        np.zeros((used, room), np.int64), np.zeros((used, room)),
-        np.zeros((used, margins), np.int64), np.zeros((used, margins), np.int64),
+        np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
+        np.zeros((used, margins), np.int64), np.zeros(used, np.int64), np.zeros((used, margins), np.int64),
+        np.zeros((used, margins), np.int64),
         np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins), np.zeros(nz), np.zeros(nz),
         np.zeros((5, nz, nz)), bend_memory(memory),
     )  # fmt: skip
@@ -94,7 +96,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
     margins = store.rows.shape[1]
     time, nt = drive.time, drive.time.shape[0]
     here, ahead, bound = tracks.here, tracks.ahead, tracks.bound
-    curved = store.acting.shape[0] > 0
+    curved, node = store.acting.shape[0] > 0, mechanism(prog)
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
     done, ticked = 0, False
@@ -137,7 +139,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         if curved:
             share = min(tracks.length[which] / long, SHARE) if long > 0.0 else SHARE
             place = _bent(
-                prog, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny
+                prog, node, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny
             )
             if place < 0 or not _clear(store, tracks, slot, place, scale, n, nr):
                 break
@@ -171,7 +173,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 here[j] = x[j]
         elif due:
             first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
-            row = parts(store, place % RANKS) * n + margins
+            row = margins if curved else n + margins
             for i in range(ny):
                 yout[index, i] = row_times(first, column, values, row + i, ahead)
         if due:
@@ -218,8 +220,8 @@ def _straight(tracks, place, stale, jumped, scale, n, margins):
     return True
 
 
-@part
-def _bent(prog, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny):
+@part(inline=True)
+def _bent(prog, node, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny):
     """Take a step with curved laws from `here` to `ahead`; returns the propagator used, -1 where none will do.
 
     `before` is that of the step before, if it ended here.
@@ -236,12 +238,12 @@ def _bent(prog, store, tracks, slot, which, before, t, x, mode, rtol, atol, size
         if store.ready[place] == 0:
             _make(store, tracks, place, slot, h, n, nr, ny)
         if store.ready[place] == USABLE and bent_step(
-            prog, store, tracks, place, slot, rank, place == before, t, h, tracks.here, x, mode, rtol, atol,
+            prog, node, store, bend, place, slot, rank, place == before, t, h, tracks.here, x, mode, rtol, atol,
             size, grain, share, tracks.ahead,
         ):  # fmt: skip
             break
         before = -1  # its nodes are lost
-        if not fresh and renew(prog, store, bend, slot, t, h, x, mode, size):
+        if not fresh and renew(prog, node, store, bend, slot, t, h, x, mode, size):
             fresh = True
         elif rank + 1 < RANKS:
             rank += 1
@@ -252,7 +254,7 @@ def _bent(prog, store, tracks, slot, which, before, t, x, mode, rtol, atol, size
     return -1 if narrow(prog, x, tracks.ahead) else place
 
 
-@part
+@part(inline=True)
 def _clear(store, tracks, slot, place, scale, n, nr):
     """Whether no event lies within a step with curved laws: margins at its nodes, and their bend between them.
 
@@ -260,41 +262,31 @@ def _clear(store, tracks, slot, place, scale, n, nr):
     varies little from node to node, as the error allowed has it; twice as much is asked.
     """
     bend, here = tracks.bend, tracks.here
-    m = parts(store, place % RANKS)
-    margins, nq, nz = store.rows.shape[1], store.acting.shape[0], here.shape[0]
+    m, nq, nz = parts(store, place % RANKS), store.acting.shape[0], here.shape[0]
     first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
     sigma = tracks.length[place // RANKS % LENGTHS] / m
     for node in range(m + 1):
-        x, gone = bend.x[node], node * sigma
-        if node == m:
-            x = tracks.ahead
-        for j in range(n):
-            bend.z[j] = x[j]
         for k in range(nr):
-            bend.z[n + k] = here[n + k] + gone * here[n + nr + k]
-        bend.z[nz - 2] = here[nz - 2] + gone
-        for i in range(margins):
-            if tracks.owner[place, i] >= 0:
-                value = row_times(first, column, values, m * n + i, bend.z)
-                for k in range(nq):
-                    value += store.pushed[slot, i, k] * bend.q[node, k]
-                if not value > 0.0:
-                    return False
-                bend.margin[node, i] = value
-    for i in range(margins):
-        if tracks.owner[place, i] >= 0:
-            bent = 0.0
-            lowest = min(bend.margin[0, i], bend.margin[m, i])
-            for node in range(1, m):
-                lowest = min(lowest, bend.margin[node, i])
-                bent = max(
-                    bent,
-                    abs(bend.margin[node - 1, i] - 2.0 * bend.margin[node, i] + bend.margin[node + 1, i]),
-                )
-            if not lowest > 0.25 * bent:
-                return False
-            owner = tracks.owner[place, i]
-            scale[0, owner] = max(scale[0, owner], bend.margin[m, i])
+            bend.x[node, n + k] = here[n + k] + node * sigma * here[n + nr + k]
+        bend.x[node, nz - 2] = here[nz - 2] + node * sigma
+    for j in range(n):
+        bend.x[0, j], bend.x[m, j] = here[j], tracks.ahead[j]
+    for a in range(tracks.count[place]):
+        i = tracks.active[place, a]
+        before = now = bent = 0.0
+        lowest = math.inf
+        for node in range(m + 1):
+            value = row_times(first, column, values, i, bend.x[node])
+            for k in range(nq):
+                value += store.pushed[slot, i, k] * bend.q[node, k]
+            if node > 1:
+                bent = max(bent, abs(before - 2.0 * now + value))
+            before, now = now, value
+            lowest = min(lowest, value)
+        if not lowest > 0.25 * bent:
+            return False
+        owner = tracks.owner[place, i]
+        scale[0, owner] = max(scale[0, owner], now)
     return True
 
 
@@ -354,18 +346,22 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
 @part
 def _make(store, tracks, place, slot, h, n, nr, ny):
     """Compute the propagator of a mode over `h` seconds, and the rows of its margins and outputs."""
-    nz, margins, rank = n + 2 * nr + 2, store.rows.shape[1], place % RANKS
+    nz, margins = n + 2 * nr + 2, store.rows.shape[1]
+    tracks.count[place] = 0
     for row in range(margins):
         tracks.fed[place, row] = 0
         tracks.owner[place, row] = store.owners[row] if store.rows[slot, row, n + nr + 1] < math.inf else -1
+        if tracks.owner[place, row] >= 0:
+            tracks.active[place, tracks.count[place]] = row
+            tracks.count[place] += 1
+    tracks.first[place, 0] = 0
     if store.acting.shape[0] > 0:
-        count = make_bent(store, tracks, place, slot, rank, h, n, nr)
+        begin, count = 0, 0 if make_bent(store, tracks.bend, place, slot, place % RANKS, h, n, nr) else -1
     else:
-        count = _make_straight(store, tracks, place, slot, h, n, nr)
+        begin, count = n, _make_straight(store, tracks, place, slot, h, n, nr)
     if count < 0:
         store.ready[place] = USELESS
         return
-    begin = parts(store, rank) * n
     for row in range(margins + ny):
         for j in range(nz):
             value = 0.0
@@ -437,7 +433,6 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
     _exponential(m, h, halvings, whole, power, scratch)
     # --- the rows, zeros left out
     count = 0
-    tracks.first[place, 0] = 0
     for row in range(n):
         for j in range(nz):
             if whole[row, j] != 0.0:

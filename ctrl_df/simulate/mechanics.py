@@ -32,6 +32,8 @@ from .layout import (
     J_NONE,
     J_RIGID,
     JOINT,
+    KIND,
+    MECHANISM,
     MODE,
     P_C,
     P_GAP,
@@ -115,6 +117,15 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
             pull = par[po + P_K] * bend + par[po + P_C] * (x[xo + 3] - x[xo + 1])
             f[0] += pull
             f[1] -= pull
+
+
+@part(inline=True)
+def mechanism(prog):
+    """Index of the first mechanism among the nodes; their number if there is none."""
+    for node in range(prog.nodes.shape[0]):
+        if prog.nodes[node, KIND] == MECHANISM:
+            return node
+    return prog.nodes.shape[0]
 
 
 @part(inline=True)
