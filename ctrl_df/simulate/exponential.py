@@ -54,12 +54,7 @@ class Bend(NamedTuple):
     gain: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): G_ki, as they are needed
     slope: np.ndarray  # (SLOTS, nq, n): K
     state: np.ndarray  # (SLOTS, 4): whether K is not zero, halvings, rank in use, patience
-    z: np.ndarray  # z and p
-    start: np.ndarray  # states at all nodes without what they change
-    x: np.ndarray  # (MOST + 1, nz): z at the nodes
-    q: np.ndarray  # (MOST + 1, nq): curved laws there
-    r: np.ndarray  # (MOST + 1, nq): remainder there
-    change: np.ndarray  # (MOST + 1, nq): D
+    nodes: np.ndarray  # (MOST + 1, nz + 3 nq): at each node z, q, R and D
     push: np.ndarray  # forces, see `ctrl_df.simulate.layout`
     dx: np.ndarray  # (n,)
     jacobian: np.ndarray  # (nq, n)
@@ -73,14 +68,13 @@ def bend_memory(memory: Memory) -> Bend:
     if nq == 0:
         slots = n = nr = 0
     used, nz = slots * LENGTHS * RANKS, n + 2 * nr + 2
-    push, x = np.zeros(F_SIZE), np.zeros((MOST + 1, nz))
+    push, nodes = np.zeros(F_SIZE), np.zeros((MOST + 1, nz + 3 * nq))
     push[F_ASKED] = CURVED
-    x[:, -1] = 1.0
+    nodes[:, nz - 1] = 1.0
     return Bend(
         np.zeros((used, MOST * n * (nz + 3 * nq))), np.zeros((used, (MOST * (MOST - 1) // 2 + 1) * n * nq)),
-        np.zeros((slots, nq, n)), np.zeros((slots, 4)), np.zeros(nz + 3 * nq), np.zeros(MOST * n), x,
-        np.zeros((MOST + 1, nq)), np.zeros((MOST + 1, nq)), np.zeros((MOST + 1, nq)), push, np.zeros(n),
-        np.zeros((nq, n)), np.zeros((2 * MOST + 7, n, n)),
+        np.zeros((slots, nq, n)), np.zeros((slots, 4)), nodes, push, np.zeros(n), np.zeros((nq, n)),
+        np.zeros((2 * MOST + 7, n, n)),
     )  # fmt: skip
 
 
@@ -112,84 +106,87 @@ def _straighten(store, bend, slot):
 
 
 @part(inline=True)
-def _ask(prog, node, t, x, mode, acting, push, dx, q):
-    """Write the curved laws' forces and rates at one state."""
+def _ask(prog, node, t, x, mode, acting, push, dx, out, first):
+    """Write the curved laws' forces and rates at one state to `out` from `first` on."""
     curved_forces(prog, node, t, x, mode, push, dx)
-    for i in range(q.shape[0]):
-        q[i] = push[acting[i]] if acting[i] < 2 else dx[acting[i] - 2]
+    for i in range(acting.shape[0]):
+        out[first + i] = push[acting[i]] if acting[i] < 2 else dx[acting[i] - 2]
 
 
 @part
-def ask(prog, node, t, x, mode, acting, push, dx, q):
+def ask(prog, node, t, x, mode, acting, push, dx, out, first):
     """Write the same; one copy of the code for all who are not in a hurry."""
-    _ask(prog, node, t, x, mode, acting, push, dx, q)
+    _ask(prog, node, t, x, mode, acting, push, dx, out, first)
 
 
-@part(inline=True)
-def bent_step(prog, node, store, bend, place, slot, rank, goes_on, t, h, here, x, mode, rtol, atol, size, grain,
-              share, ahead):  # fmt: skip
-    """One step from `here` (z) to `ahead` (its states), the nodes left in `bend`.
+@part
+def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, gain, m, goes_on, t, h, here, ahead,
+              size, grain, rtol, atol, share):  # fmt: skip
+    """One step of m parts from `here` (z and p) to the states `ahead`, the nodes left in `nodes`.
 
-    With `goes_on` the step before ended here and was of the same kind. Returns whether its error is within
-    `share` of the tolerance.
+    With `goes_on` the step before ended here and was of the same kind; `curled`: K is not zero. Returns whether
+    the error is within `share` of the tolerance.
     """
-    n, nq, nz, m = x.shape[0], store.acting.shape[0], here.shape[0], lean(PARTS)[rank]
-    z, xs, q, r, change, start = bend.z, bend.x, bend.q, bend.r, bend.change, bend.start
-    slope, base, gain, binomial = bend.slope[slot], bend.base[place], bend.gain[place], lean(BINOMIAL)
-    curled = bend.state[slot, 0] != 0.0
-    sigma = h / m
-    for j in range(nz):
-        z[j] = here[j]
+    n, nq = size.shape[0], acting.shape[0]
+    width = here.shape[0]
+    nz = width - 3 * nq
+    at_r, at_d, sigma, binomial = nz + nq, nz + 2 * nq, h / m, lean(BINOMIAL)
     # --- the remainder here and, foretold, ahead: a parabola through the last nodes of the step before
-    if goes_on:
-        for i in range(nq):
-            r0, r1, r2 = r[m, i], r[m - 1, i], r[m - 2, i]
-            z[nz + 3 * i], z[nz + 3 * i + 1], z[nz + 3 * i + 2] = r0, r0 - r1, r0 - 2.0 * r1 + r2
-            q[0, i] = q[m, i]
-    else:
-        ask(prog, node, t, x, mode, store.acting, bend.push, bend.dx, q[0])
-        for i in range(nq):
-            r0 = q[0, i]
+    if not goes_on:
+        ask(prog, node, t, here, mode, acting, push, dx, nodes[0], nz)
+    for f in range(nq):
+        p = nz + 3 * f
+        if goes_on:
+            r0, r1, r2 = nodes[m, at_r + f], nodes[m - 1, at_r + f], nodes[m - 2, at_r + f]
+            here[p], here[p + 1], here[p + 2] = r0, r0 - r1, r0 - 2.0 * r1 + r2
+            nodes[0, nz + f] = nodes[m, nz + f]
+        else:
+            r0 = nodes[0, nz + f]
             if curled:
                 for j in range(n):
-                    r0 -= slope[i, j] * x[j]
-            z[nz + 3 * i], z[nz + 3 * i + 1], z[nz + 3 * i + 2] = r0, 0.0, 0.0
-    at = 0
-    for row in range(m * n):
-        total = 0.0
-        for j in range(nz + 3 * nq):
-            total += base[at + j] * z[j]
-        start[row] = total
-        at += nz + 3 * nq
-    # --- from node to node
+                    r0 -= slope[f, j] * here[j]
+            here[p], here[p + 1], here[p + 2] = r0, 0.0, 0.0
+    for f in range(nq):
+        nodes[0, at_r + f] = here[nz + 3 * f]
     at = 0
     for k in range(1, m + 1):
         for j in range(n):
-            total = start[(k - 1) * n + j]
+            total = 0.0
+            for i in range(width):
+                total += base[at + i] * here[i]
+            nodes[k, j] = total
+            at += width
+    # --- from node to node
+    at = 0
+    for k in range(1, m + 1):
+        row = nodes[k]
+        for j in range(n):
+            total = row[j]
             for i in range(1, k):
                 for f in range(nq):
-                    total += gain[at] * change[i, f]
+                    total += gain[at] * nodes[i, at_d + f]
                     at += 1
-            xs[k, j] = total
-        _ask(prog, node, t + k * sigma, xs[k], mode, store.acting, bend.push, bend.dx, q[k])
+            row[j] = total
+        _ask(prog, node, t + k * sigma, row, mode, acting, push, dx, row, nz)
         for f in range(nq):
-            value = q[k, f]
+            value = row[nz + f]
             if curled:
                 for j in range(n):
-                    value -= slope[f, j] * xs[k, j]
-            r[k, f] = value
-            value -= z[nz + 3 * f] + k * (z[nz + 3 * f + 1] + 0.5 * (k + 1) * z[nz + 3 * f + 2])
+                    value -= slope[f, j] * row[j]
+            row[at_r + f] = value
+            p = nz + 3 * f
+            value -= here[p] + k * (here[p + 1] + 0.5 * (k + 1) * here[p + 2])
             for i in range(1, k):
-                value -= binomial[i, k] * change[i, f]
-            change[k, f] = value
+                value -= binomial[i, k] * nodes[i, at_d + f]
+            row[at_d + f] = value
     # --- the end, and its error
     total = 0.0
     for j in range(n):
         error = 0.0
         for f in range(nq):
-            error += gain[at] * change[m, f]
+            error += gain[at] * nodes[m, at_d + f]
             at += 1
-        ahead[j] = xs[m, j] + error
+        ahead[j] = nodes[m, j] + error
         if error != 0.0:
             error /= atol + h * grain[j] + rtol * size[j]
             total += error * error
@@ -200,18 +197,17 @@ def bent_step(prog, node, store, bend, place, slot, rank, goes_on, t, h, here, x
 def renew(prog, node, store, bend, slot, t, h, x, mode, size):
     """Take the Jacobian of the curved laws here for K, if they are stiff beside the present one."""
     n, nq = x.shape[0], store.acting.shape[0]
-    trial, q0, q1 = bend.x[1], bend.q[0], bend.q[1]
-    ask(prog, node, t, x, mode, store.acting, bend.push, bend.dx, q0)
+    trial, beside = bend.nodes[1], bend.nodes[0]
+    ask(prog, node, t, x, mode, store.acting, bend.push, bend.dx, beside, 0)
     for j in range(n):
         trial[j] = x[j]
     for j in range(n):
-        nudge = NUDGE * size[j]
-        trial[j] = x[j] + nudge
+        trial[j] = x[j] + NUDGE * size[j]
         nudge = trial[j] - x[j]
         if nudge != 0.0:
-            ask(prog, node, t, trial, mode, store.acting, bend.push, bend.dx, q1)
+            ask(prog, node, t, trial, mode, store.acting, bend.push, bend.dx, beside, nq)
         for i in range(nq):
-            bend.jacobian[i, j] = (q1[i] - q0[i]) / nudge if nudge != 0.0 else 0.0
+            bend.jacobian[i, j] = (beside[nq + i] - beside[i]) / nudge if nudge != 0.0 else 0.0
         trial[j] = x[j]
     # contraction: trace of h Q (dq/dx - K), and of its square
     lag, trace, square = bend.matrix[0], 0.0, 0.0

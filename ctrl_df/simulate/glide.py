@@ -76,7 +76,8 @@ def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
         np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
         np.zeros((used, margins), np.int64), np.zeros(used, np.int64), np.zeros((used, margins), np.int64),
         np.zeros((used, margins), np.int64),
-        np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins), np.zeros(nz), np.zeros(nz),
+        np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
+        np.zeros(nz + 3 * memory.acting.shape[0]), np.zeros(nz),
         np.zeros((5, nz, nz)), bend_memory(memory),
     )  # fmt: skip
 
@@ -138,10 +139,28 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         # --- over the step
         if curved:
             share = min(tracks.length[which] / long, SHARE) if long > 0.0 else SHARE
-            place = _bent(
-                prog, node, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny
-            )
-            if place < 0 or not _clear(store, tracks, slot, place, scale, n, nr):
+            bend, state = tracks.bend, tracks.bend.state[slot]
+            if state[RANK] > 0.0:
+                state[LEFT] -= 1.0
+                if state[LEFT] <= 0.0:
+                    state[RANK] = 0.0
+            place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
+            if store.ready[place] != USABLE or not bent_step(
+                prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
+                state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
+                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol, share,
+            ):  # fmt: skip
+                place = _again(
+                    prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size, grain, share, ny
+                )
+            if place < 0 or narrow(prog, x, ahead):
+                break
+            m = parts(store, place % RANKS)
+            if not _clear(
+                tracks.bend.nodes, store.pushed[slot], tracks.first[place], tracks.column[place],
+                tracks.value[place], tracks.active[place], tracks.count[place], tracks.owner[place], here,
+                ahead, scale, m, tracks.length[which] / m, n, nr,
+            ):  # fmt: skip
                 break
         else:
             place = (slot * LENGTHS + which) * RANKS
@@ -220,73 +239,68 @@ def _straight(tracks, place, stale, jumped, scale, n, margins):
     return True
 
 
-@part(inline=True)
-def _bent(prog, node, store, tracks, slot, which, before, t, x, mode, rtol, atol, size, grain, share, ny):
-    """Take a step with curved laws from `here` to `ahead`; returns the propagator used, -1 where none will do.
+@part
+def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
+    """Try a step with curved laws that failed, with matrices not made yet, with K taken anew, with more parts.
 
-    `before` is that of the step before, if it ended here.
+    Returns the propagator that it succeeded with, -1 where none will do.
     """
     bend, state, h = tracks.bend, tracks.bend.state[slot], tracks.length[which]
-    n, nr = x.shape[0], store.b.shape[2]
-    rank, fresh = int(state[RANK]), False
-    if rank > 0:
-        state[LEFT] -= 1.0
-        if state[LEFT] <= 0.0:
-            rank = 0
+    rank, made, fresh = int(state[RANK]), False, False
     while True:
         place = (slot * LENGTHS + which) * RANKS + rank
         if store.ready[place] == 0:
-            _make(store, tracks, place, slot, h, n, nr, ny)
-        if store.ready[place] == USABLE and bent_step(
-            prog, node, store, bend, place, slot, rank, place == before, t, h, tracks.here, x, mode, rtol, atol,
-            size, grain, share, tracks.ahead,
+            _make(store, tracks, place, slot, h, x.shape[0], store.b.shape[2], ny)
+            made = True
+        if made and store.ready[place] == USABLE and bent_step(
+            prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot], state[0] != 0.0,
+            bend.base[place], bend.gain[place], parts(store, rank), False, t, h, tracks.here, tracks.ahead,
+            size, grain, rtol, atol, share,
         ):  # fmt: skip
-            break
-        before = -1  # its nodes are lost
+            state[RANK] = rank
+            return place
+        made = True
         if not fresh and renew(prog, node, store, bend, slot, t, h, x, mode, size):
             fresh = True
         elif rank + 1 < RANKS:
             rank += 1
             state[LEFT] = PATIENCE
         else:
+            state[RANK] = 0.0
             return -1
-    state[RANK] = rank
-    return -1 if narrow(prog, x, tracks.ahead) else place
 
 
-@part(inline=True)
-def _clear(store, tracks, slot, place, scale, n, nr):
+@part
+def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahead, scale, m, sigma, n, nr):
     """Whether no event lies within a step with curved laws: margins at its nodes, and their bend between them.
 
     Between two nodes a margin stays within an eighth of its second difference of the chord, if that difference
     varies little from node to node, as the error allowed has it; twice as much is asked.
     """
-    bend, here = tracks.bend, tracks.here
-    m, nq, nz = parts(store, place % RANKS), store.acting.shape[0], here.shape[0]
-    first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
-    sigma = tracks.length[place // RANKS % LENGTHS] / m
+    nq, nz = pushed.shape[1], n + 2 * nr + 2
+    for k in range(nr):
+        nodes[0, n + k] = here[n + k]
+        for node in range(1, m + 1):
+            nodes[node, n + k] = here[n + k] + node * sigma * here[n + nr + k]
     for node in range(m + 1):
-        for k in range(nr):
-            bend.x[node, n + k] = here[n + k] + node * sigma * here[n + nr + k]
-        bend.x[node, nz - 2] = here[nz - 2] + node * sigma
+        nodes[node, nz - 2] = here[nz - 2] + node * sigma
     for j in range(n):
-        bend.x[0, j], bend.x[m, j] = here[j], tracks.ahead[j]
-    for a in range(tracks.count[place]):
-        i = tracks.active[place, a]
+        nodes[0, j], nodes[m, j] = here[j], ahead[j]
+    for a in range(count):
+        i = active[a]
         before = now = bent = 0.0
         lowest = math.inf
         for node in range(m + 1):
-            value = row_times(first, column, values, i, bend.x[node])
+            value = row_times(first, column, values, i, nodes[node])
             for k in range(nq):
-                value += store.pushed[slot, i, k] * bend.q[node, k]
+                value += pushed[i, k] * nodes[node, nz + k]
             if node > 1:
                 bent = max(bent, abs(before - 2.0 * now + value))
             before, now = now, value
             lowest = min(lowest, value)
         if not lowest > 0.25 * bent:
             return False
-        owner = tracks.owner[place, i]
-        scale[0, owner] = max(scale[0, owner], now)
+        scale[0, owner[i]] = max(scale[0, owner[i]], now)
     return True
 
 
