@@ -48,7 +48,7 @@ sliding, step below the resolution of time, more steps within a delay than its h
 PATIENCE = 40  # steps before a lower order that failed is tried again
 DENSE = 1e-3  # error of a step, times its tolerance, below which a lower order is tried
 SAME = 1e-15  # relative difference of two instants that only rounding parts
-WAIT = 7  # steps at most until constant propagators are tried again
+WAIT = 3  # steps at most until constant propagators are tried again
 GRAINS = 200  # steps after which rounding is asked anew
 REACH = 1e-4  # of a step: the time over which rates of inputs are taken
 SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress

@@ -27,17 +27,16 @@ from .affine import LENGTHS, RANKS, Memory
 from .compiled import part
 from .layout import CURVED, F_ASKED, F_SIZE, H_BUMP
 from .locate import bump_share
-from .matrices import multiply
 from .mechanics import curved_forces
 from .views import lean
 
-PARTS = np.array([3, 6])  # of a step, for each rank
-MOST = 6
-STIFF = 0.1  # contraction h |dR/dx| of a sweep beyond which K is renewed
+PARTS = np.array([3, 5, 8])  # of a step, for each rank
+MOST = 8
+STIFF = 0.03  # contraction h |dR/dx| of a sweep beyond which K is renewed
 NUDGE = 1e-6  # of difference quotients of the curved laws, relative to the size of a state
-PATIENCE = 40  # steps of the higher rank before the lower one is tried again
+PATIENCE = 20  # steps of the higher rank before the lower one is tried again
 EPS = np.finfo(float).eps
-ORDER = 12  # terms of the series of an exponential
+ORDER = 16  # terms of the series of an exponential
 HALVINGS = 40
 # u (u - 1) .. (u - i + 1) / i! = sum_k NEWTON[i, k] u^k / k!
 NEWTON = np.zeros((MOST + 1, MOST + 1))
@@ -58,7 +57,7 @@ class Bend(NamedTuple):
     push: np.ndarray  # forces, see `ctrl_df.simulate.layout`
     dx: np.ndarray  # (n,)
     jacobian: np.ndarray  # (nq, n)
-    matrix: np.ndarray  # (2 * MOST + 7, n, n): scratch
+    matrix: np.ndarray  # (2 * MOST + 5, n, n): scratch
 
 
 def bend_memory(memory: Memory) -> Bend:
@@ -74,7 +73,7 @@ def bend_memory(memory: Memory) -> Bend:
     return Bend(
         np.zeros((used, MOST * n * (nz + 3 * nq))), np.zeros((used, (MOST * (MOST - 1) // 2 + 1) * n * nq)),
         np.zeros((slots, nq, n)), np.zeros((slots, 4)), nodes, push, np.zeros(n), np.zeros((nq, n)),
-        np.zeros((2 * MOST + 7, n, n)),
+        np.zeros((2 * MOST + 5, n, n)),
     )  # fmt: skip
 
 
@@ -251,8 +250,8 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
     m, nq, newton = lean(PARTS)[rank], store.acting.shape[0], lean(NEWTON)
     base, gain = bend.base[place], bend.gain[place]
     sigma = h / m
-    # exp and V_0 .. V_m at tau, at sigma; J; scratch
-    jacobian, scratch = bend.matrix[2 * MOST + 5], bend.matrix[2 * MOST + 6]
+    # exp and V_0 .. V_m at tau, at sigma; J
+    jacobian = bend.matrix[2 * MOST + 4]
     for i in range(n):
         for j in range(n):
             value = store.a[slot, i, j]
@@ -260,7 +259,7 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
                 value += store.q[slot, i, k] * bend.slope[slot, k, j]
             jacobian[i, j] = value
     halvings = int(bend.state[slot, 1])
-    while not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, scratch):
+    while not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, bend.dx):
         halvings += 1
         if halvings > HALVINGS:
             return False
@@ -268,13 +267,13 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
     tau = sigma / 2.0**halvings
     for _ in range(halvings):
         _copy(bend.matrix, m, n)
-        _extend(bend.matrix, tau, m, scratch)
+        _extend(bend.matrix, tau, m, bend.dx)
         tau *= 2.0
     _copy(bend.matrix, m, n)
     width, at = n + 2 * nr + 2 + 3 * nq, 0
     for node in range(1, m + 1):
         if node > 1:
-            _extend(bend.matrix, (node - 1) * sigma, m, scratch)
+            _extend(bend.matrix, (node - 1) * sigma, m, bend.dx)
         exponential, v0, v1, v2 = bend.matrix[0], bend.matrix[1], bend.matrix[2], bend.matrix[3]
         for i in range(n):
             row = ((node - 1) * n + i) * width
@@ -323,7 +322,7 @@ def _newton_gain(matrix, newton, q, row, degree, k, sigma):
 
 
 @part
-def _series(matrix, jacobian, tau, m, scratch):
+def _series(matrix, jacobian, tau, m, column):
     """Write exp(tau J), V_0 .. V_m at tau; False where the series needs more terms than there are."""
     n = jacobian.shape[0]
     top, power = matrix[1 + m], matrix[0]
@@ -335,25 +334,35 @@ def _series(matrix, jacobian, tau, m, scratch):
             top[i, j] = power[i, j] = factor if i == j else 0.0
     small = False
     for term in range(1, ORDER + 1):
-        multiply(jacobian, power, scratch)
         small = True
-        for i in range(n):
-            for j in range(n):
-                power[i, j] = scratch[i, j] * tau / (term + m + 1)
-                top[i, j] += power[i, j]
-                small = small and abs(power[i, j]) <= 0.1 * EPS * abs(top[i, j])
+        factor = tau / (term + m + 1)
+        for j in range(n):
+            for i in range(n):
+                column[i] = power[i, j]
+            for i in range(n):
+                total = 0.0
+                for q in range(n):
+                    total += jacobian[i, q] * column[q]
+                total *= factor
+                power[i, j] = total
+                top[i, j] += total
+                small = small and abs(total) <= 0.1 * EPS * abs(top[i, j])
         if small:
             break
     if not small:
         return False
     # V_(k-1) = tau^k / k! + J V_k
+    factor = 1.0
+    for k in range(1, m + 1):
+        factor *= tau / k
     for k in range(m, -1, -1):
-        multiply(jacobian, matrix[1 + k], matrix[k])
-        factor = 1.0
-        for i in range(1, k + 1):
-            factor *= tau / i
         for i in range(n):
-            matrix[k][i, i] += factor
+            for j in range(n):
+                total = factor if i == j else 0.0
+                for q in range(n):
+                    total += jacobian[i, q] * matrix[1 + k, q, j]
+                matrix[k, i, j] = total
+        factor *= k / tau
     return True
 
 
@@ -367,20 +376,20 @@ def _copy(matrix, m, n):
 
 
 @part
-def _extend(matrix, tau, m, scratch):
-    """Go on from tau by sigma."""
-    n = scratch.shape[0]
-    onward = matrix[MOST + 2]
+def _extend(matrix, tau, m, column):
+    """Go on from tau by sigma. `column` is scratch."""
+    n = matrix.shape[1]
     for k in range(m + 2):
-        multiply(onward, matrix[k], scratch)
-        for i in range(n):
-            for j in range(n):
-                matrix[k][i, j] = scratch[i, j]
-        factor = 1.0
-        for back in range(k):
-            # V_(k-1): j = k - 1 - back
-            older = matrix[MOST + 2 + k - back]
+        for j in range(n):
             for i in range(n):
-                for j in range(n):
-                    matrix[k][i, j] += factor * older[i, j]
-            factor *= tau / (back + 1)
+                column[i] = matrix[k, i, j]
+            for i in range(n):
+                total = 0.0
+                for q in range(n):
+                    total += matrix[MOST + 2, i, q] * column[q]
+                factor = 1.0
+                for back in range(k):
+                    # V_(k-1) takes tau^back / back! V_(k-1-back)
+                    total += factor * matrix[MOST + 2 + k - back, i, j]
+                    factor *= tau / (back + 1)
+                matrix[k, i, j] = total

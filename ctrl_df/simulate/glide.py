@@ -34,7 +34,7 @@ HALVINGS = 12  # of the step, at most, before its series is summed
 NEAR = 1e-3  # times the tolerance: how far a step may be from a known length, relative to it
 ALIKE = 1e-6  # relative difference of two steps below which they count as the same length
 
-SHARE = 0.2  # of the tolerance of a step that one between samples may have
+SHARE = 0.1  # of the tolerance of a step that one between samples may have
 
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
 RANK, LEFT = 2, 3  # entries of `Bend.state`
@@ -143,7 +143,8 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             if state[RANK] > 0.0:
                 state[LEFT] -= 1.0
                 if state[LEFT] <= 0.0:
-                    state[RANK] = 0.0
+                    state[RANK] -= 1.0
+                    state[LEFT] = PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
             if store.ready[place] != USABLE or not bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
@@ -262,7 +263,7 @@ def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size,
         made = True
         if not fresh and renew(prog, node, store, bend, slot, t, h, x, mode, size):
             fresh = True
-        elif rank + 1 < RANKS:
+        elif not fresh and rank + 1 < RANKS:
             rank += 1
             state[LEFT] = PATIENCE
         else:
