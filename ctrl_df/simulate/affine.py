@@ -52,7 +52,7 @@ TERMS = 20
 SLOTS = 16
 HARMONICS = 32
 LENGTHS = 2  # of steps whose propagators are kept
-RANKS = 3  # kinds of propagators for each length, see `ctrl_df.simulate.exponential`
+RANKS = 4  # kinds of propagators for each length, see `ctrl_df.simulate.exponential`
 UNIT = 2.0**200  # probes of linear maps: what is constant beside them vanishes without rounding them
 SHARE = 0.01
 """Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""

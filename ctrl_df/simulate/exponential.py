@@ -30,9 +30,10 @@ from .locate import bump_share
 from .mechanics import curved_forces
 from .views import lean
 
-PARTS = np.array([3, 5, 8])  # of a step, for each rank
+PARTS = np.array([2, 3, 5, 8])  # of a step, for each rank
 MOST = 8
-STIFF = 0.03  # contraction h |dR/dx| of a sweep beyond which K is renewed
+MILD = 0.003  # the same, once K is not zero
+STIFF = 0.05  # contraction h |dR/dx| of a sweep beyond which K is renewed
 NUDGE = 1e-6  # of difference quotients of the curved laws, relative to the size of a state
 PATIENCE = 20  # steps of the higher rank before the lower one is tried again
 EPS = np.finfo(float).eps
@@ -120,11 +121,11 @@ def ask(prog, node, t, x, mode, acting, push, dx, out, first):
 
 @part
 def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, gain, m, goes_on, t, h, here, ahead,
-              size, grain, rtol, atol, share):  # fmt: skip
+              size, grain, rtol, atol):  # fmt: skip
     """One step of m parts from `here` (z and p) to the states `ahead`, the nodes left in `nodes`.
 
-    With `goes_on` the step before ended here and was of the same kind; `curled`: K is not zero. Returns whether
-    the error is within `share` of the tolerance.
+    With `goes_on` the step before ended here and was of the same kind; `curled`: K is not zero. Returns the
+    error, relative to the tolerance.
     """
     n, nq = size.shape[0], acting.shape[0]
     width = here.shape[0]
@@ -189,12 +190,16 @@ def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, ga
         if error != 0.0:
             error /= atol + h * grain[j] + rtol * size[j]
             total += error * error
-    return total <= n * share * share
+    return math.sqrt(total / n)
 
 
 @part
-def renew(prog, node, store, bend, slot, t, h, x, mode, size):
-    """Take the Jacobian of the curved laws here for K, if they are stiff beside the present one."""
+def contraction(prog, node, store, bend, slot, t, h, x, mode, size):
+    """Take the Jacobian of the curved laws here; returns how much an error of R shrinks in a sweep with K.
+
+    That is the spectral radius of h Q (dq/dx - K), about: the larger of what its trace and that of its square
+    say of it, which do not depend on units.
+    """
     n, nq = x.shape[0], store.acting.shape[0]
     trial, beside = bend.nodes[1], bend.nodes[0]
     ask(prog, node, t, x, mode, store.acting, bend.push, bend.dx, beside, 0)
@@ -208,7 +213,6 @@ def renew(prog, node, store, bend, slot, t, h, x, mode, size):
         for i in range(nq):
             bend.jacobian[i, j] = (beside[nq + i] - beside[i]) / nudge if nudge != 0.0 else 0.0
         trial[j] = x[j]
-    # contraction: trace of h Q (dq/dx - K), and of its square
     lag, trace, square = bend.matrix[0], 0.0, 0.0
     for i in range(n):
         for j in range(n):
@@ -220,15 +224,19 @@ def renew(prog, node, store, bend, slot, t, h, x, mode, size):
         trace += lag[i, i]
         for j in range(n):
             square += lag[i, j] * lag[j, i]
-    if not max(abs(trace), math.sqrt(abs(square))) > STIFF:
-        return False
-    for i in range(nq):
-        for j in range(n):
+    return max(abs(trace), math.sqrt(abs(square)))
+
+
+@part
+def renew(store, bend, slot):
+    """Let K be the Jacobian that `contraction` has taken; whether it is finite."""
+    for i in range(bend.jacobian.shape[0]):
+        for j in range(bend.jacobian.shape[1]):
             if not abs(bend.jacobian[i, j]) < math.inf:
                 return False
     _straighten(store, bend, slot)
-    for i in range(nq):
-        for j in range(n):
+    for i in range(bend.jacobian.shape[0]):
+        for j in range(bend.jacobian.shape[1]):
             bend.slope[slot, i, j] = bend.jacobian[i, j]
     bend.state[slot, 0] = 1.0
     return True

@@ -22,7 +22,19 @@ import numpy as np
 from . import layout as L
 from .affine import LENGTHS, RANKS, Memory, entry, recall
 from .compiled import part
-from .exponential import PATIENCE, Bend, bend_memory, bent_step, make_bent, narrow, parts, renew
+from .exponential import (
+    MILD,
+    PATIENCE,
+    STIFF,
+    Bend,
+    bend_memory,
+    bent_step,
+    contraction,
+    make_bent,
+    narrow,
+    parts,
+    renew,
+)
 from .matrices import multiply, row_times
 from .mechanics import mechanism
 from .modes import settle
@@ -37,6 +49,7 @@ ALIKE = 1e-6  # relative difference of two steps below which they count as the s
 SHARE = 0.1  # of the tolerance of a step that one between samples may have
 
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
+GIVEN_UP = 0.25  # share of the error that is left by more nodes, above which still more are of no use
 RANK, LEFT = 2, 3  # entries of `Bend.state`
 
 
@@ -146,10 +159,10 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                     state[RANK] -= 1.0
                     state[LEFT] = PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
-            if store.ready[place] != USABLE or not bent_step(
+            if store.ready[place] != USABLE or not share >= bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
                 state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
-                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol, share,
+                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
             ):  # fmt: skip
                 place = _again(
                     prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size, grain, share, ny
@@ -247,25 +260,37 @@ def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size,
     Returns the propagator that it succeeded with, -1 where none will do.
     """
     bend, state, h = tracks.bend, tracks.bend.state[slot], tracks.length[which]
-    rank, made, fresh = int(state[RANK]), False, False
+    first = rank = int(state[RANK])
+    lag, fresh, tried = -1.0, False, False
+    before = math.inf
     while True:
         place = (slot * LENGTHS + which) * RANKS + rank
+        error = 0.0
         if store.ready[place] == 0:
             _make(store, tracks, place, slot, h, x.shape[0], store.b.shape[2], ny)
-            made = True
-        if made and store.ready[place] == USABLE and bent_step(
-            prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot], state[0] != 0.0,
-            bend.base[place], bend.gain[place], parts(store, rank), False, t, h, tracks.here, tracks.ahead,
-            size, grain, rtol, atol, share,
-        ):  # fmt: skip
-            state[RANK] = rank
-            return place
-        made = True
-        if not fresh and renew(prog, node, store, bend, slot, t, h, x, mode, size):
+            tried = True
+        if store.ready[place] != USABLE:
+            return -1
+        if tried:
+            error = bent_step(
+                prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
+                state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, rank), False, t, h,
+                tracks.here, tracks.ahead, size, grain, rtol, atol,
+            )  # fmt: skip
+            if error <= share:
+                state[RANK] = rank
+                return place
+        tried = True
+        if lag < 0.0:
+            lag = contraction(prog, node, store, bend, slot, t, h, x, mode, size)
+        if not fresh and lag > STIFF and renew(store, bend, slot):
             fresh = True
-        elif not fresh and rank + 1 < RANKS:
+        elif rank + 1 < RANKS and error < GIVEN_UP * before and not (fresh and lag > STIFF):
             rank += 1
             state[LEFT] = PATIENCE
+            before = error if error > 0.0 else math.inf
+        elif not fresh and state[0] != 0.0 and lag > MILD and renew(store, bend, slot):
+            fresh, rank, before = True, first, math.inf
         else:
             state[RANK] = 0.0
             return -1
