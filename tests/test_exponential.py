@@ -63,21 +63,20 @@ def test_the_same_as_the_general_steps(name, hold):
         t = np.arange(1500) * STEP
         u = record(rng, name, t)
         fast = cdf.event_response(system, t, u, input_hold=hold)
-        slow = cdf.event_response(system, t, u, input_hold=hold, max_step=SHORT, rtol=1e-11)
+        slow = cdf.event_response(system, t, u, input_hold=hold, max_step=SHORT)
         assert fast.propagated > 500 and slow.propagated == 0
         assert [(e.subsystem, e.kind) for e in fast.events] == [(e.subsystem, e.kind) for e in slow.events]
         size = np.max(np.abs(slow.outputs), axis=-1, keepdims=True)
         error = np.max(np.abs(fast.outputs - slow.outputs) / size)
-        print(name, hold, seed, fast.propagated, error, np.max(np.abs(np.subtract([e.time for e in fast.events] or [0],[e.time for e in slow.events] or [0])))/t[-1])
         np.testing.assert_allclose(
             [e.time for e in fast.events], [e.time for e in slow.events], rtol=0, atol=1e-7 * t[-1]
         )
-        assert error < 1e-6, error
+        assert error < 1e-7, error  # 1.5e-8 at worst, against runs at rtol 1e-11
 
 
 def test_a_touch_inside_a_sample_is_met():
     """A mass on a hardening spring swings against a stop for a small part of one sample."""
-    block = cdf.Mass(1.0).with_effect(cdf.LinearSpring(100.0)).with_effect(cdf.CubicSpring(5.0))
+    block = cdf.Mass(1.0).with_effect(cdf.LinearSpring(100.0)).with_effect(cdf.CubicSpring(0.5))
     free = cdf.event_response(block, np.linspace(0, 1, 10001), 0.0, [1.0, 0.0])
     top = float(np.max(free.outputs[0][2000:]))
     assert top > 1 - 1e-6  # undamped: it comes back to where it was let go

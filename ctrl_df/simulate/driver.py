@@ -13,8 +13,8 @@ import numpy as np
 from . import history
 from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
 from .compiled import apart, njit, part
-from .flow import rates
 from .exponential import forget
+from .flow import rates
 from .glide import Glide, glide, glide_memory
 from .layout import (
     CURVED,
@@ -162,7 +162,12 @@ def advance(
     affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
     curved = prog.ints[H_AFFINE] == 2 and drive.address == 0
     gliding = (
-        (affine or curved) and locate and watch < 0 and nh <= 1 and tout.shape[0] + nt > 2 and spectrum.shape[1] == 0
+        (affine or curved)
+        and locate
+        and watch < 0
+        and nh <= 1
+        and tout.shape[0] + nt > 2
+        and spectrum.shape[1] == 0
     )
     if affine and nh > 1 and drive.omega > 0.0:
         # the series of the forcing has to converge as well

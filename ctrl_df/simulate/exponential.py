@@ -2,15 +2,16 @@
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Steps between samples of a mode that is affine but for curved laws: an exponential Runge-Kutta method.
 
-In such a mode dx/dt = A x + B r + c + d t + Q q(x, t), where q are the forces of the curved laws and the rates of
-their own states (`ctrl_df.simulate.affine`). With J = A + Q K and the remainder R = q - K x the affine part is
-taken exactly, inputs that are held or interpolated included, and R as a polynomial through m + 1 equal parts
-of the step, foretold from the step before. Each node, once known, changes what is foretold behind it by D_i
-u (u - 1) .. (u - i + 1) / i!, u counting nodes: the state at node k is x_k = E_k z + P_k p + sum_i G_ki D_i, i < k,
-z = (x, r, s, t, 1) as in `ctrl_df.simulate.glide`, p the parabola foretold, with matrices that are the same in
+In such a mode dx/dt = A x + B r + c + d t + Q q(x, t); q are the forces of the curved laws and the rates of
+their own states (`ctrl_df.simulate.affine`). With J = A + Q K and the remainder R = q - K x the affine part
+is taken exactly, inputs that are held or interpolated included, and R as a polynomial through m + 1 equal parts
+of the step, foretold from the step before. Each node, once known, changes what is foretold behind it by
+D_i u (u - 1) .. (u - i + 1) / i!, u counting nodes: x_k = E_k z + P_k p + sum_i G_ki D_i at node k, i < k,
+z = (x, r, s, t, 1) as in `ctrl_df.simulate.glide` and p the parabola foretold; the matrices are the same in
 every step of a length. What the last node changes, G_mm D_m, is the difference between the results with
 polynomials of degree m - 1 and m: the error of the former, asked to stay within the tolerance of a step (the
-result is the latter). One evaluation of the curved laws a node, three a step (m = 3) or six where they vary fast.
+result is the latter). The curved laws are evaluated once a node: twice a step (m = 2), and up to eight times
+where they vary fast.
 
 K is zero until a law turns out stiff (a bristle: rates of 10^5 1/s): then it is the Jacobian of q at a recent
 state, taken anew when steps with it fail. It changes no result beyond the tolerance, as R has what it lacks.
@@ -120,12 +121,12 @@ def ask(prog, node, t, x, mode, acting, push, dx, out, first):
 
 
 @part
-def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, gain, m, goes_on, t, h, here, ahead,
-              size, grain, rtol, atol):  # fmt: skip
-    """One step of m parts from `here` (z and p) to the states `ahead`, the nodes left in `nodes`.
+def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, gain, m, goes_on, t, h, here,
+              ahead, size, grain, rtol, atol):  # fmt: skip
+    """Take a step of m parts from `here` (z and p) to the states `ahead`, the nodes left in `nodes`.
 
     With `goes_on` the step before ended here and was of the same kind; `curled`: K is not zero. Returns the
-    error, relative to the tolerance.
+    error relative to the tolerance.
     """
     n, nq = size.shape[0], acting.shape[0]
     width = here.shape[0]
@@ -296,7 +297,7 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
                 base[one - 1] += v0[i, j] * store.d[slot, j]
                 base[one] += v0[i, j] * store.c[slot, j] + v1[i, j] * store.d[slot, j]
                 for k in range(nq):
-                    # 1, u and u (u + 1) / 2
+                    # what grows like the parabola's parts, u and u (u + 1) over 2
                     up, bow = v1[i, j] / sigma, v2[i, j] / (sigma * sigma)
                     to = one + 1 + 3 * k
                     base[to] += v0[i, j] * store.q[slot, j, k]
@@ -318,7 +319,7 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
 
 @part
 def _newton_gain(matrix, newton, q, row, degree, k, sigma):
-    """What a change of remainder k that grows like the Newton polynomial of a degree does to a state."""
+    """Return what a change of remainder k that grows like Newton's polynomial of a degree does to a state."""
     value, scale = 0.0, 1.0
     for power in range(degree + 1):
         total = 0.0

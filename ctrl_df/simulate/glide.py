@@ -1,4 +1,4 @@
-"""Affine modes on a regular grid: one constant propagator a step, as long as no event can lie inside.
+"""Modes on a regular grid: one constant propagator a step, as long as no event can lie inside.
 
 The grid is that of the samples of the inputs, the times of the outputs and the ticks of controllers. With
 z = (x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a step of h
@@ -7,6 +7,9 @@ c M^2 z, hence stays within h^2/8 max |c M^2 z| of the chord between its ends; w
 start of a step, |c M^2| exp(|M| h) bound limits that curvature over all of it. A step at whose ends every
 margin lies above this limit holds no event, for certain. The first that does not is left to the steps of
 `ctrl_df.simulate.driver`.
+
+Where curved laws stand beside the affine ones, the step is one of `ctrl_df.simulate.exponential`, and the
+margins at its nodes tell whether it holds an event.
 
 The matrices are kept row by row, zeros left out. Bounds are taken element by element, so that units do not
 matter.
@@ -54,7 +57,7 @@ RANK, LEFT = 2, 3  # entries of `Bend.state`
 
 
 class Glide(NamedTuple):
-    """Propagators of the modes a `Memory` knows, one for each length (where laws are curved, and rank), and scratch.
+    """Propagators of the modes a `Memory` knows, one for each length and rank, and scratch.
 
     Rows: states (unless laws are curved), margins, outputs.
     """
@@ -68,7 +71,7 @@ class Glide(NamedTuple):
     count: np.ndarray  # (SLOTS * LENGTHS * RANKS,): margins that the mode has
     active: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): which these are
     owner: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): margin of a row, -1 where the mode has none
-    curved: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins, nz): limits of curvature, times h^2/8, for each bound
+    curved: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins, nz): limits of curvature times h^2/8, per bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
     here: np.ndarray  # z at the start of a step
@@ -100,8 +103,8 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
           size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
 
-    `long` is a step that error control allowed before: where laws are curved, many short steps may not err more
-    than the one long step they stand for.
+    `long` is a step that error control allowed before: where laws are curved, many short steps may not err
+    more than the one long step they stand for.
 
     Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
     of the next tick, and whether a controller ticked at the end of the last step.
@@ -255,7 +258,7 @@ def _straight(tracks, place, stale, jumped, scale, n, margins):
 
 @part
 def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
-    """Try a step with curved laws that failed, with matrices not made yet, with K taken anew, with more parts.
+    """Try again a curved step that failed: with matrices not made yet, with K taken anew, with more parts.
 
     Returns the propagator that it succeeded with, -1 where none will do.
     """
@@ -298,10 +301,10 @@ def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size,
 
 @part
 def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahead, scale, m, sigma, n, nr):
-    """Whether no event lies within a step with curved laws: margins at its nodes, and their bend between them.
+    """Whether no event lies within a step with curved laws, by the margins at its nodes.
 
-    Between two nodes a margin stays within an eighth of its second difference of the chord, if that difference
-    varies little from node to node, as the error allowed has it; twice as much is asked.
+    Between two nodes a margin stays within an eighth of its second difference of the chord, if that
+    difference varies little from node to node, as the error allowed has it; twice as much is asked.
     """
     nq, nz = pushed.shape[1], n + 2 * nr + 2
     for k in range(nr):

@@ -82,8 +82,9 @@ def primitive_node(primitive, x0) -> Node:
         return Node(L.QUANTIZER, 1, 1, x0, 0, [primitive.step], 1, 2, feed=1, start=[0], affine=True)
     if isinstance(primitive, Smooth):
         return Node(
-            L.SMOOTH, 1, 1, x0, 0, primitive.p, feed=1, laws=[(address(primitive.law, "smooth"), 0, 0, 0, L.CURVED)]
-        )
+            L.SMOOTH, 1, 1, x0, 0, primitive.p, feed=1,
+            laws=[(address(primitive.law, "smooth"), 0, 0, 0, L.CURVED)],
+        )  # fmt: skip
     if isinstance(primitive, Ramp):
         return Node(L.RAMP, 1, 1, x0, 0, [primitive.offset, primitive.rate], feed=1, affine=True)
     if isinstance(primitive, Lag):

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 WIDEST_AFFINE = 24
 """States up to which a product with a full matrix is cheaper than the rates themselves."""
+WIDEST_CURVED = 10
+"""The same where curved laws stand beside: a step then takes several such products."""
 
 
 def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str]]:
@@ -107,8 +109,10 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     ints[L.H_TRACK] = int(any(n.kind in (L.PLAY, L.RATE) for n in nodes))
     kinds = [n.kind for n in nodes]
     curved = [n.kind for n in nodes if not n.affine]
-    if kinds.count(L.MECHANISM) <= 1 and nx <= WIDEST_AFFINE:
-        ints[L.H_AFFINE] = 1 if not curved else 2 * int(curved == [L.MECHANISM])
+    if kinds.count(L.MECHANISM) <= 1 and not curved and nx <= WIDEST_AFFINE:
+        ints[L.H_AFFINE] = 1
+    elif curved == [L.MECHANISM] == [k for k in kinds if k == L.MECHANISM] and nx <= WIDEST_CURVED:
+        ints[L.H_AFFINE] = 2
     ints[L.H_BUMP] = int(
         any(n.kind == L.MECHANISM and min(n.par[L.P_BUMP0 : L.P_BUMP1 + 1]) < np.inf for n in nodes)
     )
