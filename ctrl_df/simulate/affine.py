@@ -52,7 +52,7 @@ TERMS = 20
 SLOTS = 16
 HARMONICS = 32
 LENGTHS = 2  # of steps whose propagators are kept
-RANKS = 4  # kinds of propagators for each length, see `ctrl_df.simulate.exponential`
+RANKS = 4  # kinds of propagators for each length where laws are curved, see `ctrl_df.simulate.exponential`
 UNIT = 2.0**200  # probes of linear maps: what is constant beside them vanishes without rounding them
 SHARE = 0.01
 """Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
@@ -64,7 +64,7 @@ class Memory(NamedTuple):
     probe: Drive  # external inputs of a unit
     seen: np.ndarray  # (SLOTS, nm) modes; `order` tells how many are known and which is the next to go
     order: np.ndarray
-    ready: np.ndarray  # (SLOTS * LENGTHS * RANKS,) whether it has propagators, see `ctrl_df.simulate.glide`
+    ready: np.ndarray  # (SLOTS * LENGTHS * ranks,) whether it has propagators, see `ctrl_df.simulate.glide`
     a: np.ndarray  # (SLOTS, n, n)
     b: np.ndarray  # (SLOTS, n, nr)
     d: np.ndarray  # (SLOTS, n)
@@ -91,7 +91,7 @@ def memory(prog) -> Memory:
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
         probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64),
-        np.zeros(used * LENGTHS * RANKS, np.int64),
+        np.zeros(used * LENGTHS * (RANKS if nq > 0 else 1), np.int64),
         np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
         np.zeros((used, ng + 2, n + nr + 2)), acting, np.zeros((used, n, nq)), np.zeros((used, ng + 2, nq)),
@@ -118,6 +118,12 @@ def _acting(prog) -> np.ndarray:
 
 
 @part(inline=True)
+def ranks(store):
+    """Kinds of propagators for each mode and length."""
+    return RANKS if store.acting.shape[0] > 0 else 1
+
+
+@part(inline=True)
 def recall(prog, store, mode, work, x, dx0, dx, g):
     """Slot of the present mode, learnt if it is new. `x`, `dx0`, `dx`, `g` are scratch."""
     known = int(store.order[0])
@@ -139,7 +145,8 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
     slot = int(store.order[1])
     store.order[1] = (slot + 1) % SLOTS
     store.order[0] = min(known + 1, SLOTS)
-    for i in range(slot * LENGTHS * RANKS, (slot + 1) * LENGTHS * RANKS):
+    each = LENGTHS * ranks(store)
+    for i in range(slot * each, (slot + 1) * each):
         store.ready[i] = 0
     for i in range(mode.shape[0]):
         store.seen[slot, i] = mode[i]

@@ -4,8 +4,8 @@
 
 In such a mode dx/dt = A x + B r + c + d t + Q q(x, t); q are the forces of the curved laws and the rates of
 their own states (`ctrl_df.simulate.affine`). With J = A + Q K and the remainder R = q - K x the affine part
-is taken exactly, inputs that are held or interpolated included, and R as a polynomial through m + 1 equal parts
-of the step, foretold from the step before. Each node, once known, changes what is foretold behind it by
+is taken exactly, inputs that are held or interpolated included, and R as a polynomial through m + 1 equal
+parts of the step, foretold from the step before. Each node, once known, changes what is foretold behind it by
 D_i u (u - 1) .. (u - i + 1) / i!, u counting nodes: x_k = E_k z + P_k p + sum_i G_ki D_i at node k, i < k,
 z = (x, r, s, t, 1) as in `ctrl_df.simulate.glide` and p the parabola foretold; the matrices are the same in
 every step of a length. What the last node changes, G_mm D_m, is the difference between the results with

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import layout as L
-from .affine import LENGTHS, RANKS, Memory, entry, recall
+from .affine import LENGTHS, RANKS, Memory, entry, ranks, recall
 from .compiled import part
 from .exponential import (
     MILD,
@@ -64,14 +64,14 @@ class Glide(NamedTuple):
 
     length: np.ndarray  # (LENGTHS,): known steps [s]; 0: none
     newest: np.ndarray  # (1,): which was learnt last
-    first: np.ndarray  # (SLOTS * LENGTHS * RANKS, rows + 1): where a row begins in `column` and `value`
-    column: np.ndarray  # (SLOTS * LENGTHS * RANKS, room)
-    value: np.ndarray  # (SLOTS * LENGTHS * RANKS, room)
-    fed: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): whether a row has entries of external inputs
-    count: np.ndarray  # (SLOTS * LENGTHS * RANKS,): margins that the mode has
-    active: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): which these are
-    owner: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins): margin of a row, -1 where the mode has none
-    curved: np.ndarray  # (SLOTS * LENGTHS * RANKS, margins, nz): limits of curvature times h^2/8, per bound
+    first: np.ndarray  # (SLOTS * LENGTHS * ranks, rows + 1): where a row begins in `column` and `value`
+    column: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
+    value: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
+    fed: np.ndarray  # (SLOTS * LENGTHS * ranks, margins): whether a row has entries of external inputs
+    count: np.ndarray  # (SLOTS * LENGTHS * ranks,): margins that the mode has
+    active: np.ndarray  # (SLOTS * LENGTHS * ranks, margins): which these are
+    owner: np.ndarray  # (SLOTS * LENGTHS * ranks, margins): margin of a row, -1 where the mode has none
+    curved: np.ndarray  # (SLOTS * LENGTHS * ranks, margins, nz): limits of curvature times h^2/8, per bound
     bound: np.ndarray  # (nz,)
     slack: np.ndarray  # (margins,)
     here: np.ndarray  # z at the start of a step
@@ -83,7 +83,7 @@ class Glide(NamedTuple):
 def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
     """Allocate the propagators that go with a memory; small where none can be used."""
     slots, n, nr = memory.b.shape
-    used = slots * LENGTHS * RANKS
+    used = memory.ready.shape[0]
     margins = memory.rows.shape[1] if usable else 0
     nz = n + 2 * nr + 2 if usable else 0
     rows = n + margins + ny if usable else 0
@@ -180,7 +180,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             ):  # fmt: skip
                 break
         else:
-            place = (slot * LENGTHS + which) * RANKS
+            place = slot * LENGTHS + which
             if store.ready[place] == 0:
                 _make(store, tracks, place, slot, tracks.length[which], n, nr, ny)
             if store.ready[place] == USELESS:
@@ -380,9 +380,9 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
     which = (tracks.newest[0] + 1) % LENGTHS
     tracks.newest[0] = which
     tracks.length[which] = length
-    for slot in range(store.ready.shape[0] // (LENGTHS * RANKS)):
-        for rank in range(RANKS):
-            store.ready[(slot * LENGTHS + which) * RANKS + rank] = 0
+    for place in range(store.ready.shape[0]):
+        if place // ranks(store) % LENGTHS == which:
+            store.ready[place] = 0
     return which
 
 
