@@ -13,7 +13,7 @@ import numpy as np
 from . import history
 from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
 from .compiled import apart, njit, part
-from .exponential import forget
+from .exponential import Bend, bend_memory, forget
 from .flow import rates
 from .glide import Glide, glide, glide_memory
 from .layout import (
@@ -74,6 +74,7 @@ class Space(NamedTuple):
     memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
     store: Memory
     tracks: Glide
+    bend: Bend
 
 
 def workspace(prog, delays: bool = False):
@@ -98,7 +99,17 @@ def workspace(prog, delays: bool = False):
     vectors = [np.zeros(n) for _ in range(5)] + [np.zeros(ng + 1) for _ in range(5)]
     store = memory(prog)
     tracks = glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY]))
-    return Space(work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), store, tracks)
+    return Space(
+        work,
+        np.zeros((16, n)),
+        np.zeros((20, n)),
+        *vectors,
+        owner,
+        np.zeros(3),
+        store,
+        tracks,
+        bend_memory(store),
+    )
 
 
 @part(inline=True)
@@ -151,7 +162,9 @@ def advance(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks = space
+    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks, bend = (
+        space
+    )
     n, ng = x.shape[0], scale.shape[1]
     t, index, h = clock[0], int(clock[1]), clock[2]
     segment = int(clock[6])
@@ -191,7 +204,7 @@ def advance(
     for i in range(ng):
         g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
-        forget(store, tracks.bend)
+        forget(store, bend)
         for j in range(n):
             size[j] = abs(x[j])
         if delays:
@@ -240,10 +253,16 @@ def advance(
                 skip -= 1
             elif gliding:
                 begun = t
-                gone, t, segment, index, next_tick, ticked = glide(
-                    prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-                    xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g,
-                )  # fmt: skip
+                if affine:
+                    gone, t, segment, index, next_tick, ticked = glide(
+                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, None,
+                    )  # fmt: skip
+                else:
+                    gone, t, segment, index, next_tick, ticked = glide(
+                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, bend,
+                    )  # fmt: skip
                 if gone > 0:
                     clock[9] += gone
                     skip = wait = 0

@@ -29,8 +29,6 @@ from .exponential import (
     MILD,
     PATIENCE,
     STIFF,
-    Bend,
-    bend_memory,
     bent_step,
     contraction,
     make_bent,
@@ -77,7 +75,6 @@ class Glide(NamedTuple):
     here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
     matrix: np.ndarray  # (5, nz, nz)
-    bend: Bend
 
 
 def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
@@ -94,17 +91,18 @@ def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
         np.zeros((used, margins), np.int64),
         np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
         np.zeros(nz + 3 * memory.acting.shape[0]), np.zeros(nz),
-        np.zeros((5, nz, nz)), bend_memory(memory),
+        np.zeros((5, nz, nz)),
     )  # fmt: skip
 
 
 @part
 def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
-          size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g):  # fmt: skip
+          size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g, bend):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
 
-    `long` is a step that error control allowed before: where laws are curved, many short steps may not err
-    more than the one long step they stand for.
+    `bend` goes with curved laws; where there are none it is None, and the branches that need it are not even
+    compiled. `long` is a step that error control allowed before: where laws are curved, many short steps may
+    not err more than the one long step they stand for.
 
     Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
     of the next tick, and whether a controller ticked at the end of the last step.
@@ -113,7 +111,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
     margins = store.rows.shape[1]
     time, nt = drive.time, drive.time.shape[0]
     here, ahead, bound = tracks.here, tracks.ahead, tracks.bound
-    curved, node = store.acting.shape[0] > 0, mechanism(prog)
+    node = mechanism(prog)
     at, one = n + 2 * nr, n + 2 * nr + 1
     ramped = nt > 0 and drive.linear == 1
     done, ticked = 0, False
@@ -153,9 +151,9 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 here[n + nr + k] = ahead[n + nr + k] = slope
         here[at], ahead[at] = t, t1
         # --- over the step
-        if curved:
+        if bend is not None:
             share = min(tracks.length[which] / long, SHARE) if long > 0.0 else SHARE
-            bend, state = tracks.bend, tracks.bend.state[slot]
+            state = bend.state[slot]
             if state[RANK] > 0.0:
                 state[LEFT] -= 1.0
                 if state[LEFT] <= 0.0:
@@ -168,13 +166,28 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
             ):  # fmt: skip
                 place = _again(
-                    prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size, grain, share, ny
+                    prog,
+                    node,
+                    store,
+                    tracks,
+                    bend,
+                    slot,
+                    which,
+                    t,
+                    x,
+                    mode,
+                    rtol,
+                    atol,
+                    size,
+                    grain,
+                    share,
+                    ny,
                 )
             if place < 0 or narrow(prog, x, ahead):
                 break
             m = parts(store, place % RANKS)
             if not _clear(
-                tracks.bend.nodes, store.pushed[slot], tracks.first[place], tracks.column[place],
+                bend.nodes, store.pushed[slot], tracks.first[place], tracks.column[place],
                 tracks.value[place], tracks.active[place], tracks.count[place], tracks.owner[place], here,
                 ahead, scale, m, tracks.length[which] / m, n, nr,
             ):  # fmt: skip
@@ -182,7 +195,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         else:
             place = slot * LENGTHS + which
             if store.ready[place] == 0:
-                _make(store, tracks, place, slot, tracks.length[which], n, nr, ny)
+                _make(store, tracks, None, place, slot, tracks.length[which], n, nr, ny)
             if store.ready[place] == USELESS:
                 break
             stale = stale or place != before
@@ -209,7 +222,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 here[j] = x[j]
         elif due:
             first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
-            row = margins if curved else n + margins
+            row = margins if store.acting.shape[0] > 0 else n + margins
             for i in range(ny):
                 yout[index, i] = row_times(first, column, values, row + i, ahead)
         if due:
@@ -257,12 +270,12 @@ def _straight(tracks, place, stale, jumped, scale, n, margins):
 
 
 @part
-def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
+def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
     """Try again a curved step that failed: with matrices not made yet, with K taken anew, with more parts.
 
     Returns the propagator that it succeeded with, -1 where none will do.
     """
-    bend, state, h = tracks.bend, tracks.bend.state[slot], tracks.length[which]
+    state, h = bend.state[slot], tracks.length[which]
     first = rank = int(state[RANK])
     lag, fresh, tried = -1.0, False, False
     before = math.inf
@@ -270,7 +283,7 @@ def _again(prog, node, store, tracks, slot, which, t, x, mode, rtol, atol, size,
         place = (slot * LENGTHS + which) * RANKS + rank
         error = 0.0
         if store.ready[place] == 0:
-            _make(store, tracks, place, slot, h, x.shape[0], store.b.shape[2], ny)
+            _make(store, tracks, bend, place, slot, h, x.shape[0], store.b.shape[2], ny)
             tried = True
         if store.ready[place] != USABLE:
             return -1
@@ -387,7 +400,7 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
 
 
 @part
-def _make(store, tracks, place, slot, h, n, nr, ny):
+def _make(store, tracks, bend, place, slot, h, n, nr, ny):
     """Compute the propagator of a mode over `h` seconds, and the rows of its margins and outputs."""
     nz, margins = n + 2 * nr + 2, store.rows.shape[1]
     tracks.count[place] = 0
@@ -398,10 +411,11 @@ def _make(store, tracks, place, slot, h, n, nr, ny):
             tracks.active[place, tracks.count[place]] = row
             tracks.count[place] += 1
     tracks.first[place, 0] = 0
-    if store.acting.shape[0] > 0:
-        begin, count = 0, 0 if make_bent(store, tracks.bend, place, slot, place % RANKS, h, n, nr) else -1
-    else:
+    begin = count = 0
+    if bend is None:
         begin, count = n, _make_straight(store, tracks, place, slot, h, n, nr)
+    elif not make_bent(store, bend, place, slot, place % RANKS, h, n, nr):
+        count = -1
     if count < 0:
         store.ready[place] = USELESS
         return
