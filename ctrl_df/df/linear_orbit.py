@@ -81,7 +81,7 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
         Whether that output shifts with a free position.
     """
     prog, n = engine.program, engine.nstates
-    if not prog.ints[L.H_AFFINE] or n == 0 or not s.autonomous:
+    if prog.ints[L.H_AFFINE] != 1 or n == 0 or not s.autonomous:
         return None
     probe = Probe(engine)
     if any(np.any(np.isfinite(probe.at(x, u)[1][: probe.ng])) for x, u in probe.states()):

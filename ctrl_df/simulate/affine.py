@@ -7,7 +7,9 @@ all of it is linear with constant or known forcing. The Taylor series of such a 
 product a term, converges everywhere, and is its own interpolant; the margins become polynomials whose first
 root is found without another call of the laws. Which laws qualify `ctrl_df.simulate.pack` knows; A, B, d and
 the margins' rows of a mode are learnt by evaluating its rates at unit states, once, and kept for the modes
-met last.
+met last. Where a mechanism has curved laws besides, their forces q(x, t) stand apart: rates and margins are
+affine in them too, dx/dt = A x + B r(t) + c + d t + Q q, and Q is learnt like B
+(`ctrl_df.simulate.exponential` goes on from there).
 """
 
 from __future__ import annotations
@@ -22,9 +24,13 @@ from .compiled import part
 from .flow import combine, rates
 from .layout import (
     A_BODIES,
+    A_INNER,
     AUX,
+    CURVED,
     DIR0,
     DIR1,
+    F_ASKED,
+    F_GIVEN,
     G_BODY1,
     H_NG,
     H_NR,
@@ -32,10 +38,12 @@ from .layout import (
     KIND,
     MECHANISM,
     MODE,
+    STRAIGHT,
     STUCK,
     WALL,
     Drive,
     G,
+    X,
 )
 from .mechanics import closed, dry_level
 from .roots import first_root
@@ -44,6 +52,7 @@ TERMS = 20
 SLOTS = 16
 HARMONICS = 32
 LENGTHS = 2  # of steps whose propagators are kept
+RANKS = 4  # kinds of propagators for each length where laws are curved, see `ctrl_df.simulate.exponential`
 UNIT = 2.0**200  # probes of linear maps: what is constant beside them vanishes without rounding them
 SHARE = 0.01
 """Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
@@ -55,12 +64,15 @@ class Memory(NamedTuple):
     probe: Drive  # external inputs of a unit
     seen: np.ndarray  # (SLOTS, nm) modes; `order` tells how many are known and which is the next to go
     order: np.ndarray
-    ready: np.ndarray  # (SLOTS * LENGTHS,) whether the mode has propagators, see `ctrl_df.simulate.glide`
+    ready: np.ndarray  # (SLOTS * LENGTHS * ranks,) whether it has propagators, see `ctrl_df.simulate.glide`
     a: np.ndarray  # (SLOTS, n, n)
     b: np.ndarray  # (SLOTS, n, nr)
     d: np.ndarray  # (SLOTS, n)
     c: np.ndarray  # (SLOTS, n): rates at zero
     rows: np.ndarray  # (SLOTS, ng + 2, n + nr + 2): a margin's slopes over x, r, t; at zero, inf: none
+    acting: np.ndarray  # (nq,) what each of q is: the force on body 0 or 1, or 2 + a state whose rate it is
+    q: np.ndarray  # (SLOTS, n, nq)
+    pushed: np.ndarray  # (SLOTS, ng + 2, nq): a margin's slopes over q
     outs: np.ndarray  # (SLOTS, ny, n + nr + 2): an output's slopes over x, r, t; its value at zero
     owners: np.ndarray  # (ng + 2,): margin that each row belongs to
     base: np.ndarray  # scratch: rates and margins (ng + 3) at zero
@@ -73,16 +85,42 @@ class Memory(NamedTuple):
 def memory(prog) -> Memory:
     """Allocate the memory of a program; small where its modes are not affine."""
     used = SLOTS if prog.ints[L.H_AFFINE] else 1
+    acting = _acting(prog)
+    nq = len(acting)
     n, nr, ny, ng, nm = (int(prog.ints[i]) for i in (H_NX, H_NR, L.H_NY, H_NG, L.H_NM))
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
-        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64), np.zeros(used * LENGTHS, np.int64),
+        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64),
+        np.zeros(used * LENGTHS * (RANKS if nq > 0 else 1), np.int64),
         np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
-        np.zeros((used, ng + 2, n + nr + 2)), np.zeros((used, ny, n + nr + 2)), np.zeros(ng + 2, np.int64),
+        np.zeros((used, ng + 2, n + nr + 2)), acting, np.zeros((used, n, nq)), np.zeros((used, ng + 2, nq)),
+        np.zeros((used, ny, n + nr + 2)), np.zeros(ng + 2, np.int64),
         np.zeros(ng + 3), np.zeros(ng + 3), np.zeros((TERMS + 1, nr)), np.zeros(TERMS + 1),
         np.zeros(n),
     )  # fmt: skip
+
+
+def _acting(prog) -> np.ndarray:
+    """Return what the curved laws act on, see `Memory.acting`; nothing where there are none."""
+    if prog.ints[L.H_AFFINE] != 2:
+        return np.zeros(0, np.int64)
+    node = next(row for row in prog.nodes if row[KIND] == MECHANISM)
+    aux = prog.ints[node[AUX] :]
+    bodies, first = int(aux[A_BODIES]), int(aux[L.A_LAWS])
+    count = int(aux[L.A_NFORCE] + aux[L.A_NFRIC0] + aux[L.A_NFRIC1])
+    laws = prog.ints[first : first + count * L.R_SIZE].reshape(count, L.R_SIZE)
+    pushed = {int(law[L.R_BODY]) for law in laws if law[L.R_SORT] == CURVED}
+    if aux[L.A_BRISTLE] >= 0:
+        pushed.add(bodies - 1)
+    inner = int(node[X]) + 2 * bodies
+    return np.array([*sorted(pushed), *range(2 + inner, 2 + inner + int(aux[A_INNER]))], np.int64)
+
+
+@part(inline=True)
+def ranks(store):
+    """Kinds of propagators for each mode and length."""
+    return RANKS if store.acting.shape[0] > 0 else 1
 
 
 @part(inline=True)
@@ -107,24 +145,29 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
     slot = int(store.order[1])
     store.order[1] = (slot + 1) % SLOTS
     store.order[0] = min(known + 1, SLOTS)
-    for i in range(slot * LENGTHS, (slot + 1) * LENGTHS):
+    each = LENGTHS * ranks(store)
+    for i in range(slot * each, (slot + 1) * each):
         store.ready[i] = 0
     for i in range(mode.shape[0]):
         store.seen[slot, i] = mode[i]
-    n, nr = x.shape[0], prog.ints[H_NR]
+    n, nr, nq, forces = x.shape[0], prog.ints[H_NR], store.acting.shape[0], work[1]
     for j in range(n):
-        x[j] = 0.0
+        x[j] = dx0[j] = dx[j] = 0.0
     for i in range(nr):
         store.probe.harmonics[i, 0] = 0.0
-    # rates and margins at zero, then one state, input, or the time at a time far from it
-    for column in range(-1, n + nr + 1):
+    forces[F_ASKED] = STRAIGHT
+    # rates and margins at zero, then one state, input, the time, or a curved law's force far from it
+    for column in range(-1, n + nr + 1 + nq):
         t = 0.0
+        acting = store.acting[column - n - nr - 1] if column > n + nr else 2
         if 0 <= column < n:
             x[column] = UNIT
         elif n <= column < n + nr:
             store.probe.harmonics[column - n, 0] = UNIT
         elif column == n + nr:
             t = UNIT
+        elif acting < 2:
+            forces[F_GIVEN + acting] = UNIT
         margin = store.base if column < 0 else store.ahead
         rates(prog, store.probe, 0, t, x, mode, work, dx0 if column < 0 else dx, g, True)
         extend(prog, mode, work, g, margin)
@@ -139,6 +182,12 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
         elif column == n + nr:
             for j in range(n):
                 store.d[slot, j] = (dx[j] - dx0[j]) / UNIT
+        elif column > n + nr:
+            for j in range(n):
+                rate = 1.0 if j == acting - 2 else 0.0
+                store.q[slot, j, column - n - nr - 1] = (dx[j] - dx0[j]) / UNIT if acting < 2 else rate
+            if acting < 2:
+                forces[F_GIVEN + acting] = 0.0
         else:
             for j in range(n):
                 store.c[slot, j] = dx0[j]
@@ -147,16 +196,20 @@ def _learn(prog, store, mode, work, x, dx0, dx, g):
             value = combine(prog, prog.ints[prog.ints[L.H_OUT] + i], work[0])
             if column < 0:
                 store.outs[slot, i, n + nr + 1] = value
-            else:
+            elif column <= n + nr:
                 store.outs[slot, i, column] = (value - store.outs[slot, i, n + nr + 1]) / UNIT
         if column >= 0:
             for i in range(store.rows.shape[1]):
-                known_margin = store.base[i] < math.inf
-                store.rows[slot, i, column] = (margin[i] - store.base[i]) / UNIT if known_margin else 0.0
+                slope = (margin[i] - store.base[i]) / UNIT if store.base[i] < math.inf else 0.0
+                if column <= n + nr:
+                    store.rows[slot, i, column] = slope
+                else:
+                    store.pushed[slot, i, column - n - nr - 1] = slope
     for i in range(store.rows.shape[1]):
         owner = i if i < prog.ints[H_NG] else _owner(prog, i - prog.ints[H_NG])
         store.owners[i] = owner
         store.rows[slot, i, n + nr + 1] = store.base[i] if owner >= 0 else math.inf
+    forces[F_ASKED] = STRAIGHT | CURVED
     return slot
 
 
@@ -334,3 +387,11 @@ def _owner(prog, body):
         if prog.nodes[n, KIND] == MECHANISM:
             return prog.nodes[n, G] + body
     return -1
+
+
+@part
+def entry(row, j, n, nr):
+    """Entry over z of a row of `Memory.rows` or `Memory.outs`; slopes of inputs stand beside."""
+    if j < n + nr:
+        return row[j]
+    return row[j - nr] if j >= n + 2 * nr else 0.0

@@ -13,9 +13,27 @@ import numpy as np
 from . import history
 from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
 from .compiled import apart, njit, part
+from .exponential import Bend, bend_memory, forget
 from .flow import rates
 from .glide import Glide, glide, glide_memory
-from .layout import H_AFFINE, H_BUMP, H_DELAYS, H_HISTORY, H_NG, H_NX, H_NY, H_TRACK, NG, Drive, G, Program
+from .layout import (
+    CURVED,
+    F_ASKED,
+    F_SIZE,
+    H_AFFINE,
+    H_BUMP,
+    H_DELAYS,
+    H_HISTORY,
+    H_NG,
+    H_NX,
+    H_NY,
+    H_TRACK,
+    NG,
+    STRAIGHT,
+    Drive,
+    G,
+    Program,
+)
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .native import call_native, native_address
@@ -30,6 +48,7 @@ sliding, step below the resolution of time, more steps within a delay than its h
 PATIENCE = 40  # steps before a lower order that failed is tried again
 DENSE = 1e-3  # error of a step, times its tolerance, below which a lower order is tried
 SAME = 1e-15  # relative difference of two instants that only rounding parts
+WAIT = 3  # steps at most until constant propagators are tried again
 GRAINS = 200  # steps after which rounding is asked anew
 REACH = 1e-4  # of a step: the time over which rates of inputs are taken
 SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
@@ -55,6 +74,7 @@ class Space(NamedTuple):
     memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
     store: Memory
     tracks: Glide
+    bend: Bend
 
 
 def workspace(prog, delays: bool = False):
@@ -71,14 +91,25 @@ def workspace(prog, delays: bool = False):
             "state is a whole history. Find its motion by simulation (event_response), or put a lag of the "
             "same time (input_lag) in its place."
         )
-    work = (np.zeros(int(prog.ints[H_HISTORY]) + past), np.zeros(2), np.zeros(max(n, 4) + 2))
+    work = (np.zeros(int(prog.ints[H_HISTORY]) + past), np.zeros(F_SIZE), np.zeros(max(n, 4) + 2))
+    work[1][F_ASKED] = STRAIGHT | CURVED
     owner = np.zeros(ng + 1, np.int64)
     for node in range(prog.nodes.shape[0]):
         owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
     vectors = [np.zeros(n) for _ in range(5)] + [np.zeros(ng + 1) for _ in range(5)]
     store = memory(prog)
     tracks = glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY]))
-    return Space(work, np.zeros((16, n)), np.zeros((20, n)), *vectors, owner, np.zeros(3), store, tracks)
+    return Space(
+        work,
+        np.zeros((16, n)),
+        np.zeros((20, n)),
+        *vectors,
+        owner,
+        np.zeros(3),
+        store,
+        tracks,
+        bend_memory(store),
+    )
 
 
 @part(inline=True)
@@ -131,7 +162,9 @@ def advance(
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks = space
+    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks, bend = (
+        space
+    )
     n, ng = x.shape[0], scale.shape[1]
     t, index, h = clock[0], int(clock[1]), clock[2]
     segment = int(clock[6])
@@ -140,8 +173,14 @@ def advance(
     held = nt > 0 and drive.linear == 0
     has_tracked, bumpy, delays = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1, prog.ints[H_DELAYS] > 0
     affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
+    curved = prog.ints[H_AFFINE] == 2 and drive.address == 0
     gliding = (
-        affine and locate and watch < 0 and nh <= 1 and tout.shape[0] + nt > 2 and spectrum.shape[1] == 0
+        (affine or curved)
+        and locate
+        and watch < 0
+        and nh <= 1
+        and tout.shape[0] + nt > 2
+        and spectrum.shape[1] == 0
     )
     if affine and nh > 1 and drive.omega > 0.0:
         # the series of the forcing has to converge as well
@@ -157,7 +196,7 @@ def advance(
     known = False  # k[0] holds the rates at (t, x)
     jumped = False  # something outside the states jumped just now: modes may be out of line
     generation = 1.0  # of the record that a delay opens next
-    patience = slot = 0
+    patience = slot = skip = wait = 0
     level = order  # of steps that samples cut short
     stale = 0  # steps until rounding is asked anew
     blocked = ng - 1 if clock[7] > 0.5 else -1
@@ -165,6 +204,7 @@ def advance(
     for i in range(ng):
         g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
+        forget(store, bend)
         for j in range(n):
             size[j] = abs(x[j])
         if delays:
@@ -207,19 +247,31 @@ def advance(
         if jumped and (has_tracked or not locate):
             settle(prog, drive, segment, t, x, mode, work, dx)
             jumped = False
-        if affine:
+        if affine or gliding:
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
-            if gliding:
+            if gliding and skip > 0:
+                skip -= 1
+            elif gliding:
                 begun = t
-                gone, t, segment, index, next_tick, ticked = glide(
-                    prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-                    xout, yout, size, scale, rtol, next_tick, x1, xi, dx, g,
-                )  # fmt: skip
+                if affine:
+                    gone, t, segment, index, next_tick, ticked = glide(
+                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, None,
+                    )  # fmt: skip
+                else:
+                    gone, t, segment, index, next_tick, ticked = glide(
+                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, bend,
+                    )  # fmt: skip
                 if gone > 0:
                     clock[9] += gone
-                    h = max(h, t - begun)
+                    skip = wait = 0
+                    if affine:
+                        h = max(h, t - begun)
                     known, jumped = False, ticked or held
                     continue
+                if curved:
+                    skip = wait = min(2 * wait + 1, WAIT)
         if jumped or not known:
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
             if locate and (has_tracked or watch >= 0):

@@ -23,6 +23,7 @@ STUCK, FREE = 0, 2  # besides the directions -1 and +1
 
 # integer layout of a mechanism in the aux table
 A_BODIES, A_JOINT, A_STOP, A_BRISTLE, A_MEASURED, A_NFORCE, A_NFRIC0, A_NFRIC1, A_LAWS = range(9)
+A_INNER = 9  # states of its laws, which follow those of its bodies
 # joint kinds
 J_NONE, J_RIGID, J_IMPACT, J_ELASTIC = range(4)
 
@@ -68,12 +69,20 @@ EVENT_KINDS = (
 # header of the integer table: sizes of state, signals, inputs, outputs, modes, margins; widest node input;
 # whether margins need input rates; position of the output rows; offsets of node inputs and of scratch in the
 # work vector; whether a friction law has a narrow feature over speed; whether the flow of every mode is
-# affine; number of delays, and where their history begins in the work vector
+# affine (1), or is but for the curved laws of one mechanism (2); number of delays, and where their history
+# begins in the work vector
 H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_BUMP = range(12)
 H_AFFINE, H_DELAYS, H_HISTORY = 12, 13, 14
 
 # a law's record in the integer table
-R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SIZE = range(5)
+R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SORT, R_SIZE = range(6)
+# sorts of laws: affine in place and speed while the mode lasts, or not; a friction law is of the sort of its
+# whole chain
+STRAIGHT, CURVED = 1, 2
+
+# forces of a mechanism in the scratch of a run: on its two bodies; those given from outside on either; which
+# sorts of laws are asked
+F_GIVEN, F_ASKED, F_SIZE = 2, 4, 5
 
 
 class Program(NamedTuple):

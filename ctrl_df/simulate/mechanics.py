@@ -16,8 +16,11 @@ from .layout import (
     A_NFRIC0,
     A_STOP,
     AUX,
+    CURVED,
     DIR0,
     DIR1,
+    F_ASKED,
+    F_GIVEN,
     FREE,
     G_BODY1,
     G_JOINT_HIGH,
@@ -29,6 +32,8 @@ from .layout import (
     J_NONE,
     J_RIGID,
     JOINT,
+    KIND,
+    MECHANISM,
     MODE,
     P_C,
     P_GAP,
@@ -44,7 +49,9 @@ from .layout import (
     R_BODY,
     R_PAR,
     R_SIZE,
+    R_SORT,
     R_STATE,
+    STRAIGHT,
     STUCK,
     WALL,
     G,
@@ -66,15 +73,21 @@ def level(prog, first, count, moving, direction, speed):
 
 @part(inline=True)
 def smooth_forces(prog, node, t, x, mode, force, f, dx):
-    """Fill f[0:2] with the forces on the bodies but dry friction and contact; writes internal rates to dx."""
+    """Fill f[0:2] with the forces on the bodies but dry friction and contact; writes internal rates to dx.
+
+    f[F_ASKED] says which sorts of laws are asked, f[F_GIVEN:] what acts besides.
+    """
     nodes, par, aux = prog.nodes, prog.par, prog.ints
     xo, po, ao = nodes[node, X], nodes[node, PAR], nodes[node, AUX]
     driven = aux[ao + A_BODIES] - 1
-    f[0] = f[1] = 0.0
-    f[driven] = force
+    asked = int(f[F_ASKED])
+    f[0], f[1] = f[F_GIVEN], f[F_GIVEN + 1]
+    f[driven] += force
     first = aux[ao + A_LAWS]
     base_p, base_x, base_dx = par.address, x.address, dx.address
     for i in range(first, first + aux[ao + A_NFORCE] * R_SIZE, R_SIZE):
+        if aux[i + R_SORT] & asked == 0:
+            continue
         b = aux[i + R_BODY]
         z = 8 * (xo + aux[i + R_STATE])
         f[b] += call_force(
@@ -86,7 +99,7 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
             base_p + 8 * aux[i + R_PAR],
             base_dx + z,
         )
-    if aux[ao + A_BRISTLE] >= 0:
+    if aux[ao + A_BRISTLE] >= 0 and asked & CURVED != 0:
         z = xo + aux[ao + A_BRISTLE]
         v = x[xo + 2 * driven + 1]
         start = friction_start(prog, node, driven)
@@ -97,7 +110,7 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
             rate -= par[po + P_SIGMA0] * abs(v) * x[z] / g
         dx[z] = rate
         f[driven] -= par[po + P_SIGMA0] * x[z] + par[po + P_SIGMA1] * rate
-    if aux[ao + A_JOINT] == J_ELASTIC:
+    if aux[ao + A_JOINT] == J_ELASTIC and asked & STRAIGHT != 0:
         region = mode[nodes[node, MODE] + JOINT]
         if region != 0:
             bend = x[xo + 2] - x[xo] - (par[po + P_GAP] if region > 0 else 0.0)
@@ -107,11 +120,40 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
 
 
 @part(inline=True)
+def mechanism(prog):
+    """Index of the first mechanism among the nodes; their number if there is none."""
+    for node in range(prog.nodes.shape[0]):
+        if prog.nodes[node, KIND] == MECHANISM:
+            return node
+    return prog.nodes.shape[0]
+
+
+@part(inline=True)
 def friction_start(prog, node, body):
     """Index of the first friction law of a body."""
     ao = prog.nodes[node, AUX]
     start = prog.ints[ao + A_LAWS] + R_SIZE * prog.ints[ao + A_NFORCE]
     return start if body == 0 else start + R_SIZE * prog.ints[ao + A_NFRIC0]
+
+
+@part(inline=True)
+def _asked(prog, node, body, f):
+    """Whether the friction laws of a body are among those asked; there is one at least."""
+    return prog.ints[friction_start(prog, node, body) + R_SORT] & int(f[F_ASKED]) != 0
+
+
+@part(inline=True)
+def curved_forces(prog, node, t, x, mode, f, dx):
+    """Fill f[0:2] with what the curved laws add to the forces on the bodies; writes internal rates to dx.
+
+    f[F_ASKED] has to be CURVED.
+    """
+    smooth_forces(prog, node, t, x, mode, 0.0, f, dx)
+    xo, mo = prog.nodes[node, X], prog.nodes[node, MODE]
+    for b in range(prog.ints[prog.nodes[node, AUX] + A_BODIES]):
+        d = mode[mo + b]
+        if (d == 1 or d == -1) and _asked(prog, node, b, f):
+            f[b] -= d * dry_level(prog, node, b, 1.0, float(d), abs(x[xo + 2 * b + 1]))
 
 
 @part(inline=True)
@@ -159,7 +201,7 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
     friction0 = friction1 = 0.0
     for b in range(bodies):
         d = mode[mo + b]
-        if d == 1 or d == -1:
+        if (d == 1 or d == -1) and _asked(prog, node, b, f):
             drag = d * dry_level(prog, node, b, 1.0, float(d), abs(x[xo + 2 * b + 1]))
             if b == 0:
                 friction0 = drag

@@ -32,9 +32,9 @@ class Node:
     ng: int = 0
     aux: Sequence[int] = ()
     feed: int = 0
-    laws: list[tuple[int, int, int, int]] = field(
+    laws: list[tuple[int, int, int, int, int]] = field(
         default_factory=list
-    )  # address, par offset, state offset, body
+    )  # address, par offset, state offset, body, sort
     start: Sequence[int] = ()  # initial modes
     affine: bool = False  # whether its rates, in any mode, are an affine function of state, inputs and time
 
@@ -71,8 +71,9 @@ def primitive_node(primitive, x0) -> Node:
         return Node(L.QUANTIZER, 1, 1, x0, 0, [primitive.step], 1, 2, feed=1, start=[0], affine=True)
     if isinstance(primitive, Smooth):
         return Node(
-            L.SMOOTH, 1, 1, x0, 0, primitive.p, feed=1, laws=[(address(primitive.law, "smooth"), 0, 0, 0)]
-        )
+            L.SMOOTH, 1, 1, x0, 0, primitive.p, feed=1,
+            laws=[(address(primitive.law, "smooth"), 0, 0, 0, L.CURVED)],
+        )  # fmt: skip
     if isinstance(primitive, Ramp):
         return Node(L.RAMP, 1, 1, x0, 0, [primitive.offset, primitive.rate], feed=1, affine=True)
     if isinstance(primitive, Lag):
@@ -124,7 +125,7 @@ def user_node(system, x0):
 
     pointer, keep = callback(call, "system")
     feed = 1 if nx == 0 else int(_has_feedthrough(output, nx, nu, params))
-    return Node(L.SYSTEM, nu, ny, x0, nx, feed=feed, laws=[(pointer, 0, 0, 0)]), keep
+    return Node(L.SYSTEM, nu, ny, x0, nx, feed=feed, laws=[(pointer, 0, 0, 0, L.CURVED)]), keep
 
 
 def _has_feedthrough(output, nx, nu, params) -> bool:
@@ -158,11 +159,13 @@ def core_node(core: Core, x0: int) -> Node:
     par += [_narrowest(chain) for chain in (core.friction + ((),))[:2]]
     laws = []
     for term in core.forces:
-        laws.append((address(type(term.effect).law, "force"), len(par), term.state, term.body))  # type: ignore[arg-type]
+        law = address(type(term.effect).law, "force")  # type: ignore[arg-type]
+        laws.append((law, len(par), term.state, term.body, _sort([term.effect])))
         par += term.effect.values
     for body, chain in enumerate(core.friction):
         for effect in chain:
-            laws.append((address(type(effect).law, "friction"), len(par), 0, body))  # type: ignore[arg-type]
+            law = address(type(effect).law, "friction")  # type: ignore[arg-type]
+            laws.append((law, len(par), 0, body, _sort(chain)))
             par += effect.values
     effects = [term.effect for term in core.forces] + [e for chain in core.friction for e in chain]
     chains = [len(c) for c in core.friction] + [0]
@@ -176,6 +179,7 @@ def core_node(core: Core, x0: int) -> Node:
         chains[0],
         chains[1],
         0,  # index of its first law, filled when packed
+        sum(term.effect.states for term in core.forces) + (bristle is not None),
     ]
     mode = [L.FREE, L.FREE, 0, 0]
     return Node(
@@ -191,8 +195,13 @@ def core_node(core: Core, x0: int) -> Node:
         feed=0,
         laws=laws,
         start=mode,
-        affine=core.bristle is None and all(e.affine for e in effects),
+        affine=bristle is None and _sort(effects) == L.STRAIGHT,
     )
+
+
+def _sort(effects) -> int:
+    """Return the sort of laws that act together."""
+    return L.STRAIGHT if all(e.affine for e in effects) else L.CURVED
 
 
 def _narrowest(chain) -> float:

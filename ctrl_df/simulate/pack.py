@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 WIDEST_AFFINE = 24
 """States up to which a product with a full matrix is cheaper than the rates themselves."""
+WIDEST_CURVED = 10
+"""The same where curved laws stand beside: a step then takes several such products."""
 
 
 def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str]]:
@@ -84,8 +86,8 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
         node = nodes[i]
         inputs = rows(flat.us[u_at[i] : u_at[i + 1]], flat.ur[u_at[i] : u_at[i + 1]])
         laws = len(ints)
-        for law_address, offset, state, body in node.laws:
-            ints.extend((law_address, len(par) + offset, state, body))
+        for law_address, offset, state, body, sort in node.laws:
+            ints.extend((law_address, len(par) + offset, state, body, sort))
         aux = list(node.aux)
         if node.kind == L.MECHANISM:
             aux[L.A_LAWS] = laws
@@ -104,9 +106,11 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     ints[L.H_NM], ints[L.H_NG] = len(modes), ng
     ints[L.H_TRACK] = int(any(n.kind in (L.PLAY, L.RATE) for n in nodes))
     kinds = [n.kind for n in nodes]
-    ints[L.H_AFFINE] = int(
-        all(n.affine for n in nodes) and kinds.count(L.MECHANISM) <= 1 and nx <= WIDEST_AFFINE
-    )
+    curved = [n.kind for n in nodes if not n.affine]
+    if kinds.count(L.MECHANISM) <= 1 and not curved and nx <= WIDEST_AFFINE:
+        ints[L.H_AFFINE] = 1
+    elif curved == [L.MECHANISM] == [k for k in kinds if k == L.MECHANISM] and nx <= WIDEST_CURVED:
+        ints[L.H_AFFINE] = 2
     ints[L.H_BUMP] = int(
         any(n.kind == L.MECHANISM and min(n.par[L.P_BUMP0 : L.P_BUMP1 + 1]) < np.inf for n in nodes)
     )

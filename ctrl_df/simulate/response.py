@@ -29,8 +29,10 @@ class EventResponse(ct.TimeResponseData):
         How the simulation ended; anything but CONVERGED means that `time` ends early, at the last state that
         is right.
     propagated : int
-        Steps between samples and outputs that were taken at once, by the constant propagator of a mode, where
-        no event could lie inside; 0 for systems with laws that are not affine between events.
+        Steps between samples and outputs that were taken at once, by the constant matrices of a mode, where
+        no event could lie inside: exactly where all laws are affine between events, else by an exponential
+        Runge-Kutta method within the tolerance; 0 for systems with delays, plays, rate limits, static laws
+        that are smooth or more than one mechanism, and without a grid of samples or outputs.
     """
 
     events: list[Event]
