@@ -44,7 +44,7 @@ def warm_up(progress: bool | None = None) -> None:
 
 def is_warm() -> bool:
     """Return whether machine code of the engine is kept, as new as its sources (or none is wanted)."""
-    from .simulate import driver
+    from .simulate.kernel import driver
 
     kept = getattr(driver.advance, "_cache", None)  # none where numba is switched off
     return kept is None or kept.known
@@ -102,7 +102,7 @@ def _laws():
     from .blocks.effect import effect_library
     from .blocks.memoryless import cubic
     from .simulate.engine import Engine
-    from .simulate.pointers import address
+    from .simulate.program.pointers import address
 
     for effect in effect_library().values():
         law = getattr(effect, "law", None)

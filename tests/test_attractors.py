@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import ctrl_df as cdf
-from ctrl_df.df.backlash import backlash_attractors
+from ctrl_df.df.closed_form.backlash import backlash_attractors
 
 NODE, WEIGHT = np.polynomial.legendre.leggauss(16)
 LONGEST = 24  # periods

@@ -13,8 +13,8 @@ import pytest
 from scipy.optimize import brentq
 
 import ctrl_df as cdf
-from ctrl_df.df.backlash import backlash_attractors
-from ctrl_df.df.backlash_branches import coexisting_branches, symmetric_branch
+from ctrl_df.df.closed_form.backlash import backlash_attractors
+from ctrl_df.df.closed_form.backlash_branches import coexisting_branches, symmetric_branch
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from ctrl_df.df import backlash
-from ctrl_df.df.backlash import BACKLASH_REGIMES, backlash_attractors, backlash_family
+from ctrl_df.df.closed_form import backlash
+from ctrl_df.df.closed_form.backlash import BACKLASH_REGIMES, backlash_attractors, backlash_family
 
 IMPACT, CONTACT, ASYMMETRIC, SUBHARMONIC, APERIODIC, FREE = range(6)
 PAPER = dict(motor_mass=1.0, load_mass=8.0, gap=0.018)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from ctrl_df.df.friction import FRICTION_REGIMES, friction_family
+from ctrl_df.df.closed_form.friction import FRICTION_REGIMES, friction_family
 
 SLIP, STICK_SLIP, STUCK = (FRICTION_REGIMES.index(name) for name in ("slip", "stick-slip", "stuck"))
 

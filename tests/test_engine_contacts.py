@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.simulate import layout as L
 from ctrl_df.simulate.engine import Engine, constant_drive, harmonic_drive
+from ctrl_df.simulate.program import layout as L
 from ctrl_df.status import Status
 
 

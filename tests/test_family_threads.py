@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.df import attractors, threads, work
-from ctrl_df.df.attractors import orbit_attractors
+from ctrl_df.df import threads, work
+from ctrl_df.df.forced_orbit import attractors
+from ctrl_df.df.forced_orbit.attractors import orbit_attractors
 from ctrl_df.limit_cycles.finder import OrbitFinder
-from ctrl_df.simulate import driver
 from ctrl_df.simulate.beside import flow
 from ctrl_df.simulate.engine import Engine, constant_drive
+from ctrl_df.simulate.kernel import driver
 from ctrl_df.simulate.passages import strides
 
 HARDENING = cdf.Mass(9.0, [cdf.Coulomb(5), cdf.Viscous(0.5), cdf.LinearSpring(200.0), cdf.CubicSpring(1e5)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.simulate import driver
+from ctrl_df.simulate.kernel import driver
 
 STEP = 2e-3
 SHORT = 0.9e-3  # a longest step that leaves no propagator to use

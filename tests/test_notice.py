@@ -3,7 +3,7 @@
 import time
 from types import SimpleNamespace
 
-from ctrl_df.simulate import notice
+from ctrl_df.simulate.compiler import notice
 
 
 def _compile(seconds, listener, inner=None):

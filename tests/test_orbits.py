@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
 from ctrl_df.blocks.mechanism import Mass, TwoMass, backlash_masses, friction_mass
-from ctrl_df.df.attractors import orbit_attractors
-from ctrl_df.df.backlash import BACKLASH_REGIMES, backlash_family
-from ctrl_df.df.friction import FRICTION_REGIMES, friction_family
-from ctrl_df.df.orbits import ORBIT_REGIMES, OrbitSolver, orbit_family
+from ctrl_df.df.closed_form.backlash import BACKLASH_REGIMES, backlash_family
+from ctrl_df.df.closed_form.friction import FRICTION_REGIMES, friction_family
+from ctrl_df.df.forced_orbit.attractors import orbit_attractors
+from ctrl_df.df.forced_orbit.orbits import ORBIT_REGIMES, OrbitSolver, orbit_family
 from ctrl_df.simulate.sampled import sampled
 
 

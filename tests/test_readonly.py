@@ -13,20 +13,25 @@ import pytest
 import ctrl_df
 from ctrl_df import cli
 from ctrl_df.model_file import EXAMPLE
-from ctrl_df.simulate import compiled
+from ctrl_df.simulate.compiler import compiled
 
 PACKAGE = Path(ctrl_df.__file__).parent
 NOWHERE = "/dev/null/nowhere"  # not even root can make it
 FRICTION = "import ctrl_df as cdf; print(cdf.describing_function(cdf.friction_mass(9, 5, .5), 10., 5.))"
 COUNTED = FRICTION + (
-    "; from ctrl_df.df.friction import _family; print('hits', sum(_family.stats.cache_hits.values()))"
+    "; from ctrl_df.df.closed_form.friction import _family"
+    "; print('hits', sum(_family.stats.cache_hits.values()))"
 )
 
-SMALL = "from ctrl_df.df.wall_map import wrap; print(wrap(7.0), 'hits', sum(wrap.stats.cache_hits.values()))"
+SMALL = (
+    "from ctrl_df.df.closed_form.wall_map import wrap"
+    "; print(wrap(7.0), 'hits', sum(wrap.stats.cache_hits.values()))"
+)
+PLACES = sorted({file.parent.relative_to(PACKAGE) for file in PACKAGE.rglob("*.py")})
 MODULES = {
     "sizes": "FIVE = 5.0\n",
     "inner": """
-from .compiled import njit
+from .compiler.compiled import njit
 from .sizes import FIVE
 
 @njit()
@@ -34,7 +39,7 @@ def inner(x):
     return FIVE * x
 """,
     "outer": """
-from .compiled import njit
+from .compiler.compiled import njit
 from .inner import (  # over several lines
     inner as called,
 )
@@ -73,7 +78,7 @@ def cold(tmp_path):
     """A copy of the package without machine code, and with files where it would go."""
     folder = tmp_path / "cold"
     shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
-    for place in ("simulate", "df", "blocks/effects"):
+    for place in PLACES:
         (folder / "ctrl_df" / place / "__pycache__").write_text("no folder")
     return folder
 
@@ -85,7 +90,7 @@ def warm(tmp_path):
         pytest.skip("root without setpriv writes everywhere")
     folder = tmp_path / "warm"
     shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
-    for place in ("simulate", "df", "blocks/effects"):
+    for place in PLACES:
         (into := folder / "ctrl_df" / place / "__pycache__").mkdir()
         for kept in compiled.folders(PACKAGE / place / "_.py"):
             for file in kept.glob("*.nb*") if kept.is_dir() else ():
@@ -116,7 +121,7 @@ def test_a_law_of_the_users_compiles_where_nothing_can_be_kept(cold):
     (cold / "own.py").write_text("def law(t, x, v, z, p, dz):\n    return -p[0] * x\n")
     (cold / "__pycache__").write_text("no folder")
     code = (
-        "from ctrl_df.simulate import pointers as p; import own; "
+        "from ctrl_df.simulate.program import pointers as p; import own; "
         "print(p.address(own.law, 'force') != 0, 'CFunc' in repr(type(p._compiled[own.law][1])))"
     )
     done = run(cold, "-c", code)
@@ -140,7 +145,7 @@ def test_damaged_machine_code_is_compiled_anew(tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
     assert "hits 0" in run(folder, "-c", SMALL).stdout
-    files = list((folder / "ctrl_df" / "df" / "__pycache__").glob("wall_map.wrap*.nb*"))
+    files = list((folder / "ctrl_df" / "df" / "closed_form" / "__pycache__").glob("wall_map.wrap*.nb*"))
     assert len(files) == 2
     for file in files:
         file.write_bytes(file.read_bytes()[:40])
@@ -165,7 +170,7 @@ def test_a_caller_is_compiled_anew_when_what_it_calls_is_edited(tmp_path):
         (simulate / f"{name}.py").write_text(text)
     code = "from ctrl_df.simulate.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
     said = [run(folder, "-c", code).stdout.split()]
-    (simulate / "nodes.py").write_text("# no part of it")
+    (simulate / "program" / "nodes.py").write_text("# no part of it")
     said.append(run(folder, "-c", code).stdout.split())
     (simulate / "sizes.py").write_text("FIVE = 7.0\n")
     said.append(run(folder, "-c", code).stdout.split())

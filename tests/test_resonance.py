@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
-from ctrl_df.df.orbits import OrbitSolver
+from ctrl_df.df.forced_orbit.orbits import OrbitSolver
 
 
 def block(inertia, *effects):

@@ -12,7 +12,7 @@ from ..blocks.effects import Backlash, Coulomb, Stiction, Viscous
 from ..checks import shown
 from ..status import Status
 from .branch import Branch
-from .memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
+from .closed_form.memoryless import callable_harmonics, element_harmonics, static_regimes, swept_harmonics
 
 
 @dataclass(frozen=True)
@@ -282,7 +282,7 @@ class FrictionClosedForm(_OfPosition):
         return block.core.bodies == 1 and len(kinds) == len(set(kinds)) and {Coulomb} <= set(kinds) <= known
 
     def _of_position(self, A, omega, orders):
-        from .friction import FRICTION_REGIMES, friction_family
+        from .closed_form.friction import FRICTION_REGIMES, friction_family
 
         block = self.subject
         given = {type(e): e.values[0] for e in block.effects}
@@ -305,7 +305,7 @@ class ImpactMap(_OfPosition):
     Attributes
     ----------
     options : dict
-        Of `ctrl_df.df.backlash.backlash_family`.
+        Of `ctrl_df.df.closed_form.backlash.backlash_family`.
     """
 
     options: dict = field(default_factory=dict)
@@ -323,7 +323,7 @@ class ImpactMap(_OfPosition):
 
     def branches(self, A, omega, near_A, near_omega) -> list[Branch]:
         """See `Method.branches`."""
-        from .backlash_branches import backlash_branches
+        from .closed_form.backlash_branches import backlash_branches
 
         found = backlash_branches(self.subject, A, omega, near_A, near_omega)
         return [b.differentiated(self.order) for b in found] if self.order else found
@@ -333,7 +333,7 @@ class ImpactMap(_OfPosition):
         return (*super().identity(), self.options)
 
     def _of_position(self, A, omega, orders):
-        from . import backlash
+        from .closed_form import backlash
 
         block, joint = self.subject, self.subject.effects[0]
         load, motor = block.core.masses
@@ -350,7 +350,7 @@ class ForcedOrbit(Method):
     Attributes
     ----------
     options : dict
-        Of `ctrl_df.df.orbits.orbit_family`.
+        Of `ctrl_df.df.forced_orbit.orbits.orbit_family`.
     """
 
     options: dict = field(default_factory=dict)
@@ -361,7 +361,7 @@ class ForcedOrbit(Method):
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
-        from . import orbits
+        from .forced_orbit import orbits
 
         y, code, residual = orbits.orbit_family(
             self.subject, A, omega, orders=orders, output=self.output, **self.options
@@ -370,7 +370,7 @@ class ForcedOrbit(Method):
 
     def compiled(self) -> bool:
         """See `Method.compiled`."""
-        from . import orbits
+        from .forced_orbit import orbits
 
         return not orbits.solver_for(self.subject, self.output, **self.options).engine.calls_python
 

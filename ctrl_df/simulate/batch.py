@@ -13,7 +13,7 @@ from ..checks import choice, count, flag, real_array, shown, unknown_keywords
 from ..status import Status
 from .engine import EVENT_KINDS, RTOL, Engine, Event
 from .groups import Group, groups_of
-from .parameters import checked_parameters
+from .program.parameters import checked_parameters
 from .response import EventResponse, checked_limits, checked_times, misplaced
 from .runs import Drives, Runs, harmonic_drives, run_many, sampled_drives
 

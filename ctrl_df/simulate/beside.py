@@ -8,12 +8,13 @@ import math
 
 import numpy as np
 
-from . import driver, pointers
-from .compiled import njit
+from .compiler.compiled import njit
+from .compiler.native import call_native
+from .compiler.views import lean
 from .engine import Engine, State
-from .layout import H_NG, Drive
-from .native import call_native
-from .views import lean
+from .kernel import driver
+from .program import pointers
+from .program.layout import H_NG, Drive
 
 _AT_ONCE = 100_000  # steps after which a run is begun anew from where it is, as it would be alone
 _MOST = 20_000_000  # steps of one state

@@ -11,10 +11,11 @@ import control as ct
 import numpy as np
 
 from ..status import Status
-from . import driver, history, layout, pointers
-from .flatten import flatten
-from .layout import EVENT_KINDS, Drive
-from .pack import pack
+from .kernel import driver, history
+from .program import layout, pointers
+from .program.flatten import flatten
+from .program.layout import EVENT_KINDS, Drive
+from .program.pack import pack
 
 RTOL = 1e-9
 """Default relative tolerance; the absolute one is a thousandth of it."""
@@ -77,7 +78,7 @@ class Run:
     states: np.ndarray  # (nt, nx)
     recorded: int
     steps: int
-    propagated: int  # steps taken by constant propagators, see `ctrl_df.simulate.glide`
+    propagated: int  # steps taken by constant propagators, see `ctrl_df.simulate.kernel.glide`
     event_count: int
     events: tuple[np.ndarray, np.ndarray, np.ndarray]  # time, node, kind
     before: np.ndarray  # state just before the event that stopped the run
@@ -123,7 +124,7 @@ class Engine:
     Parameters
     ----------
     system : block, LTI system or interconnection
-        What to run; see `ctrl_df.simulate.flatten`.
+        What to run; see `ctrl_df.simulate.program.flatten`.
     values : mapping
         Parameters that differ from those of its blocks, checked already. With columns of numbers in it (see
         `ctrl_df.column`) the engine runs the first of these systems, and ``par`` has the packed parameters of

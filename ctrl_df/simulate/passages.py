@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..status import Status
-from . import driver, history, pointers
-from .compiled import njit
+from .compiler.compiled import njit
+from .compiler.native import call_native
+from .compiler.views import lean
 from .engine import FAR, STATUS, Engine, State, constant_drive
-from .layout import H_NG
-from .native import call_native
-from .views import lean
+from .kernel import driver, history
+from .program import pointers
+from .program.layout import H_NG
 
 _PEEKS = 129  # in a stride of about four passages, from which the peak of an output is read
 _TOGETHER = 64  # strides at once

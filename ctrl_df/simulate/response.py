@@ -10,9 +10,9 @@ import numpy as np
 
 from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
 from ..status import Status
-from . import layout as L
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
-from .parameters import checked_parameters, with_values
+from .program import layout as L
+from .program.parameters import checked_parameters, with_values
 
 
 class EventResponse(ct.TimeResponseData):

@@ -14,10 +14,11 @@ import numpy as np
 from numba.core import config
 
 from ..status import Status
-from . import driver, many, pointers
 from .engine import FAR, RTOL, STATUS
 from .groups import Group
-from .many import Drives, How, Rows
+from .kernel import driver, many
+from .kernel.many import Drives, How, Rows
+from .program import pointers
 
 _MOST_TOGETHER = 256  # runs between two looks at what is left to do
 _SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time

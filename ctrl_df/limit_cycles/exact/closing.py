@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...simulate.engine import Engine, Event
-from ...simulate.layout import AUX, KIND, MECHANISM, MODE
+from ...simulate.program.layout import AUX, KIND, MECHANISM, MODE
 from ...status import Status
 from .monodromy import RTOL, Tracer
 from .multiple_shooting import shoot

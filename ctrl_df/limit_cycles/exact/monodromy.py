@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate import driver, layout
 from ...simulate.beside import flow
 from ...simulate.engine import Drive, Engine, State, constant_drive
-from ...simulate.look import jump, look
+from ...simulate.kernel import driver
+from ...simulate.kernel.look import jump, look
+from ...simulate.program import layout
 from ...status import Status
 
 RTOL = 1e-11

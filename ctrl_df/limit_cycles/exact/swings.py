@@ -10,8 +10,8 @@ import numpy as np
 
 from ...blocks.element import Element
 from ...simulate.engine import Engine, State
-from ...simulate.layout import DELAY, H_OUT, KIND, X
 from ...simulate.passages import strides
+from ...simulate.program.layout import DELAY, H_OUT, KIND, X
 from ...status import Status
 from .kicks import Kicks
 

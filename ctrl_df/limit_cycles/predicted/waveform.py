@@ -8,9 +8,9 @@ import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ...blocks.transparent import without_delays
-from ...df.symmetries import Sizes, find_symmetries
-from ...simulate import layout
+from ...df.forced_orbit.symmetries import Sizes, find_symmetries
 from ...simulate.engine import Engine, harmonic_drive
+from ...simulate.program import layout
 
 # Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)

@@ -1,0 +1,65 @@
+"""A line of a family: consecutive orbits, closed one from another by compiled code."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...simulate.engine import State, harmonic_drive
+from ..threads import go_on
+from .orbit_search import RTOL
+from .sweep import sweep
+
+_AT_ONCE = 64  # points of a line between two chances to interrupt it
+
+
+class Line:
+    """Consecutive points and what is measured of their orbits.
+
+    Parameters
+    ----------
+    solver : OrbitSolver
+        Acquainted with motions of their size.
+    A, omega : (n,) arrays
+    orders : int
+        Highest harmonic.
+    """
+
+    def __init__(self, solver, A, omega, orders: int):
+        n, rows = len(A), solver.row + 1
+        self.solver, self.A, self.omega, self.orders = solver, A, omega, orders
+        self.integrals = np.zeros((n, rows, orders + 1), complex)
+        self.ends, self.miss = np.zeros((n, 2, rows)), np.zeros(n)
+        self.kinds, self.still = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        self._drive, self._scratch = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros((1, 2), complex)
+        self._power = solver.symmetries.power
+        self._past = np.zeros((4, max(len(self._power), 1)))
+        self._mode, self._known = np.zeros(0, np.int64), 0
+
+    def close(self, first: int) -> int:
+        """Close the orbits from point `first` on, whose predecessor the solver has; return how many."""
+        s, state = self.solver, self.solver.previous
+        self._past[0, : len(state.x)] = state.x / self._units(first - 1)
+        self._past[3, 0] = 0.02
+        self._mode, self._known = state.mode.copy(), 1
+        p = first
+        while p < len(self.A):  # compiled code hears no Ctrl-C: some points at a time
+            end = min(p + _AT_ONCE, len(self.A))
+            done, _, self._known = sweep(
+                s.shot, self._drive, self._scratch, self.A[p:end], self.omega[p:end], self._power, self._past,
+                self._mode, self._known, s.mirrored, RTOL, s._hmax(self.orders), s.max_steps,
+                self.integrals[p:end], self.ends[p:end], self.miss[p:end], self.kinds[p:end],
+                self.still[p:end],
+            )  # fmt: skip
+            go_on()
+            s._raise_if_raised()
+            p += done
+            if p < end:
+                break
+        return p - first
+
+    def state(self, p: int) -> State:
+        """State of the orbit of point `p`, the last one closed."""
+        return State(0.0, self._past[0, : len(self._power)] * self._units(p), self._mode.copy())
+
+    def _units(self, p):
+        return self.A[p] / self.omega[p] ** self._power

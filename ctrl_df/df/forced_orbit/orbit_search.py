@@ -1,0 +1,391 @@
+"""The search for one forced periodic orbit: transient, Newton's method, and what to try when it fails."""
+
+from __future__ import annotations
+
+import control as ct
+import numpy as np
+
+from ...blocks.mechanism import Mechanism
+from ...blocks.transparent import without_shifts
+from ...simulate.engine import Engine, State, harmonic_drive
+from ...simulate.kernel import driver
+from ...simulate.program import layout, pointers
+from ...simulate.program.layout import EVENT_KINDS
+from ...status import Status
+from ..threads import go_on
+from . import shooting
+from .linear_orbit import linear_orbit
+from .shooting import CLOSED, SPENT, close_orbit
+from .shot import follow, make_shot, set_state, shoot
+from .symmetries import Probe, Sizes, find_symmetries
+
+RTOL = 5e-10
+_FAMILIAR = 1e3  # factor between sizes of motion for which laws need not be asked anew
+_BINS = 2  # decades of force and of frequency: within them sizes, up to A / omega^2, differ by _FAMILIAR
+_COARSE = 1e-7  # tolerance while a transient is followed
+_AT_ONCE = 64  # shots between two chances to interrupt them
+_START = 0.02  # of a period: first step of a shot
+LONGEST = 12  # periods of a subharmonic motion that is recognised
+BLOCKS = 8  # an average's spread is estimated from that many parts
+BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
+TOUCH = BIT["impact"] | BIT["contact"] | BIT["release"]
+
+
+class OrbitSearch:
+    """Finds forced periodic orbits of one block; `ctrl_df.df.forced_orbit.orbits` names them.
+
+    Parameters
+    ----------
+    block : ct.NonlinearIOSystem or LTI system
+        One input.
+    output : str or int
+        Output described, the first by default.
+    transient, averages, max_steps : int
+        As in `ctrl_df.df.forced_orbit.orbits.orbit_family`.
+    """
+
+    def __init__(self, block, output=None, *, transient=4, averages=64, max_steps=1_000_000):
+        self.transient, self.averages, self.max_steps = (
+            int(transient),
+            max(int(averages), BLOCKS),
+            int(max_steps),
+        )
+        self.block = block
+        if block.ninputs != 1:
+            raise ValueError(
+                f"a describing function needs one input; {block.name} has {block.ninputs}. "
+                "Fix the others inside the block."
+            )
+        self.row = _row(block, output)
+        self.delay, self.offset = 0.0, 0.0
+        inner = ct.ss(block) if isinstance(block, ct.TransferFunction) else block
+        if isinstance(block, Mechanism):
+            # delays turn the phase, offset and drift move the mean: all exactly, outside the simulation
+            inner, self.delay, late, offset = without_shifts(block)
+            if self.row == 0:
+                self.delay, self.offset = self.delay + late, offset
+        self.engine = Engine(inner)
+        prog = self.engine.program
+        if np.any(prog.nodes[:, layout.KIND] == layout.SAMPLED):
+            raise ValueError(
+                f"forced periodic orbits need continuous time; {block.name} holds a sampled system, whose "
+                "ticks have no common period with the forcing. Take its continuous equivalent here."
+            )
+        pointers.raised.clear()
+        self.mechanisms = [n for n in prog.nodes if n[layout.KIND] == layout.MECHANISM]
+        self.inertia = sum(
+            prog.par[n[layout.PAR] + b] for n in self.mechanisms for b in range(prog.ints[n[layout.AUX]])
+        ) or 1.0  # fmt: skip
+        self.quantized = bool(np.any(prog.nodes[:, layout.KIND] == layout.QUANTIZER))
+        self.gap = any(prog.par[n[layout.PAR] + layout.P_GAP] > 0 for n in self.mechanisms)
+        self.contacts = self.gap or any(
+            prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms
+        )
+        self.atol = 0.0
+        self.previous: State | None = None
+        self._given: State | None = None
+        self._about: tuple | None = None
+        self._answers: dict[tuple, tuple] = {}
+        self.sizes = Sizes.ones(self.engine.nstates)
+        self._ask(self.sizes)
+        self.forget()
+
+    def _ask(self, sizes: Sizes):
+        """Find the symmetries of the laws for motions of such sizes, and what follows from them."""
+        self.symmetries = s = find_symmetries(self.engine, self.block, sizes)
+        self._check(s)
+        self.symmetric = s.odd
+        self.shot = make_shot(self.engine, s, self.row + 1)
+        self.free_row = self._row_is_free(s, sizes)
+        self.linear = linear_orbit(self.engine, s, self.row, self.free_row)
+
+    def _acquaint(self, A, omega, whatever_before=False):
+        """Ask the laws about motions of this size, unless they were asked about ones not far from it.
+
+        With `whatever_before` what they were asked before makes no difference: answers do not depend on it.
+        """
+        if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), _FAMILIAR):
+            return
+        about = tuple(_BINS * np.round(np.log10([A, omega]) / _BINS))
+        if about == self._about:
+            return
+        self._about = about
+        if about not in self._answers:
+            force, rate = (float(10.0**x) for x in about)
+            states = self._motion(force, rate)
+            # states that belong to no mechanism are as large as they get in a few periods
+            run = self.engine.run(
+                self.engine.start(), 6 * np.pi / rate, harmonic_drive([[0.0, force]], rate), max_steps=20_000
+            )
+            seen = np.maximum(np.abs(run.state.x), self.shot.space.size)
+            pointers.raised.clear()
+            if np.all(np.isfinite(seen)):
+                states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
+            self._ask(Sizes(states, force, rate))
+            kept = (self.symmetries, self.symmetric, self.shot, self.free_row, self.linear)
+            self._answers[about] = (Sizes(self._motion(force, rate), force, rate), *kept)
+        self.sizes, self.symmetries, self.symmetric, self.shot, self.free_row, self.linear = self._answers[
+            about
+        ]
+        self.forget()
+
+    def _motion(self, A, omega):
+        """Return the size of each state in the motion of a free inertia under the force."""
+        power = self.symmetries.power
+        return A / (np.where(power > 0, self.inertia, 1.0) * omega**power)
+
+    def _check(self, s):
+        if not s.autonomous:
+            raise ValueError(
+                "a describing function needs laws that do not depend on time itself; "
+                f"those of {self.block.name} do. Make the time-dependent signal an input."
+            )
+        if pointers.raised and not np.any(np.isfinite(self._rates(np.zeros(self.engine.nstates)))):
+            raise user_error(self.block, pointers.raised[-1])
+        pointers.raised.clear()
+
+    def _rates(self, x, force=0.0):
+        return Probe(self.engine).at(x, force)[0]
+
+    def _row_is_free(self, s, sizes):
+        """Whether the output described shifts with a free position."""
+        probe, x = Probe(self.engine), np.zeros(self.engine.nstates)
+        at_zero = probe.at(x, 0.0)[2][self.row]
+        size = sizes.states
+        return any(probe.at(x + 3.7 * size * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
+
+    def forget(self):
+        """Start the next point from rest."""
+        self.previous = self.first = None
+        self.shot.jacobian[:] = np.nan
+        self.shot.size[:] = 0.0
+        self.shot.clock[:] = 0.0  # the step of the last run: a line must not depend on the one before
+
+    # --- the search -----------------------------------------------------------------------------------------
+
+    def _aim(self, A, omega):
+        self._acquaint(A, omega)
+        self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
+        self.drive = harmonic_drive([[0.0, A]], omega)
+        self._unit = self._motion(A, omega)
+
+    def _hmax(self, orders):
+        """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic.
+
+        Impacts are located on the interpolant of a step, which is less exact than its end.
+        """
+        return min(1 / 16 if self.contacts else 1 / 8, 9 / 8 / orders)
+
+    def _start(self, A):
+        """At rest, a joint off its faces; the sizes of the states from the motion of a free inertia."""
+        n = self.engine.nstates
+        y = np.zeros(n)
+        for node in self.mechanisms:
+            if self.engine.program.ints[node[layout.AUX]] == 2:
+                y[node[layout.X] + 2] = 0.3 * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
+        state = self._state(y)
+        self._resize(A)
+        return state
+
+    def _resize(self, A):
+        n = self.engine.nstates
+        self.shot.space.size[:] = (
+            1e-3 * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
+        )
+        self.shot.size[:n] = 0.0
+        self.shot.scale[:] = 0.0
+        self.shot.jacobian[:] = np.nan
+
+    def _state(self, y, mode=None):
+        """State at coordinates y."""
+        x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
+        set_state(self.shot, np.array(y, float), x, mode)
+        return State(0.0, x, mode)
+
+    def _nudged(self, state):
+        """Return the state a little off: no motion stays on a repelling orbit by the grace of rounding."""
+        y = self.symmetries.transform @ state.x
+        y[self.symmetries.free] += 1e-3 * self.shot.size[self.symmetries.free]
+        return self._state(y, state.mode)
+
+    def _follow(self, state, periods, rtol=_COARSE):
+        """Return the state after some periods (twice as many shots where mirrored)."""
+        state = state.copy()
+        self._trail(state, periods * 2 if self.mirrored else periods, rtol)
+        return state
+
+    def _trail(self, state, shots, rtol=RTOL):
+        """Coordinates before each of some shots of the state, in place."""
+        trail = np.empty((shots, len(state.x)))
+        for first in range(0, shots, _AT_ONCE):
+            reason, spent = follow(
+                self.shot, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
+                self._hmax(1) * self.period, _START * self.period, self.budget,
+                trail[first : first + _AT_ONCE],
+            )  # fmt: skip
+            self.budget -= spent
+            self._checked(reason, state)
+        return trail
+
+    def _checked(self, reason, state):
+        go_on()
+        self._raise_if_raised()
+        if reason != driver.DONE or self.budget <= 0 or not np.all(np.isfinite(state.x)):
+            raise self._stopped(reason, state)
+
+    def _shoot(self, state, rtol=RTOL, periods=1, spectrum=None):
+        """One shot of the state, in place."""
+        shot = self.shot
+        orders = 1 if spectrum is None else spectrum.shape[1] - 1
+        if not 0.0 < shot.clock[2] <= 5 * _START * self.period:
+            shot.clock[2] = _START * self.period
+        reason = shoot(
+            shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
+            self._hmax(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum, self.budget,
+        )  # fmt: skip
+        self.budget -= int(shot.clock[3])
+        self._checked(reason, state)
+        return int(shot.tally[2])
+
+    def _span(self, periods):
+        return self.period / 2 if self.mirrored else periods * self.period
+
+    def _periodic(self, state, periods=1, orders=9):
+        """Newton on the shot; (state, mismatch) of an attracting orbit, or None; its integrals are kept."""
+        state, shot = state.copy(), self.shot
+        spectrum = np.zeros((self.row + 1, orders + 1), complex)
+        shot.jacobian[:] = np.nan
+        shot.clock[2] = _START * self.period
+        outcome, miss = close_orbit(
+            shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, RTOL, self.atol,
+            self._hmax(orders) * self.period, spectrum, self.budget, 24, False,
+        )  # fmt: skip
+        self.budget -= int(shot.clock[3]) * 4
+        go_on()
+        self._raise_if_raised()
+        if outcome == SPENT or outcome == shooting.FAILED:
+            raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
+        if outcome != CLOSED:
+            return None
+        if not self.mirrored:
+            self._check_free_speed(shot.trial[1])
+        if self.quantized:  # the harmonics of the centred motion
+            self._shoot(state.copy(), RTOL, periods, spectrum)
+        self._keep(spectrum)
+        return state, miss
+
+    def measure(self, state, periods, orders, rtol):
+        """One shot of a closed orbit, for its integrals, ends and event kinds."""
+        spectrum = np.zeros((self.row + 1, orders + 1), complex)
+        end = state.copy()
+        self._shoot(end, rtol, periods, spectrum)
+        if not self.mirrored:
+            self._check_free_speed(self.symmetries.transform @ (end.x - state.x))
+        self._keep(spectrum)
+
+    def _keep(self, spectrum):
+        self.integrals, self.ends = spectrum[self.row], self.shot.ends[:, self.row].copy()
+        self.kinds, self.still = int(self.shot.tally[2]), bool(self.shot.tally[5])
+
+    def _check_free_speed(self, step):
+        """Raise where a speed that nothing ties to the ground has changed: something pushes the mechanism."""
+        gained = np.abs(step[self.symmetries.inertial])
+        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
+            raise OutOfWork(Status.DIVERGED)
+
+    def _touching(self, orders):
+        """Look for an orbit whose bodies touch, for a block found swinging freely within its gap.
+
+        A motion without contact coexists with others at moderate force and is what a centred start leads
+        to. Returns the orbit or None, and a state from which the bodies keep touching or None.
+        """
+        prog, keeps = self.engine.program, None
+        node = next(m for m in self.mechanisms if prog.par[m[layout.PAR] + layout.P_GAP] > 0)
+        at, gap = node[layout.X], prog.par[node[layout.PAR] + layout.P_GAP]
+        speed = gap * self.omega + self.A / (prog.par[node[layout.PAR] + layout.P_M0 + 1] * self.omega)
+        for face, leaving in ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2)):
+            self.mirrored = self.symmetric
+            y = np.zeros(self.engine.nstates)
+            y[at + 2], y[at + 3] = face * gap, leaving * speed
+            self._resize(self.A)
+            state = self._follow(self._state(y), 20)
+            if not self.shot.tally[2] & TOUCH:
+                continue
+            orbit = self._periodic(state, orders=orders)
+            if orbit is None and self.symmetric:
+                self.mirrored = False
+                state = self._follow(self._nudged(state), 30)
+                if not self.shot.tally[2] & TOUCH:
+                    continue
+                orbit = self._periodic(state, orders=orders)
+            if orbit is not None and self.kinds & TOUCH:
+                return orbit, state
+            if orbit is None:
+                keeps = state if keeps is None else keeps
+        return None, keeps
+
+    def _stop_if_running_away(self, y):
+        """Raise where a state grows out of all bounds, or a free body steadily gains speed."""
+        half, y = len(y) // 2, y / self._unit
+        if np.max(np.abs(y[-1])) > 100 * np.max(np.abs(y[half])) > 1e4 * np.max(np.abs(y[0])):
+            raise OutOfWork(Status.DIVERGED)
+        s = self.symmetries
+        for i in range(len(s.power)):
+            if s.power[i] != 1 or not s.positions[i - 1]:
+                continue
+            early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
+            spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
+            if abs(early) > 1e-3 and abs(late / early - 1) < 1e-3 and spread < 0.5 * abs(early / half):
+                raise OutOfWork(Status.DIVERGED)
+
+    # --- how a search can fail ------------------------------------------------------------------------
+
+    def _raise_if_raised(self):
+        if pointers.raised:
+            error = pointers.raised[0]
+            pointers.raised.clear()
+            raise user_error(self.block, error)
+
+    def _stopped(self, reason, state):
+        """Return what to raise for a run that ended early."""
+        if reason in (driver.STEPS, driver.DONE, driver.CHATTER, driver.FULL):
+            return OutOfWork(Status.WORK_LIMIT)
+        x = state.x
+        if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < 1e50:
+            force = self.A * np.cos(self.omega * self.shot.clock[0])
+            with np.errstate(all="ignore"):
+                slope = self._rates(x, force)
+                ahead = self._rates(x + slope * 1e-6 * self.period, force)
+            pointers.raised.clear()
+            if not (np.all(np.isfinite(slope)) and np.all(np.isfinite(ahead))):
+                return user_error(self.block, ValueError(f"a law returned NaN or inf near the state {x}"))
+        return OutOfWork(Status.DIVERGED)
+
+
+def user_error(block, error) -> RuntimeError:
+    """Return the one error for a law that raises or returns NaN; Ctrl-C is none and goes on."""
+    if not isinstance(error, Exception):
+        raise error
+    wrapped = RuntimeError(f"{Status.USER_ERROR} (block {block.name}: {error!r})")
+    wrapped.__cause__ = error
+    return wrapped
+
+
+class OutOfWork(Exception):
+    """A point's search ended: the state ran away, or the bound on work was hit."""
+
+    def __init__(self, status):
+        super().__init__(str(status))
+        self.status = status
+        self.regime = "diverged" if status is Status.DIVERGED else "work limit"
+
+
+def _row(block, output) -> int:
+    labels = list(block.output_labels)
+    if output is None:
+        return 0
+    if isinstance(output, int | np.integer) and 0 <= output < len(labels):
+        return int(output)
+    if output in labels:
+        return labels.index(output)
+    raise ValueError(f"output must be one of {', '.join(labels)}; got {output!r}.")

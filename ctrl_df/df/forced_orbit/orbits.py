@@ -1,0 +1,401 @@
+"""Forced periodic orbits on the event engine: N(a, omega) of anything that has no closed form.
+
+The block is driven by ``A cos(omega t)`` and the state that repeats after one period (after half of one,
+mirrored, where the laws are odd) is found by Newton's method on the engine's period map, not by waiting for
+transients. Where that fails, or finds an orbit that repels, the motion is followed and named: not half-wave
+symmetric (``asymmetric``), repeating after several periods (``subharmonic``), or not at all (``aperiodic``,
+averaged).
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from ...blocks.mechanism import Mechanism
+from ...simulate.engine import State
+from ...simulate.program import layout
+from ...status import Status
+from .far_newton import close_far
+from .line import Line
+from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
+
+ORBIT_REGIMES = (
+    "slip",
+    "stick-slip",
+    "stuck",
+    "impact",
+    "contact",
+    "asymmetric",
+    "subharmonic",
+    "aperiodic",
+    "smooth",
+    "diverged",
+    "work limit",
+    "drifting",
+    "free",
+    "resonance",
+    *(f"subharmonic {k}" for k in range(2, LONGEST + 1)),
+)
+"""Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
+without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
+periods, with their number; none; no dry friction and no contact; the state runs away (NaN); the bound on
+work was hit (NaN); the mass travels steadily besides swinging (the ramp is no part of the harmonics);
+a load never touched; an undamped linear mechanism driven at its natural frequency, which swings wider and
+wider (NaN)."""
+_WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
+_CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
+_EVEN = 1e-2  # a motion that repeats so much better after two half periods than after one is not symmetric
+
+
+def orbit_family(
+    block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000, **keywords
+):
+    """Harmonics of the steady motion on a grid, by forced periodic orbits.
+
+    Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the answer
+    is the one reached that way. `orbit_attractors` lists the others.
+
+    Parameters
+    ----------
+    block : ct.NonlinearIOSystem or LTI system
+        One input.
+    A, omega : (na,), (nw,) arrays
+        Amplitudes and frequencies [rad/s], > 0.
+    orders : int
+        Highest harmonic, >= 1.
+    output : str or int
+        Output described, the first by default.
+    transient : int
+        Periods followed before the first Newton step of a point without a neighbour.
+    averages : int
+        Periods averaged where the motion has no period, >= 8.
+    max_steps : int
+        Bound on the work of one point, in integration steps.
+
+    Returns
+    -------
+    harmonics : (na, nw, orders + 1) complex
+        Y_k / A; index 0 the mean (zero for the position of a free mass, which may be anywhere).
+    regime : (na, nw) int
+        Index into `ORBIT_REGIMES`.
+    residual : (na, nw)
+        Mismatch after the period relative to the size of the orbit; for averaged motions twice the standard
+        error of the fundamental, relative. NaN where there is no answer.
+
+    Raises
+    ------
+    ValueError
+        A block with several inputs, with time-dependent laws, or in discrete time.
+    RuntimeError
+        A law raised or returned NaN; carries the exception.
+    """
+    if keywords:
+        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    A, omega = np.atleast_1d(np.asarray(A, float)), np.atleast_1d(np.asarray(omega, float))
+    harmonics = np.full((len(A), len(omega), orders + 1), np.nan + 0j)
+    regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int16)
+    residual = np.full((len(A), len(omega)), np.nan)
+    solver = solver_for(block, output, transient, averages, max_steps)
+    a_order = np.argsort(A)[::-1]  # downwards: large motions are the simple ones
+    w_order = np.argsort(omega)
+    along_a = len(A) > 1
+    solver.forget()
+    for line in w_order if along_a else [0]:
+        row, column = (a_order, np.full(len(A), line)) if along_a else (np.zeros(len(omega), int), w_order)
+        solver.line(A[row], omega[column], harmonics, regime, residual, row, column)
+    return harmonics, regime, residual
+
+
+def _steady(means, sizes) -> bool:
+    """Whether averages over consecutive blocks scatter and do not tend anywhere.
+
+    A slope is believed from four times its standard error: for eight blocks one steady motion in 200 is then
+    followed longer than need be.
+    """
+    at = np.arange(len(means)) - 0.5 * (len(means) - 1)
+    size = np.max(np.abs(means))
+    for values, scale in ((means.real, size), (means.imag, size), (sizes, np.max(sizes))):
+        slope = at @ values / (at @ at)
+        rest = values - values.mean() - slope * at
+        error = np.sqrt(rest @ rest / (len(at) - 2) / (at @ at))
+        if abs(slope) > 4 * error and abs(slope) * len(at) > 1e-6 * scale:
+            return False
+    return True
+
+
+_kept = threading.local()
+
+
+def solver_for(block, output=None, transient=4, averages=64, max_steps=1_000_000) -> OrbitSolver:
+    """Return a solver, the one of the last call in this thread where it is for an equal block."""
+    key = (block, output, transient, averages, max_steps)
+    last = getattr(_kept, "last", None)
+    if last is not None and last[0][1:] == key[1:]:
+        known = last[0][0]
+        if known is block or (isinstance(block, Mechanism) and known == block):
+            return last[1]
+    solver = OrbitSolver(block, output, transient=transient, averages=averages, max_steps=max_steps)
+    _kept.last = (key, solver)
+    return _kept.last[1]
+
+
+class OrbitSolver(OrbitSearch):
+    """Solves points and lines of a family, each started from the one before, and names what it finds."""
+
+    # --- lines and points -----------------------------------------------------------------------------------
+
+    def line(self, A, omega, harmonics, regime, residual, row, column):
+        """Solve consecutive points, compiled as long as they close, one by one where they do not."""
+        orders, n = harmonics.shape[-1] - 1, len(A)
+        self._acquaint(A[n // 2], omega[n // 2], whatever_before=True)
+        line, power = Line(self, A, omega, orders), self.symmetries.power
+        p = 0
+        if self.previous is not None and self.first is not None:  # the line before starts where this one does
+            x, mode, units = self.first
+            self.previous = State(0.0, x / units * A[0] / omega[0] ** power, mode)
+        while p < n:
+            # the point by itself: its start, its regime, its checks
+            harmonics[row[p], column[p]], name, residual[row[p], column[p]] = self.solve(
+                A[p], omega[p], orders
+            )
+            regime[row[p], column[p]] = _CODE[name]
+            if p == 0:
+                self.first = None
+                if self.previous is not None and self.simple and name not in ("stuck", "free"):
+                    self.first = (self.previous.x, self.previous.mode, A[0] / omega[0] ** power)
+            p += 1
+            if p == n or self.previous is None or not self.simple:
+                continue
+            done = line.close(p)
+            some = slice(p, p + done)
+            y = self._coefficients(
+                line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]
+            )
+            finished = self._turned(y, omega[some]) / A[some, None]
+            for q in range(p, p + done):
+                self.kinds, self.still = int(line.kinds[q]), bool(line.still[q])
+                name = self._name(y[q - p], line.ends[q, :, self.row], line.miss[q])
+                if name in ("stuck", "free"):  # these need a second look
+                    done = q - p
+                    break
+                harmonics[row[q], column[q]] = finished[q - p]
+                regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], line.miss[q]
+            if done:
+                p += done
+                self.previous = line.state(p - 1)
+
+    def solve_from(self, state, A: float, omega: float, orders: int):
+        """`solve`, from a state of the caller's, or from rest (None), whatever was solved before."""
+        self.previous = None
+        self._acquaint(A, omega, whatever_before=True)
+        self._given = state
+        try:
+            return self.solve(A, omega, orders)
+        finally:
+            self._given = None
+
+    def solve(self, A: float, omega: float, orders: int):
+        """Return (Y_k/A for k = 0..orders, regime name, residual)."""
+        self._aim(A, omega)
+        if self.linear is not None:
+            self.simple = False
+            y, name, x = self.linear.answer(A, omega, orders)
+            self.previous = None if x is None else State(0.0, x, self.engine._modes.copy())
+            return self._finished(y, name), name, np.nan if np.isnan(y[1]) else 0.0
+        try:
+            y, name, residual = self._answer(orders)
+        except OutOfWork as stop:
+            self.previous, self.simple = None, False
+            return np.full(orders + 1, np.nan + 0j), stop.regime, np.nan
+        return self._finished(y, name), name, residual
+
+    # --- one point --------------------------------------------------------------------------------
+
+    def _answer(self, orders):
+        """Coefficients Y_k, regime and residual at the present aim."""
+        self.mirrored, self.simple = self.symmetric, True
+        state = self._given or self.previous or self._start(self.A)
+        if self._given is not None:
+            self._resize(self.A)
+        state = state.copy()
+        orbit = self._periodic(state, orders=orders) if self.previous is not None else None
+        if orbit is None:
+            orbit = self._periodic(self._follow(state, self.transient), orders=orders)
+        if orbit is None:
+            state = self._follow(state, 27)
+            trail = self._trail(state, 5)
+            orbit = self._periodic(state, orders=orders)
+            if orbit is None and self.symmetric and self._alternates(trail):
+                self.mirrored = False
+                orbit = self._periodic(state, orders=orders)
+                self.mirrored = orbit is None
+            if orbit is None:
+                orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
+        if orbit is None and self.symmetric:
+            self.mirrored = False
+            state = self._follow(self._nudged(state), 40)
+            orbit = self._periodic(state, orders=orders)
+        if self.gap and orbit is not None and not self.kinds & TOUCH and self._given is None:
+            mirrored, within = self.mirrored, orbit[0]
+            touching, state = self._touching(orders)
+            if touching is not None or state is not None:
+                orbit = touching
+            else:
+                self.mirrored, state = mirrored, within
+                orbit = self._periodic(within, orders=orders)
+        if orbit is None:
+            return self._unperiodic(state, orders)
+        self.previous = orbit[0]
+        y = self._coefficients(self.integrals, self.ends, 1, self.mirrored)
+        return y, self._name(y, self.ends, orbit[1]), orbit[1]
+
+    def _unperiodic(self, state, orders):
+        """Look for a longer period; else follow the motion until it is steady, and average."""
+        self.mirrored, self.simple = False, False
+        state = self._follow(state, 40, RTOL)
+        y = self._trail(state, 2 * LONGEST + 1)
+        self._stop_if_running_away(y)
+        found = self._longer_period(state, y, orders)
+        if found is not None:
+            return found
+        orbit = close_far(self, state, orders=orders, patient=self._slow(y))
+        if orbit is None:
+            for periods in _WAITS:
+                means, sizes = self._averages(state, orders)
+                if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
+                    break
+                state = self._follow(state, periods)
+                orbit = self._periodic(state, orders=orders) or close_far(self, state, orders=orders)
+                if orbit is not None:
+                    break
+            else:  # still on its way
+                grows = np.all(np.diff(sizes) > 0) and np.ptp(np.diff(sizes)) < 0.5 * np.mean(np.diff(sizes))
+                raise OutOfWork(Status.DIVERGED if grows else Status.WORK_LIMIT)
+        if orbit is not None:
+            self.previous, self.simple = orbit[0], True
+            y = self._coefficients(self.integrals, self.ends, 1, False)
+            return y, self._name(y, self.ends, orbit[1]), orbit[1]
+        self.previous = state
+        mean = means.mean(axis=0)
+        if self.gap and not self.touched:
+            return mean, "free", 0.0
+        error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
+        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
+
+    def _alternates(self, y):
+        """Whether a motion repeats after two of the shots it is followed by, and not after one."""
+        once, twice = (np.max(np.abs(self._apart(y, k)[-1]), initial=0.0) for k in (1, 2))
+        return bool(twice < _EVEN * once and once > _EVEN)
+
+    def _apart(self, y, shots):
+        """Return changes over so many shots of the coordinates that have to repeat, in their sizes."""
+        s, steps = self.symmetries, y[shots:] - y[:-shots]
+        wrap = np.where(s.wrap > 0, s.wrap, 1.0)
+        steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)
+        return (steps / np.maximum(np.max(np.abs(y), axis=0), 1e-300))[:, s.free]
+
+    def _slow(self, y):
+        """Whether a motion changes little, and steadily, from shot to shot: a transient, not chaos."""
+        steps = np.max(np.abs(self._apart(y, 1)), axis=1, initial=0.0)[-4:]
+        return bool(np.max(steps) < 0.3 and np.max(steps) < 2 * np.min(steps))
+
+    def _longer_period(self, state, y, orders):
+        """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
+        s = self.symmetries
+        size = np.where(self.shot.size > 0, self.shot.size, 1.0)
+        least = 3e-3  # mismatch of the shorter periods: a multiple that closes no better is not tried
+        for periods in range(1, LONGEST + 1):
+            gap = (y[-1] - y[-1 - periods]) / size
+            gap -= np.where(
+                s.wrap > 0, np.round(gap * size / np.where(s.wrap > 0, s.wrap, 1)) * s.wrap / size, 0
+            )
+            apart = np.max(np.abs(gap[s.free]), initial=0.0)
+            if apart < 0.3 * least:
+                least = apart
+                orbit = self._periodic(state, periods, orders)
+                if orbit is not None:
+                    self.previous, self.simple = orbit[0], periods == 1
+                    c = self._coefficients(self.integrals, self.ends, periods, False)
+                    name = f"subharmonic {periods}" if periods > 1 else self._name(c, self.ends, orbit[1])
+                    return c, name, orbit[1]
+        return None
+
+    def _averages(self, state, orders):
+        """Follow the state, in place, over `averages` periods; coefficients and size of every block."""
+        length, parts, sizes, self.touched = self.averages // BLOCKS, [], [], False
+        for _ in range(BLOCKS):
+            mean, size = np.zeros(orders + 1, complex), 0.0
+            for _ in range(length):
+                part = np.zeros((self.row + 1, orders + 1), complex)
+                self.touched |= bool(self._shoot(state, RTOL, 1, part) & TOUCH)
+                ends = self.shot.ends[:, self.row]
+                mean += self._coefficients(part[self.row], ends, 1, False) / length
+                y = np.abs(self.symmetries.transform @ state.x) / self._unit
+                size += np.max(y[self.symmetries.free], initial=0.0) / length
+            parts.append(mean)
+            sizes.append(size)
+        return np.array(parts), np.array(sizes)
+
+    # --- what was found -------------------------------------------------------------------------------
+
+    def _coefficients(self, integrals, ends, periods, mirrored, omega=None):
+        """Fourier coefficients from the integrals of a shot, free of a steady drift and of a free mean.
+
+        The last axis of `integrals` are the harmonics, that of `ends` the start and the end; `omega`, the one
+        aimed at by default, may belong to many shots.
+        """
+        omega = np.asarray(self.omega if omega is None else omega)[..., None]
+        period, k = 2 * np.pi / omega, np.arange(integrals.shape[-1])
+        if mirrored:
+            y = 4 / period * integrals
+            center = ends.mean(axis=-1)
+            # the integral of a constant over half a period is 2 / (j k omega)
+            y[..., 1::2] -= 4 / period * 2 * center[..., None] / (1j * k[1::2] * omega)
+            y[..., 0::2] = 0.0
+            y[..., 0] = center
+        else:
+            y = integrals * 2 / (periods * period)
+            drift = ends[..., 1] - ends[..., 0]
+            y[..., 0] = y[..., 0] / 2 - drift / 2
+            y[..., 1:] -= 1j * drift[..., None] / (np.pi * k[1:] * periods)
+        if self.free_row:
+            y[..., 0] = 0.0
+        return y
+
+    def _turned(self, y, omega=None):
+        """Delays turn the phase of every harmonic."""
+        omega = np.asarray(self.omega if omega is None else omega)[..., None]
+        y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay)
+        y[..., 0] += 0.0 if self.free_row else self.offset
+        return y
+
+    def _finished(self, y, name):
+        return np.full(len(y), np.nan + 0j) if name == "stuck" else self._turned(y) / self.A
+
+    def _name(self, y, ends, miss):
+        """Regime of a motion of one period."""
+        s, kinds = self.symmetries, self.kinds
+        if self.still and not kinds & ~(BIT["corner"] | BIT["switch"]):
+            return "stuck"
+        if self.gap and not kinds & TOUCH:
+            return "free"
+        drift = abs(ends[1] - ends[0]) if not self.mirrored else 0.0
+        if drift > 1e-6 * abs(y[1]) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
+            return "drifting"
+        even = np.max(np.abs(y[2::2]), initial=0.0)
+        if self.symmetric and even > max(1e-7, 1e3 * miss) * abs(y[1]):
+            return "asymmetric"
+        rigid = kinds & (BIT["impact"] | BIT["stop"])
+        if kinds & BIT["stop contact"] or (kinds & BIT["contact"] and not self._elastic()):
+            return "contact"
+        if rigid:
+            return "impact"
+        if kinds & (BIT["stick"] | BIT["breakaway"]):
+            return "stick-slip"
+        return "slip" if kinds & BIT["reversal"] else "smooth"
+
+    def _elastic(self):
+        prog = self.engine.program
+        return any(prog.ints[n[layout.AUX] + layout.A_JOINT] == layout.J_ELASTIC for n in self.mechanisms)

@@ -1,0 +1,270 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""One shot of the event engine: half a period, mirrored afterwards, or whole periods.
+
+A `Shot` holds what stays the same from shot to shot, so that compiled code allocates nothing. Coordinates y
+= T x are those of `ctrl_df.df.forced_orbit.symmetries`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...simulate.compiler.compiled import apart, njit, part
+from ...simulate.compiler.native import call_native, native_address
+from ...simulate.compiler.views import lean
+from ...simulate.engine import harmonic_drive
+from ...simulate.kernel import driver
+from ...simulate.kernel.flow import combine, refresh
+from ...simulate.kernel.modes import settle
+from ...simulate.program import layout as L
+
+_CHATTER_ROOM = 60  # runs go on where the event log is full
+
+
+class Shot(NamedTuple):
+    """Everything a shot needs that stays the same from shot to shot; see `make_shot`."""
+
+    run: int  # addresses of the engine and of `take`
+    take: int
+    prog: L.Program
+    space: driver.Space
+    scale: np.ndarray  # (4, ng) scales of margins
+    clock: np.ndarray
+    before: np.ndarray
+    log_t: np.ndarray
+    log_n: np.ndarray
+    log_k: np.ndarray
+    none: np.ndarray  # no output times
+    none_x: np.ndarray
+    none_y: np.ndarray
+    no_spectrum: np.ndarray
+    modes: np.ndarray  # modes of a fresh state
+    transform: np.ndarray
+    inverse: np.ndarray
+    offset: np.ndarray
+    free: np.ndarray
+    wrap: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    size: np.ndarray  # sizes of the coordinates
+    jacobian: np.ndarray  # (nf, nf), kept from point to point
+    trial: np.ndarray  # rows of scratch, states
+    trial_mode: np.ndarray  # rows of scratch, modes
+    matrix: np.ndarray  # (3, nf, nf) scratch
+    shifts: np.ndarray  # (ns, n) directions of free position
+    ends: np.ndarray  # (2, ny) outputs at the start and at the end of the last shot with a spectrum
+    tally: np.ndarray  # shots, steps, event kinds (bits), Jacobians, reason of the last run, ended stuck
+
+
+def make_shot(engine, symmetries, rows: int) -> Shot:
+    """Allocate the arrays of shots on an engine; harmonics are taken of its first `rows` outputs."""
+    n, nf = engine.nstates, len(symmetries.free)
+    ng = int(engine.program.ints[L.H_NG]) + 1
+    s = symmetries
+    drive, vector, modes = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros(n), engine._modes.copy()
+    none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
+    no_spectrum = np.zeros((rows, 0), complex)
+    log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
+    shot = Shot(
+        driver.address(), 0, engine.program, engine._space, np.zeros((4, ng)), np.zeros(10),
+        np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
+        s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
+        np.full((nf, nf), np.nan), np.zeros((14, max(n, 1))), np.zeros((4, len(modes)), np.int64),
+        np.zeros((3, nf, nf)),
+        np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(6, np.int64),
+    )  # fmt: skip
+    return shot._replace(
+        take=native_address(take, (shot, drive, 1.0, vector, modes, True, 1e-9, 1e-12, 1.0, no_spectrum, 1))
+    )
+
+
+# --- one shot ---------------------------------------------------------------------------------------------
+
+
+@njit(error_model="numpy", nogil=True)
+def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
+    """`take` one shot, from Python."""
+    return call_native(
+        shot.take,
+        (
+            lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
+            budget,
+        ),
+    )  # fmt: skip
+
+
+@njit(error_model="numpy", nogil=True)
+def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget, trail):
+    """`take` one shot after another, as many as `trail` has rows, which receive the coordinates before each.
+
+    A step that another run has left behind is `step` [s] if it is no use here. Returns why the last one ended
+    and how many integration steps all took.
+    """
+    shot, drive, x, mode, trail = lean(shot), lean(drive), lean(x), lean(mode), lean(trail)
+    reason, spent = driver.DONE, 0
+    for k in range(trail.shape[0]):
+        coordinates(shot, x, trail[k])
+        if not 0.0 < shot.clock[2] <= 5.0 * step:
+            shot.clock[2] = step
+        reason = call_native(
+            shot.take,
+            (
+                shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget - spent,
+            ),
+        )  # fmt: skip
+        spent += int(shot.clock[3])
+        if reason != driver.DONE or spent >= budget:
+            break
+    return reason, spent
+
+
+@apart
+def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
+    """Run (x, mode), in place, from t = 0 over `time`, mirrored afterwards if asked; return why it ended.
+
+    With columns in `spectrum` the integrals of the outputs against exp(-j k omega t) are written to it, and
+    the outputs at both ends to ``shot.ends``.
+    """
+    prog, clock = shot.prog, shot.clock
+    work = shot.space.work
+    clock[0] = clock[1] = clock[3] = clock[4] = clock[5] = clock[6] = clock[7] = 0.0
+    clock[8] = -1.0
+    for j in range(x.shape[0]):
+        # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
+        shot.space.size[j] = max(abs(x[j]), 0.1 * shot.space.size[j])
+    settle(prog, drive, 0, 0.0, x, mode, work, shot.space.dx)
+    wanted = spectrum.shape[1] > 0
+    if wanted:
+        for i in range(spectrum.shape[0]):
+            for k in range(spectrum.shape[1]):
+                spectrum[i, k] = 0.0
+        _outputs(shot, drive, 0.0, x, mode, 0)
+    reason = driver.DONE
+    kinds = 0
+    for _ in range(_CHATTER_ROOM):
+        reason = call_native(
+            shot.run,
+            (
+                prog, drive, clock, x, mode, time, shot.none, shot.none_x, shot.none_y, 8, rtol, atol, hmax,
+                True, False, -1, 0.0, -1, max(rtol, 1e-10), budget, shot.log_t, shot.log_n, shot.log_k,
+                shot.before, shot.scale, 0, shot.space, spectrum, drive.omega,
+            ),
+        )  # fmt: skip
+        for i in range(min(int(clock[5]), shot.log_t.shape[0])):
+            kinds |= 1 << shot.log_k[i]
+        if reason != driver.FULL:
+            break
+    shot.tally[0] += 1
+    shot.tally[1] += int(clock[3])
+    shot.tally[2] = kinds
+    shot.tally[4] = reason
+    shot.tally[5] = _stuck(prog, mode)
+    if wanted:
+        _outputs(shot, drive, time, x, mode, 1)
+    if mirrored and reason == driver.DONE:
+        mirror(shot, x, mode)
+    return reason
+
+
+@part
+def _stuck(prog, mode):
+    """1 where every body is held by friction or at a stop."""
+    bodies = 0
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, L.KIND] == L.MECHANISM:
+            for b in range(prog.ints[prog.nodes[n, L.AUX]]):
+                bodies += 1
+                if mode[prog.nodes[n, L.MODE] + b] != L.STUCK:
+                    return 0
+    return 1 if bodies > 0 else 0
+
+
+@part
+def _outputs(shot, drive, t, x, mode, row):
+    prog, w = shot.prog, shot.space.work[0]
+    refresh(prog, drive, 0, t, x, mode, w)
+    for i in range(shot.ends.shape[1]):
+        shot.ends[row, i] = combine(prog, prog.ints[prog.ints[L.H_OUT] + i], w)
+
+
+@part
+def mirror(shot, x, mode):
+    """Mirror the state of an odd system: what follows is the mirror image of what would have followed."""
+    prog = shot.prog
+    for j in range(x.shape[0]):
+        x[j] = shot.offset[j] - x[j]
+    for n in range(prog.nodes.shape[0]):
+        kind, at = prog.nodes[n, L.KIND], prog.nodes[n, L.MODE]
+        if kind == L.MECHANISM:
+            for slot in (L.DIR0, L.DIR1):
+                if abs(mode[at + slot]) == 1:
+                    mode[at + slot] = -mode[at + slot]
+            elastic = prog.ints[prog.nodes[n, L.AUX] + L.A_JOINT] == L.J_ELASTIC
+            if not (elastic and prog.par[prog.nodes[n, L.PAR] + L.P_GAP] == 0.0):
+                mode[at + L.JOINT] = -mode[at + L.JOINT]
+            mode[at + L.WALL] = -mode[at + L.WALL]
+        elif kind == L.PWA:
+            mode[at] = prog.ints[prog.nodes[n, L.AUX]] - 2 - mode[at]
+        elif kind == L.QUANTIZER or kind == L.PLAY or kind == L.RATE:
+            mode[at] = -mode[at]
+
+
+# --- coordinates ------------------------------------------------------------------------------------------
+
+
+@part
+def coordinates(shot, x, y):
+    """Y = T x."""
+    for i in range(x.shape[0]):
+        value = 0.0
+        for j in range(x.shape[0]):
+            value += shot.transform[i, j] * x[j]
+        y[i] = value
+
+
+@njit(error_model="numpy")
+def set_state(shot, y, x, mode):
+    """`place`, from Python."""
+    place(lean(shot), lean(y), lean(x), lean(mode))
+
+
+@part
+def place(shot, y, x, mode):
+    """Set the state at coordinates y (clipped to gaps and stops); contacts survive if untouched."""
+    prog, n = shot.prog, x.shape[0]
+    for i in range(n):
+        y[i] = min(max(y[i], shot.lower[i]), shot.upper[i])
+    for i in range(n):
+        value = 0.0
+        for j in range(n):
+            value += shot.inverse[i, j] * y[j]
+        x[i] = value
+    for k in range(prog.nodes.shape[0]):
+        if prog.nodes[k, L.KIND] != L.MECHANISM:
+            continue
+        at, first = prog.nodes[k, L.MODE], prog.nodes[k, L.X]
+        mode[at + L.DIR0], mode[at + L.DIR1] = shot.modes[at + L.DIR0], shot.modes[at + L.DIR1]
+        if prog.ints[prog.nodes[k, L.AUX] + L.A_JOINT] == L.J_IMPACT and mode[at + L.JOINT] != 0:
+            gap = prog.par[prog.nodes[k, L.PAR] + L.P_GAP]
+            face = gap if mode[at + L.JOINT] > 0 else 0.0
+            # contact survives what rounding leaves of it
+            if abs(y[first + 2] - face) > 1e-9 * gap or abs(y[first + 3]) > 1e-9 * shot.size[first + 3]:
+                mode[at + L.JOINT] = 0
+            else:
+                x[first + 2] = x[first] + face
+                x[first + 3] = x[first + 1]
+    for i in range(n):
+        if x[i] < shot.low[i] or x[i] > shot.high[i]:
+            x[i] = min(max(x[i], shot.low[i]), shot.high[i])
+    for k in range(prog.nodes.shape[0]):
+        if prog.nodes[k, L.KIND] == L.MECHANISM:
+            at, first = prog.nodes[k, L.MODE], prog.nodes[k, L.X]
+            if mode[at + L.WALL] != 0:
+                driven = first + 2 * (prog.ints[prog.nodes[k, L.AUX]] - 1)
+                if (x[driven] != shot.low[driven] and x[driven] != shot.high[driven]) or x[driven + 1] != 0.0:
+                    mode[at + L.WALL] = 0

@@ -1,0 +1,262 @@
+"""What a system's laws leave unchanged, found by asking them: oddness, free positions, free speeds.
+
+A shooting method needs to know which states must repeat (a free mass may be anywhere), whether half a
+period tells the whole one (odd laws), and whether the laws depend on time at all. Lists of known effects
+would not hold for effects that users write; the compiled rates are evaluated at random states instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...blocks.mechanism import Mechanism
+from ...simulate.engine import Engine, constant_drive
+from ...simulate.kernel.look import look
+from ...simulate.program import layout as L
+
+_PROBES = 24
+_TOL = 1e-9
+
+
+@dataclass
+class Symmetries:
+    """Coordinates y = T x of a system, and what is known of each.
+
+    Attributes
+    ----------
+    transform, inverse : (n, n) arrays
+        Two bodies are described by load position, speed of their centre of mass, stretch and relative speed.
+    odd : bool
+        Whether the laws are odd about the mirror ``x -> offset - x``.
+    offset : (n,) array
+        Not zero across a gap: motor and load change faces.
+    free : (m,) int array
+        Coordinates that must repeat after a period.
+    wrap : (n,) array
+        Length over which a coordinate repeats (a ripple over position); 0: none.
+    positions : (n,) bool array
+        States that are positions of a free body, whose mean has no meaning.
+    inertial : (n,) bool array
+        Coordinates whose speed is free as well: nothing ties the mechanism to the ground.
+    lower, upper : (n,) arrays
+        Bounds of the coordinates (the gap).
+    low, high : (n,) arrays
+        Bounds of the states (end stops).
+    power : (n,) int array
+        1 for speeds, 2 for positions of a mechanism, 0 for other states.
+    autonomous : bool
+        False where the rates depend on time itself.
+    shifts : list of (n,) bool arrays
+        The directions of free position, one a mechanism.
+    """
+
+    transform: np.ndarray
+    inverse: np.ndarray
+    odd: bool
+    offset: np.ndarray
+    free: np.ndarray
+    wrap: np.ndarray
+    positions: np.ndarray
+    inertial: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    power: np.ndarray
+    autonomous: bool
+    shifts: list
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """What motion the laws are asked about: laws that matter there must show.
+
+    Attributes
+    ----------
+    states : (n,) array
+        Size of each state.
+    force : float
+        Size of the input.
+    rate : float
+        Typical frequency [rad/s].
+    """
+
+    states: np.ndarray
+    force: float = 1.0
+    rate: float = 1.0
+
+    @classmethod
+    def ones(cls, n: int) -> Sizes:
+        """Return sizes of one in every unit."""
+        return cls(np.ones(n))
+
+    def near(self, other: Sizes, factor: float) -> bool:
+        """Whether all sizes agree within a factor."""
+        ratios = np.append(self.states / other.states, (self.force / other.force, self.rate / other.rate))
+        return bool(ratios.max() <= factor and ratios.min() >= 1 / factor)
+
+
+class Probe:
+    """Rates and margins of an engine at given states and input."""
+
+    def __init__(self, engine: Engine, sizes: Sizes | None = None):
+        self.engine, self.prog = engine, engine.program
+        self.sizes = Sizes.ones(engine.nstates) if sizes is None else sizes
+        self.ng = int(self.prog.ints[L.H_NG])
+        self.rng = np.random.default_rng(20)
+
+    def at(self, x, u, t=0.0, mode=None):
+        """Return rates, margins (sorted within each node) and outputs, modes settled first."""
+        engine, prog = self.engine, self.prog
+        x = x.copy()
+        mode = engine._modes.copy() if mode is None else mode.copy()
+        drive = constant_drive(np.full(engine.ninputs, u))
+        work, dx, g = engine._space.work, np.zeros(len(x)), np.full(self.ng + 1, np.inf)
+        y = np.zeros(engine.noutputs)
+        look(prog, drive, t, x, mode, work, dx, g, y, True, 0.0)
+        for node in prog.nodes:
+            mine = slice(node[L.G], node[L.G] + node[L.NG])
+            # what a quantizer does with its steps shows in the rates, or it does nothing
+            g[mine] = np.inf if node[L.KIND] == L.QUANTIZER else np.sort(g[mine])
+        return dx, g, y
+
+    def states(self):
+        """Random states over several decades, bodies within their gaps, some of them at rest."""
+        n = self.engine.nstates
+        for i in range(_PROBES):
+            x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(-4, 1, size=n) * self.sizes.states
+            u = self.rng.normal() * 10.0 ** self.rng.uniform(-1, 2) * self.sizes.force
+            for node in _mechanisms(self.prog):
+                at, bodies = node[L.X], self.prog.ints[node[L.AUX] + L.A_BODIES]
+                if i % 3 == 0:
+                    x[at + 1 : at + 2 * bodies : 2] = 0.0
+                if bodies == 2:
+                    joint, gap = self.prog.ints[node[L.AUX] + L.A_JOINT], self.prog.par[node[L.PAR] + L.P_GAP]
+                    if joint == L.J_RIGID:
+                        x[at + 2 : at + 4] = x[at : at + 2]
+                    elif gap > 0:
+                        reach = (0.0, 1.0) if joint == L.J_IMPACT else (-1.0, 2.0)
+                        x[at + 2] = x[at] + gap * self.rng.uniform(*reach)
+            yield x, u
+
+
+def _mechanisms(prog):
+    return [node for node in prog.nodes if node[L.KIND] == L.MECHANISM]
+
+
+def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> Symmetries:
+    """Ask the laws of a compiled system for its symmetries; `block` tells wavelengths of ripples."""
+    n, prog, probe = engine.nstates, engine.program, Probe(engine, sizes)
+    transform, power = np.eye(n), np.zeros(n, int)
+    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    low, high, gaps = lower.copy(), upper.copy(), np.zeros(n)
+    free, positions, inertial = np.ones(n, bool), np.zeros(n, bool), np.zeros(n, bool)
+    wrap, shifts = np.zeros(n), []
+    samples = [(x, u, probe.at(x, u)) for x, u in probe.states()]
+    for node in _mechanisms(prog):
+        at, aux, par = node[L.X], node[L.AUX], node[L.PAR]
+        bodies, joint = prog.ints[aux + L.A_BODIES], prog.ints[aux + L.A_JOINT]
+        places = np.arange(at, at + 2 * bodies, 2)
+        power[places], power[places + 1] = 2, 1
+        if bodies == 2:
+            m0, m1 = prog.par[par + L.P_M0], prog.par[par + L.P_M0 + 1]
+            transform[at + 1, [at + 1, at + 3]] = m0 / (m0 + m1), m1 / (m0 + m1)
+            transform[at + 2, at] = transform[at + 3, at + 1] = -1.0
+            if joint == L.J_RIGID:
+                free[at + 2 : at + 4] = False
+            gaps[at] = -prog.par[par + L.P_GAP]
+            if joint == L.J_IMPACT:
+                lower[at + 2], upper[at + 2] = 0.0, prog.par[par + L.P_GAP]
+        stopped = prog.ints[aux + L.A_STOP] == 1
+        if stopped:
+            low[places[-1]], high[places[-1]] = prog.par[par + L.P_LOW], prog.par[par + L.P_HIGH]
+        direction = np.zeros(n, bool)
+        direction[places] = True
+        if not stopped and _unmoved(
+            probe, samples, direction, probe.rng.normal() * 1.7 * probe.sizes.states[at]
+        ):
+            free[at] = False
+            positions[places] = True
+            shifts.append(direction)
+            speeds = np.zeros(n, bool)
+            speeds[places + 1] = True
+            if _unmoved(probe, samples, speeds, 0.37 * probe.sizes.states[at + 1], direction):
+                free[at + 1] = False
+                inertial[at + 1] = True
+        elif not stopped:
+            for length in _wavelengths(block):
+                if _unmoved(probe, samples, direction, length, tol=1e-6):
+                    wrap[at] = length
+    mine = np.zeros(n, bool)
+    for node in _mechanisms(prog):
+        mine[node[L.X] : node[L.X] + 2 * prog.ints[node[L.AUX] + L.A_BODIES]] = True
+    for i in np.flatnonzero(~mine):
+        direction = np.arange(n) == i
+        if _unmoved(probe, samples, direction, 0.83 * probe.sizes.states[i]):
+            free[i] = False
+            positions[i] = True
+            shifts.append(direction)
+    offset, odd = np.zeros(n), False
+    for trial in (gaps, _on_motor(gaps)) if np.any(gaps) else (gaps,):
+        if _is_odd(probe, samples, trial):
+            offset, odd = trial, True
+            break
+    return Symmetries(
+        transform, np.linalg.inv(transform), odd, offset, np.flatnonzero(free), wrap, positions, inertial,
+        lower, upper, low, high, power, _autonomous(probe, samples), shifts,
+    )  # fmt: skip
+
+
+def _unmoved(probe, samples, direction, shift, rate=None, tol=_TOL):
+    """Whether a shift of some states changes no margin and no rate (but `rate`, which shifts along)."""
+    for x, u, (dx, g, _) in samples:
+        other, other_g, _ = probe.at(x + shift * direction, u)
+        expected = dx if rate is None else dx + shift * rate
+        if not (_close(other, expected, tol) and _close(other_g, g, tol)):
+            return False
+    return True
+
+
+def _is_odd(probe, samples, offset):
+    compared = 0
+    for x, u, (dx, g, y) in samples:
+        if not np.all(np.isfinite(dx)):
+            continue
+        other, other_g, other_y = probe.at(offset - x, -u)
+        center = probe.at(offset / 2, 0.0)[2] if np.any(offset) else 0.0
+        if not (_close(other, -dx) and _close(other_g, g)):
+            return False
+        if not np.any(offset) and not _close(other_y - 2 * center, -y):
+            return False
+        compared += 1
+    return compared > 0
+
+
+def _on_motor(gaps):
+    """Return the mirror about the load instead of the motor."""
+    offset = np.zeros_like(gaps)
+    at = np.flatnonzero(gaps)
+    offset[at + 2] = -gaps[at]
+    return offset
+
+
+def _autonomous(probe, samples):
+    for x, u, (dx, _, _) in samples[: _PROBES // 2]:
+        if not _close(probe.at(x, u, t=probe.rng.uniform(1, 100) / probe.sizes.rate)[0], dx):
+            return False
+    return True
+
+
+def _close(a, b, tol=_TOL):
+    """Whether two vectors agree, entry by entry: their units differ."""
+    finite = np.isfinite(b)
+    if not np.array_equal(finite, np.isfinite(a)):
+        return False
+    return bool(np.all(np.abs(a[finite] - b[finite]) <= tol * np.abs(b[finite])))
+
+
+def _wavelengths(block):
+    effects = getattr(block, "effects", ()) if isinstance(block, Mechanism) else ()
+    return sorted({e.wavelength for e in effects if hasattr(e, "wavelength")}, reverse=True)

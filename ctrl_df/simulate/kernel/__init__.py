@@ -1,0 +1,1 @@
+"""The compiled engine: flow of a mode, steps, events, outputs."""

@@ -1,0 +1,250 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""Mechanisms at an event: which way bodies start or stay, and what an impact leaves."""
+
+from __future__ import annotations
+
+from ..compiler.compiled import part
+from ..program.layout import (
+    A_BODIES,
+    A_BRISTLE,
+    A_JOINT,
+    A_NFRIC0,
+    AUX,
+    DIR0,
+    DIR1,
+    E_CONTACT,
+    E_IMPACT,
+    E_STOP,
+    E_STOP_CONTACT,
+    FREE,
+    J_ELASTIC,
+    J_IMPACT,
+    J_RIGID,
+    JOINT,
+    MODE,
+    P_GAP,
+    P_HIGH,
+    P_LOW,
+    P_M0,
+    P_REST,
+    P_STOP_REST,
+    PAR,
+    STUCK,
+    WALL,
+    X,
+)
+from .flow import node_input, refresh
+from .mechanics import accelerate, closed, dry_level, smooth_forces
+
+
+@part
+def has_dry(prog, node, body):
+    """Whether set-valued dry friction acts on a body."""
+    ao = prog.nodes[node, AUX]
+    if prog.ints[ao + A_NFRIC0 + body] == 0:
+        return False
+    return not (prog.ints[ao + A_BRISTLE] >= 0 and body == prog.ints[ao + A_BODIES] - 1)
+
+
+@part
+def tendency(f, up, down, wall):
+    """Direction in which a body at rest starts under the force f, or 0 (held by friction or wall)."""
+    if f > up and wall != 1:
+        return 1
+    if f < -down and wall != -1:
+        return -1
+    return 0
+
+
+@part
+def body_tendency(prog, node, body, f, wall):
+    """Tendency of one body by itself."""
+    up = dry_level(prog, node, body, 0.0, 1.0, 0.0)
+    down = dry_level(prog, node, body, 0.0, -1.0, 0.0)
+    return tendency(f, up, down, wall)
+
+
+@part
+def _direction(prog, node, body, d):
+    return d if has_dry(prog, node, body) else FREE
+
+
+@part
+def resolve(prog, node, t, x, mode, force, f, dx):
+    """Bring a mechanism's modes in line with its velocities and forces; returns whether any changed."""
+    nodes, aux = prog.nodes, prog.ints
+    xo, mo = nodes[node, X], nodes[node, MODE]
+    bodies = aux[nodes[node, AUX] + A_BODIES]
+    driven = bodies - 1
+    joint = aux[nodes[node, AUX] + A_JOINT]
+    old0, old1, old_joint, old_wall = mode[mo], mode[mo + 1], mode[mo + JOINT], mode[mo + WALL]
+    if joint == J_ELASTIC:
+        _elastic_region(prog, node, x, mode)
+    smooth_forces(prog, node, t, x, mode, force, f, dx)
+    if bodies == 2 and closed(prog, node, mode):
+        _resolve_joined(prog, node, x, mode, f)
+    else:
+        for b in range(bodies):
+            v = x[xo + 2 * b + 1]
+            wall = mode[mo + WALL] if b == driven else 0
+            if v != 0.0:
+                mode[mo + b] = _direction(prog, node, b, 1 if v > 0 else -1)
+                if b == driven:
+                    mode[mo + WALL] = 0
+            elif wall == 0 and not has_dry(prog, node, b):
+                mode[mo + b] = FREE
+            else:
+                d = body_tendency(prog, node, b, f[b], wall)
+                mode[mo + b] = STUCK if d == 0 else _direction(prog, node, b, d)
+                if b == driven and d != 0:
+                    mode[mo + WALL] = 0
+    return (
+        old0 != mode[mo]
+        or old1 != mode[mo + 1]
+        or old_joint != mode[mo + JOINT]
+        or old_wall != mode[mo + WALL]
+    )
+
+
+@part
+def _elastic_region(prog, node, x, mode):
+    """Region of an elastic joint: in the gap, or on one of its faces."""
+    xo, gap = prog.nodes[node, X], prog.par[prog.nodes[node, PAR] + P_GAP]
+    at = prog.nodes[node, MODE] + JOINT
+    delta = x[xo + 2] - x[xo]
+    if gap == 0.0:
+        mode[at] = 1
+    elif delta > gap:
+        mode[at] = 1
+    elif delta < 0.0:
+        mode[at] = -1
+    elif 0.0 < delta < gap:
+        mode[at] = 0
+
+
+@part
+def _resolve_joined(prog, node, x, mode, f):
+    """Two bodies in contact: move together, stay stuck, or separate."""
+    par = prog.par
+    xo, po, mo = prog.nodes[node, X], prog.nodes[node, PAR], prog.nodes[node, MODE]
+    impact = prog.ints[prog.nodes[node, AUX] + A_JOINT] == J_IMPACT
+    side, wall = mode[mo + JOINT], mode[mo + WALL]
+    m0, m1 = par[po + P_M0], par[po + P_M0 + 1]
+    v = x[xo + 3]
+    dry = has_dry(prog, node, 0) or has_dry(prog, node, 1)
+    if v != 0.0 or (not dry and wall == 0):
+        d = 1 if v > 0 else -1
+        if v != 0.0:
+            mode[mo + WALL] = 0
+        mode[mo + DIR0] = _direction(prog, node, 0, d)
+        mode[mo + DIR1] = _direction(prog, node, 1, d)
+        if impact:
+            f0 = f[0] - d * dry_level(prog, node, 0, 1.0, float(d), abs(v))
+            f1 = f[1] - d * dry_level(prog, node, 1, 1.0, float(d), abs(v))
+            if side * (m0 * (f0 + f1) / (m0 + m1) - f0) < 0.0:
+                mode[mo + JOINT] = 0
+        return
+    d0 = body_tendency(prog, node, 0, f[0], 0)
+    d1 = body_tendency(prog, node, 1, f[1], wall)
+    if impact:
+        a0 = 0.0 if d0 == 0 else (f[0] - d0 * dry_level(prog, node, 0, 1.0, float(d0), 0.0)) / m0
+        a1 = 0.0 if d1 == 0 else (f[1] - d1 * dry_level(prog, node, 1, 1.0, float(d1), 0.0)) / m1
+        if side * (a1 - a0) < 0.0:
+            mode[mo + JOINT] = 0
+            mode[mo + DIR0] = _separate(prog, node, 0, d0, 0)
+            mode[mo + DIR1] = _separate(prog, node, 1, d1, wall)
+            if d1 != 0:
+                mode[mo + WALL] = 0
+            return
+    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0) + dry_level(prog, node, 1, 0.0, 1.0, 0.0)
+    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0) + dry_level(prog, node, 1, 0.0, -1.0, 0.0)
+    d = tendency(f[0] + f[1], up, down, wall)
+    if d == 0:
+        mode[mo + DIR0] = mode[mo + DIR1] = STUCK
+    else:
+        mode[mo + WALL] = 0
+        mode[mo + DIR0] = _direction(prog, node, 0, d)
+        mode[mo + DIR1] = _direction(prog, node, 1, d)
+
+
+@part
+def _separate(prog, node, body, d, wall):
+    if d == 0:
+        return STUCK if wall != 0 or has_dry(prog, node, body) else FREE
+    return _direction(prog, node, body, d)
+
+
+@part
+def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
+    """Newton's impact in the joint; the end of chatter becomes sustained contact.
+
+    Chatter: with restitution e < 1 and a steady pressing acceleration p the flights shrink geometrically and
+    end after 2 w / (p (1 - e)), w the rebound speed. Once a flight is lower than `height` of the gap (or of
+    the position's own size) the rest of the chatter is passed over at once, momentum kept: an error of
+    position of that order.
+    """
+    w, f, trial = work
+    nodes, par = prog.nodes, prog.par
+    mo, po, xo = nodes[node, MODE], nodes[node, PAR], nodes[node, X]
+    m0, m1, gap = par[po + P_M0], par[po + P_M0 + 1], par[po + P_GAP]
+    v0, v1 = x[xo + 1], x[xo + 3]
+    common = (m0 * v0 + m1 * v1) / (m0 + m1)
+    rebound = -par[po + P_REST] * (v1 - v0)
+    if side * (v1 - v0) < 0.0:
+        rebound = v1 - v0  # already parting: the margin was crossed by rounding alone
+    x[xo + 1] = common - m1 / (m0 + m1) * rebound
+    x[xo + 3] = common + m0 / (m0 + m1) * rebound
+    x[xo + 2] = x[xo] + (gap if side > 0 else 0.0)
+    mode[mo + JOINT] = 0
+    refresh(prog, drive, segment, t, x, mode, w)
+    force = node_input(prog, node, 0, w)
+    resolve(prog, node, t, x, mode, force, f, trial)
+    accelerate(prog, node, t, x, mode, force, f, dx, g)
+    press = side * (dx[xo + 3] - dx[xo + 1])
+    speed = abs(rebound)
+    # positions are known relative to their size only: a flight below that resolution is none
+    lowest = height * (gap + 4.0 * abs(x[xo]))
+    if press > 0.0 and speed * speed < 2.0 * press * lowest:
+        x[xo + 1] = x[xo + 3] = common
+        mode[mo + JOINT] = side
+        refresh(prog, drive, segment, t, x, mode, w)
+        resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
+        return E_CONTACT if mode[mo + JOINT] != 0 else E_IMPACT
+    return E_IMPACT
+
+
+@part
+def stop(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
+    """Newton's impact on an end stop; the end of chatter becomes rest at the stop."""
+    w, f, trial = work
+    nodes, par, aux = prog.nodes, prog.par, prog.ints
+    mo, po, xo = nodes[node, MODE], nodes[node, PAR], nodes[node, X]
+    driven = aux[nodes[node, AUX] + A_BODIES] - 1
+    at, low, high = xo + 2 * driven, par[po + P_LOW], par[po + P_HIGH]
+    rigid = aux[nodes[node, AUX] + A_JOINT] == J_RIGID
+    joined = driven == 1 and closed(prog, node, mode)
+    v = x[at + 1]
+    rebound = -par[po + P_STOP_REST] * v if side * v > 0.0 else v
+    x[at] = high if side > 0 else low
+    x[at + 1] = rebound
+    if rigid:
+        x[xo] = x[at]
+        x[xo + 1] = rebound
+    elif joined:
+        # the load flies on, or is hit at once when it stands between motor and stop
+        mode[mo + JOINT] = 0 if rebound != v else mode[mo + JOINT]
+    refresh(prog, drive, segment, t, x, mode, w)
+    force = node_input(prog, node, 0, w)
+    resolve(prog, node, t, x, mode, force, f, trial)
+    accelerate(prog, node, t, x, mode, force, f, dx, g)
+    press, speed = side * dx[at + 1], abs(rebound)
+    if speed == 0.0 or (press > 0.0 and speed * speed < 2.0 * press * height * (high - low + abs(x[at]))):
+        x[at + 1] = 0.0
+        if rigid:
+            x[xo + 1] = 0.0
+        mode[mo + WALL] = side
+        refresh(prog, drive, segment, t, x, mode, w)
+        resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
+        return E_STOP_CONTACT
+    return E_STOP

@@ -1,0 +1,568 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""The event-driven run: adaptive steps within a mode, events located as roots of their margins."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.compiled import apart, njit, part
+from ..compiler.native import call_native, native_address
+from ..compiler.views import lean
+from ..program.layout import (
+    CURVED,
+    F_ASKED,
+    F_SIZE,
+    H_AFFINE,
+    H_BUMP,
+    H_DELAYS,
+    H_HISTORY,
+    H_NG,
+    H_NX,
+    H_NY,
+    H_TRACK,
+    NG,
+    STRAIGHT,
+    Y_SIZE,
+    Drive,
+    G,
+    Program,
+)
+from . import history
+from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
+from .exponential import Bend, bend_memory, forget
+from .flow import rates
+from .glide import Glide, glide, glide_memory
+from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
+from .modes import event, settle, track
+from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
+from .stepper import grains, inside, prepare, prepare8, roughness, step
+
+DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
+"""Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
+sliding, step below the resolution of time, more steps within a delay than its history holds."""
+
+PATIENCE = 40  # steps before a lower order that failed is tried again
+DENSE = 1e-3  # error of a step, times its tolerance, below which a lower order is tried
+SAME = 1e-15  # relative difference of two instants that only rounding parts
+WAIT = 3  # steps at most until constant propagators are tried again
+GRAINS = 200  # steps after which rounding is asked anew
+REACH = 1e-4  # of a step: the time over which rates of inputs are taken
+SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
+
+
+class Space(NamedTuple):
+    """Scratch arrays of a run; see `workspace`."""
+
+    work: tuple  # signals, inputs and the history of delays; forces; a state
+    k: np.ndarray  # rates of the stages of a step
+    poly: np.ndarray  # interpolant
+    x1: np.ndarray  # states
+    xi: np.ndarray
+    dx: np.ndarray
+    size: np.ndarray  # running size of each state
+    grain: np.ndarray  # see `grains`
+    g: np.ndarray  # margins
+    g0: np.ndarray
+    gtol: np.ndarray
+    lowest: np.ndarray
+    norm: np.ndarray
+    owner: np.ndarray  # node of each margin
+    memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
+    store: Memory
+    tracks: Glide
+    bend: Bend
+
+
+def workspace(prog, delays: bool = False):
+    """Scratch arrays of a run, made once: compiled code that counts no references needs memory from outside.
+
+    With `delays` the work vector also holds the history of pure delays, part of the state of the program. Who
+    moves states about without it cannot treat such a program.
+    """
+    n, ng = int(prog.ints[H_NX]), int(prog.ints[H_NG])
+    past = int(prog.ints[H_DELAYS]) * Y_SIZE
+    if past and not delays:
+        raise ValueError(
+            "exact orbits need a state of finitely many numbers; this system has a pure delay inside, whose "
+            "state is a whole history. Find its motion by simulation (event_response), or put a lag of the "
+            "same time (input_lag) in its place."
+        )
+    work = (np.zeros(int(prog.ints[H_HISTORY]) + past), np.zeros(F_SIZE), np.zeros(max(n, 4) + 2))
+    work[1][F_ASKED] = STRAIGHT | CURVED
+    owner = np.zeros(ng + 1, np.int64)
+    for node in range(prog.nodes.shape[0]):
+        owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
+    vectors = [np.zeros(n) for _ in range(5)] + [np.zeros(ng + 1) for _ in range(5)]
+    store = memory(prog)
+    tracks = glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY]))
+    return Space(
+        work,
+        np.zeros((16, n)),
+        np.zeros((20, n)),
+        *vectors,
+        owner,
+        np.zeros(3),
+        store,
+        tracks,
+        bend_memory(store),
+    )
+
+
+@part(inline=True)
+def copy(source, target):
+    """Copy a vector in place."""
+    for i in range(source.shape[0]):
+        target[i] = source[i]
+
+
+@functools.cache
+def address() -> int:
+    """Return the address of `advance`, compiled now if need be."""
+    none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
+    prog = Program(np.zeros((0, 13), np.int64), np.zeros(H_HISTORY + 1, np.int64), none)
+    drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
+    arguments = (
+        prog, drive, none, none, counts, 0.0, none, rows, rows, 8, 0.0, 0.0, 0.0, True, True, -1, 0.0, 1, 0.0,
+        0, none, counts, counts, none, rows, 0, workspace(prog), np.zeros((0, 0), complex), 0.0,
+    )  # fmt: skip
+    return native_address(advance, arguments)
+
+
+@njit(error_model="numpy")
+def run(
+    engine, prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate,
+    stop_at_event, watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale,
+    fresh, space, spectrum, omega,
+):  # fmt: skip
+    """Run from clock[0] to t_end: `advance`, at its address `engine`, on views of the arrays."""
+    return call_native(engine, (
+        lean(prog), lean(drive), lean(clock), lean(x), lean(mode), t_end, lean(tout), lean(xout), lean(yout),
+        order, rtol, atol, hmax, locate, stop_at_event, watch, watch_level, watch_sign, height, max_steps,
+        lean(log_t), lean(log_n), lean(log_k), lean(before), lean(scale), fresh, lean(space), lean(spectrum),
+        omega,
+    ))  # fmt: skip
+
+
+@apart
+def advance(
+    prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate, stop_at_event,
+    watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale, fresh, space,
+    spectrum, omega,
+):  # fmt: skip
+    """Run from clock[0] to t_end; see `ctrl_df.simulate.engine.Engine.run` for the arguments.
+
+    ``clock``: [time, next output index, last step size, steps used, events so far, events in this log,
+    segment, on section, margin of the last event, steps by constant propagators].
+    ``before``: state just before the event that stopped the run. ``scale`` (4, ng): see `renewed`.
+    ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
+    ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
+    added; no columns, no integrals. Returns the reason (module constants).
+    """
+    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks, bend = (
+        space
+    )
+    n, ng = x.shape[0], scale.shape[1]
+    t, index, h = clock[0], int(clock[1]), clock[2]
+    segment = int(clock[6])
+    shortest = SHORTEST * (t_end - t)
+    nt, nh = drive.time.shape[0], drive.harmonics.shape[1]
+    held = nt > 0 and drive.linear == 0
+    has_tracked, bumpy, delays = prog.ints[H_TRACK] == 1, prog.ints[H_BUMP] == 1, prog.ints[H_DELAYS] > 0
+    affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
+    curved = prog.ints[H_AFFINE] == 2 and drive.address == 0
+    gliding = (
+        (affine or curved)
+        and locate
+        and watch < 0
+        and nh <= 1
+        and tout.shape[0] + nt > 2
+        and spectrum.shape[1] == 0
+    )
+    if affine and nh > 1 and drive.omega > 0.0:
+        # the series of the forcing has to converge as well
+        hmax = min(hmax, 2.5 / ((nh - 1) * drive.omega))
+    if spectrum.shape[1] > 0 and omega > 0.0:
+        # ten nodes integrate a wave over so many radians of it
+        hmax = min(hmax, (6.0 if affine else 10.0) / (spectrum.shape[1] * omega))
+    steps = events_here = 0
+    # a run that goes on after a full event log goes on counting events without progress
+    zero_events = int(memo[0]) if memo[2] == 1.0 else 0
+    last_event_t = memo[1] if memo[2] == 1.0 else t
+    armed = False  # the run has been before the section: beyond it is a passage, at an event too
+    known = False  # k[0] holds the rates at (t, x)
+    jumped = False  # something outside the states jumped just now: modes may be out of line
+    generation = 1.0  # of the record that a delay opens next
+    patience = slot = skip = wait = 0
+    level = order  # of steps that samples cut short
+    stale = 0  # steps until rounding is asked anew
+    blocked = ng - 1 if clock[7] > 0.5 else -1
+    reason = DONE
+    for i in range(ng):
+        g[i] = math.inf  # the section's margin must not outlive the run that watched it
+    if fresh == 1:
+        forget(store, bend)
+        for j in range(n):
+            size[j] = abs(x[j])
+        if delays:
+            start_delays(prog, drive, segment, t, x, mode, work)
+        tick(prog, drive, segment, t, x, mode, work, dx)
+        if not settle(prog, drive, segment, t, x, mode, work, dx):
+            reason = CHATTER
+        if delays:
+            start_delays(prog, drive, segment, t, x, mode, work)
+    renewed(prog, mode, scale, -1)
+    next_tick = next_sample(prog, t)
+    while reason == DONE:
+        while index < tout.shape[0] and tout[index] <= t + SAME * abs(t):
+            if jumped:
+                settle(prog, drive, segment, t, x, mode, work, dx)
+            for j in range(n):
+                xout[index, j] = x[j]
+            record(prog, drive, segment, t, x, mode, work, yout[index])
+            index += 1
+        if t >= t_end:
+            break
+        if steps >= max_steps:
+            reason = STEPS
+            break
+        # --- the next instant at which the inputs may jump or kink
+        limit = t_end
+        while segment + 1 < nt and drive.time[segment + 1] <= t:
+            segment += 1
+            generation = 1.0
+            jumped = jumped or held
+        if segment + 1 < nt:
+            limit = min(limit, drive.time[segment + 1])
+        limit = min(limit, next_tick)
+        if delays:
+            limit, arrived = history.advance(prog, t, h if h > 0.0 else math.inf, limit, work[0])
+            if arrived > 0.0:
+                jumped = True
+                generation = arrived if generation == 0.0 else min(generation, arrived)
+        # --- rates and margins here
+        if jumped and (has_tracked or not locate):
+            settle(prog, drive, segment, t, x, mode, work, dx)
+            jumped = False
+        if affine or gliding:
+            slot = recall(prog, store, mode, work, x1, xi, dx, g)
+            if gliding and skip > 0:
+                skip -= 1
+            elif gliding:
+                begun = t
+                if affine:
+                    gone, t, segment, index, next_tick, ticked = glide(
+                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, None,
+                    )  # fmt: skip
+                else:
+                    gone, t, segment, index, next_tick, ticked = glide(
+                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, bend,
+                    )  # fmt: skip
+                if gone > 0:
+                    clock[9] += gone
+                    skip = wait = 0
+                    if affine:
+                        h = max(h, t - begun)
+                    known, jumped = False, ticked or held
+                    continue
+                if curved:
+                    skip = wait = min(2 * wait + 1, WAIT)
+        if jumped or not known:
+            rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
+            if locate and (has_tracked or watch >= 0):
+                reach = REACH * (h if h > 0.0 else _first_step(x, k[0], limit - t, hmax))
+                complete(
+                    prog, drive, segment, t, x, mode, work, k[0], g0, reach, watch, watch_level, watch_sign
+                )
+            else:
+                g0[ng - 1] = math.inf
+            known = True
+        theta, at = 1.0, -1
+        if locate:
+            for i in range(ng):
+                if g0[i] < math.inf:
+                    scale[NOW, i] = max(scale[NOW, i], abs(g0[i]))
+            tolerances(prog, x, mode, scale, gtol)
+            armed = armed or (blocked != ng - 1 and gtol[ng - 1] < g0[ng - 1] < math.inf)
+            # margins already crossed at the start (simultaneous events)
+            value, at = worst(g0, gtol, scale[NOW], blocked)
+            if value < 0.0 and jumped:
+                jumped = known = False
+                settle(prog, drive, segment, t, x, mode, work, dx)
+                continue
+            jumped = False
+            if at >= 0 and value < 0.0:
+                if at == ng - 1 and not armed:
+                    blocked = at  # begun beyond the section
+                    continue
+                theta = 0.0
+            else:
+                at = -1
+        length = 0.0
+        if theta > 0.0:
+            # --- a step
+            steps += 1
+            room = limit - t
+            length = min(h, hmax)
+            if affine and h <= 0.0:
+                length = min(room, hmax)
+            elif h <= 0.0:
+                length = h = _first_step(x, k[0], room, hmax)
+            if bumpy:
+                for j in range(n):
+                    x1[j] = x[j] + length * k[0, j]
+                length *= bump_share(prog, x, x1)
+            truncated = t + length >= limit - 1e-12 * max(abs(limit), length)
+            if truncated:
+                length = room
+            prepared = False
+            terms = rank = 0
+            if affine:
+                least = forced(prog, drive, segment, t, length, rtol, store)
+                terms, share = series(store, slot, length, least, k[0], size, rtol, atol, poly)
+                if not share > 0.0:
+                    reason = NAN
+                    break
+                if share < 1.0:
+                    shrink(store, share, terms, poly)
+                    length *= share
+                    truncated = False
+                inside(terms, 1.0, x, poly, x1)
+                prepared = True
+                # a step costs the same however long: only an event cuts the next one short
+                h_next = max(h, 5.0 * length)
+            else:
+                for i in range(ng):
+                    lowest[i] = g0[i]
+                if stale == 0:
+                    grains(prog, drive, segment, t, x, mode, work, k[0], size, x1, dx, g, grain)
+                    stale = GRAINS
+                stale -= 1
+                # samples much denser than the motion: a cheaper pair does
+                rank = level if nt > 0 and not delays and truncated and h >= 2.0 * length else order
+                error = step(
+                    rank,
+                    prog,
+                    drive,
+                    segment,
+                    t,
+                    length,
+                    x,
+                    mode,
+                    work,
+                    k,
+                    g,
+                    lowest,
+                    x1,
+                    size,
+                    grain,
+                    rtol,
+                    atol,
+                    locate,
+                )
+                # many short steps may not err more than the one long step they stand for
+                share = min(length / h, 1.0) if rank < order else 1.0
+                if not error <= share and rank < order:
+                    level = 8 if rank == 5 else min(order, 5)
+                    patience = PATIENCE
+                    continue
+                patience = max(patience - 1, 0)
+                if truncated and rank == level and patience == 0 and error < DENSE * length / h:
+                    level = 5 if level == 8 else 3
+                if not error < math.inf:
+                    h = 0.2 * length
+                    if not h >= 0.1 * max(1e-12 * abs(t), shortest):
+                        reason = NAN
+                    continue
+                if error > 1.0:
+                    h = length * max(0.2, 0.9 * error ** (-1.0 / order))
+                    if t + h == t:
+                        reason = TINY
+                    continue
+                if bumpy:
+                    share = bump_share(prog, x, x1)
+                    if share < 0.7:
+                        h = 0.9 * share * length
+                        continue
+                h_next = h
+                if rank == order:
+                    grow = 5.0
+                    if error > (1e-6 if order == 8 else 1e-4):
+                        grow = min(5.0, 0.9 * error ** (-1.0 / order))
+                    h_next = length * max(grow, 0.3)
+                    if truncated:
+                        h_next = max(h_next, h)
+            # --- events
+            suspect = False
+            if locate:
+                for i in range(ng):
+                    norm[i] = scale[NOW, i]
+                if affine and watch < 0:
+                    theta, at = crossing(
+                        prog, store, slot, mode, work, length, terms, poly, g0, gtol, norm, g
+                    )
+                else:
+                    if affine or watch >= 0 or has_tracked:
+                        margins(
+                            prog, drive, segment, t + length, x1, mode, work, dx, g, REACH * length, watch,
+                            watch_level, watch_sign,
+                        )  # fmt: skip
+                        suspect = True
+                    for i in range(ng):
+                        if abs(g[i]) < math.inf:
+                            norm[i] = max(scale[NOW, i], abs(g[i]))
+                        if i != blocked and (
+                            g[i] + gtol[i] < 0.0 or (rank == 8 and lowest[i] + gtol[i] < 0.0)
+                        ):
+                            suspect = True
+                    suspect = suspect or may_touch(prog, x, x1, mode, length)
+            inner = index < tout.shape[0] and tout[index] < t + length
+            if not prepared and (suspect or spectrum.shape[1] > 0 or inner or delays):
+                if rank == 8:
+                    prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
+                    rough = roughness(size, grain, length, rtol, atol, poly)
+                    if rough > 1.0:
+                        h = length * max(0.3, 0.9 * rough ** (-0.125))
+                        continue
+                else:
+                    terms = prepare(rank, length, k, poly)
+            if suspect:
+                theta, at = locate_event(
+                    prog, drive, segment, t, length, x, mode, work, terms, poly, xi, dx, g, gtol, norm,
+                    blocked, watch, watch_level, watch_sign,
+                )  # fmt: skip
+            if blocked >= 0 and locate and g[blocked] > gtol[blocked]:
+                blocked = -1
+            reached = t + theta * length if theta < 1.0 else (limit if truncated else t + length)
+            # --- outputs inside the step
+            while index < tout.shape[0] and tout[index] < reached - SAME * abs(reached):
+                record_inside(
+                    prog, drive, segment, t, (tout[index] - t) / length, length, x, mode, work, terms, poly,
+                    xout[index], yout[index],
+                )  # fmt: skip
+                index += 1
+            if spectrum.shape[1] > 0:
+                accumulate(
+                    prog, drive, segment, t, length, min(theta, 1.0), x, mode, work, terms, poly, xi,
+                    spectrum, omega
+                )  # fmt: skip
+            if delays and not remember(
+                prog, drive, segment, t, length, min(theta, 1.0), generation, x, mode, work, terms, poly, xi
+            ):
+                reason = HISTORY
+                break
+            generation = 0.0
+            if theta < 1.0:
+                inside(terms, theta, x, poly, x1)
+            t = reached
+            copy(x1, x)
+            for j in range(n):
+                # a size that forgets slowly: tolerances do not tighten as a state swings through zero
+                size[j] = max(abs(x[j]), 0.98 * size[j])
+            h = h_next
+            if at < 0:
+                known = False
+                if not affine:
+                    if locate:
+                        copy(g, g0)
+                    copy(k[12 if rank == 8 else (6 if rank == 5 else 3)], k[0])
+                    known = theta == 1.0
+                if has_tracked:
+                    track(prog, drive, segment, t, x, mode, work)
+                if t == next_tick:
+                    tick(prog, drive, segment, t, x, mode, work, dx)
+                    next_tick = next_sample(prog, t)
+                    jumped, generation = True, 1.0
+                continue
+        reach = REACH * h
+        if theta < 1.0 and theta * length > 0.0:
+            # a step that ran far beyond its event says little of what follows
+            h = max(min(h, 3.0 * theta * length), 1e-14 * abs(t))
+        # --- an event at (t, x)
+        known = False
+        if at == ng - 1:
+            blocked = at
+            if log_t.shape[0] > 0:
+                reason = SECTION
+            copy(x, before)
+            continue
+        if has_tracked:
+            track(prog, drive, segment, t, x, mode, work)
+            margins(prog, drive, segment, t, x, mode, work, dx, g, reach, -1, 0.0, 1)
+        copy(x, before)
+        node = owner[at]
+        modes = _signature(mode)
+        slot_at = at - prog.nodes[node, G]
+        kind = event(prog, drive, segment, t, x, mode, work, dx, g, node, slot_at, height, reach)
+        stale = 0
+        generation = 1.0
+        settled = settle(prog, drive, segment, t, x, mode, work, dx)
+        if not settled:
+            zero_events += 100
+        if settled and _signature(mode) == modes and _same(x, before):
+            # nothing came of it: rounding alone crossed this margin, which thereby counts as larger
+            scale[NOW, at] *= 100.0
+        else:
+            renewed(prog, mode, scale, node)
+        zero_events += 1
+        if t - last_event_t > max(1e-9 * abs(t), shortest):
+            zero_events = 0
+            last_event_t = t
+        clock[4] += 1
+        clock[8] = at
+        if events_here < log_t.shape[0]:
+            log_t[events_here] = t
+            log_n[events_here] = node
+            log_k[events_here] = kind
+        events_here += 1
+        if zero_events > 2000:
+            reason = CHATTER
+        elif stop_at_event:
+            reason = EVENT
+        elif log_t.shape[0] > 1 and events_here >= log_t.shape[0]:
+            reason = FULL
+    clock[0], clock[1], clock[2] = t, index, h
+    clock[3] += steps
+    clock[5] = events_here
+    clock[6] = segment
+    clock[7] = 1.0 if blocked >= 0 else 0.0
+    memo[0], memo[1], memo[2] = zero_events, last_event_t, 1.0 if reason == FULL else 0.0
+    return reason
+
+
+@part
+def _signature(mode):
+    """One number that tells mode vectors apart."""
+    value = 0
+    for i in range(mode.shape[0]):
+        value = 31 * value + mode[i]
+    return value
+
+
+@part
+def _same(a, b):
+    """Whether two vectors are equal."""
+    for i in range(a.shape[0]):
+        if a[i] != b[i]:
+            return False
+    return True
+
+
+@part
+def _first_step(x, dx, room, hmax):
+    """Estimate a first step: the time in which some state changes by a hundredth of itself.
+
+    States that begin at zero tell nothing; where all do, a millionth of the time ahead is tried.
+    """
+    h = math.inf
+    for j in range(x.shape[0]):
+        if x[j] != 0.0 and dx[j] != 0.0:
+            h = min(h, 0.01 * abs(x[j] / dx[j]))
+    span = min(room, hmax)
+    return min(max(h, 1e-9 * span), span) if h < math.inf else 1e-6 * span

@@ -1,0 +1,513 @@
+"""Modes on a regular grid: one constant propagator a step, as long as no event can lie inside.
+
+The grid is that of the samples of the inputs, the times of the outputs and the ticks of controllers. With
+z = (x, r, s, t, 1), r the external inputs and s their slopes, a mode obeys dz/dt = M z, so that a step of h
+seconds takes z to exp(M h) z, a matrix computed once for each mode and length. A margin c z has the curvature
+c M^2 z, hence stays within h^2/8 max |c M^2 z| of the chord between its ends; with |z| <= `bound` at the
+start of a step, |c M^2| exp(|M| h) bound limits that curvature over all of it. A step at whose ends every
+margin lies above this limit holds no event, for certain. The first that does not is left to the steps of
+`ctrl_df.simulate.kernel.driver`.
+
+Where curved laws stand beside the affine ones, the step is one of `exponential`, and the
+margins at its nodes tell whether it holds an event.
+
+The matrices are kept row by row, zeros left out. Bounds are taken element by element, so that units do not
+matter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.compiled import part
+from ..program import layout as L
+from .affine import LENGTHS, RANKS, Memory, entry, ranks, recall
+from .exponential import (
+    MILD,
+    PATIENCE,
+    STIFF,
+    bent_step,
+    contraction,
+    make_bent,
+    narrow,
+    parts,
+    renew,
+)
+from .matrices import multiply, row_times
+from .mechanics import mechanism
+from .modes import settle
+from .outputs import next_sample, record, tick
+
+EPS = np.finfo(float).eps
+ORDER = 16  # terms of an exponential's series
+HALVINGS = 12  # of the step, at most, before its series is summed
+NEAR = 1e-3  # times the tolerance: how far a step may be from a known length, relative to it
+ALIKE = 1e-6  # relative difference of two steps below which they count as the same length
+
+SHARE = 0.1  # of the tolerance of a step that one between samples may have
+
+USABLE, USELESS = 1, 2  # entries of `Memory.ready`
+GIVEN_UP = 0.25  # share of the error that is left by more nodes, above which still more are of no use
+RANK, LEFT = 2, 3  # entries of `Bend.state`
+
+
+class Glide(NamedTuple):
+    """Propagators of the modes a `Memory` knows, one for each length and rank, and scratch.
+
+    Rows: states (unless laws are curved), margins, outputs.
+    """
+
+    length: np.ndarray  # (LENGTHS,): known steps [s]; 0: none
+    newest: np.ndarray  # (1,): which was learnt last
+    first: np.ndarray  # (SLOTS * LENGTHS * ranks, rows + 1): where a row begins in `column` and `value`
+    column: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
+    value: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
+    fed: np.ndarray  # (SLOTS * LENGTHS * ranks, margins): whether a row has entries of external inputs
+    count: np.ndarray  # (SLOTS * LENGTHS * ranks,): margins that the mode has
+    active: np.ndarray  # (SLOTS * LENGTHS * ranks, margins): which these are
+    owner: np.ndarray  # (SLOTS * LENGTHS * ranks, margins): margin of a row, -1 where the mode has none
+    curved: np.ndarray  # (SLOTS * LENGTHS * ranks, margins, nz): limits of curvature times h^2/8, per bound
+    bound: np.ndarray  # (nz,)
+    slack: np.ndarray  # (margins,)
+    here: np.ndarray  # z at the start of a step
+    ahead: np.ndarray  # and at its end
+    matrix: np.ndarray  # (5, nz, nz)
+
+
+def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
+    """Allocate the propagators that go with a memory; small where none can be used."""
+    slots, n, nr = memory.b.shape
+    used = memory.ready.shape[0]
+    margins = memory.rows.shape[1] if usable else 0
+    nz = n + 2 * nr + 2 if usable else 0
+    rows = n + margins + ny if usable else 0
+    return Glide(
+        np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
+        np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
+        np.zeros((used, margins), np.int64), np.zeros(used, np.int64), np.zeros((used, margins), np.int64),
+        np.zeros((used, margins), np.int64),
+        np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
+        np.zeros(nz + 3 * memory.acting.shape[0]), np.zeros(nz),
+        np.zeros((5, nz, nz)),
+    )  # fmt: skip
+
+
+@part
+def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
+          size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g, bend):  # fmt: skip
+    """Go on from `t` over as many steps as hold no event.
+
+    `bend` goes with curved laws; where there are none it is None, and the branches that need it are not even
+    compiled. `long` is a step that error control allowed before: where laws are curved, many short steps may
+    not err more than the one long step they stand for.
+
+    Returns the number of steps gone, the time, the segment of the inputs, the next output's index, the time
+    of the next tick, and whether a controller ticked at the end of the last step.
+    """
+    n, nr, ny = x.shape[0], prog.ints[L.H_NR], prog.ints[L.H_NY]
+    margins = store.rows.shape[1]
+    time, nt = drive.time, drive.time.shape[0]
+    here, ahead, bound = tracks.here, tracks.ahead, tracks.bound
+    node = mechanism(prog)
+    at, one = n + 2 * nr, n + 2 * nr + 1
+    ramped = nt > 0 and drive.linear == 1
+    done, ticked = 0, False
+    stale = True  # the bounds, the slack and the margins at the start are to be taken anew
+    for j in range(n):
+        here[j] = x[j]
+    for j in range(one):
+        bound[j] = 0.0
+    for j in range(n, at):
+        here[j] = ahead[j] = 0.0
+    here[one] = ahead[one] = bound[one] = 1.0
+    before = -1
+    while t < t_end:
+        jumped = False
+        while segment + 1 < nt and time[segment + 1] <= t:
+            segment += 1
+            jumped = not ramped
+        t1 = _following(t, time, segment, tout, index, next_tick)
+        near = NEAR * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
+        which = _known(tracks, t1 - t, near)
+        if which < 0 and t1 < t_end and done == 0 and t1 - t <= hmax:
+            which = _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick)
+        if which < 0 or t1 > t_end or t1 - t > hmax:
+            break
+        # --- the inputs, and the bounds of all
+        for k in range(nr):
+            value = drive.harmonics[k, 0].real if drive.harmonics.shape[1] > 0 else 0.0
+            if nt > 0:
+                value += drive.samples[k, segment]
+            here[n + k] = ahead[n + k] = value
+            if ramped and segment + 1 < nt:
+                slope = (drive.samples[k, segment + 1] - drive.samples[k, segment]) / (
+                    time[segment + 1] - time[segment]
+                )
+                here[n + k] = value + slope * (t - time[segment])
+                ahead[n + k] = value + slope * (t1 - time[segment])
+                here[n + nr + k] = ahead[n + nr + k] = slope
+        here[at], ahead[at] = t, t1
+        # --- over the step
+        if bend is not None:
+            share = min(tracks.length[which] / long, SHARE) if long > 0.0 else SHARE
+            state = bend.state[slot]
+            if state[RANK] > 0.0:
+                state[LEFT] -= 1.0
+                if state[LEFT] <= 0.0:
+                    state[RANK] -= 1.0
+                    state[LEFT] = PATIENCE
+            place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
+            if store.ready[place] != USABLE or not share >= bent_step(
+                prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
+                state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
+                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
+            ):  # fmt: skip
+                place = _again(
+                    prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share,
+                    ny,
+                )  # fmt: skip
+            if place < 0 or narrow(prog, x, ahead):
+                break
+            m = parts(store, place % RANKS)
+            if not _clear(
+                bend.nodes, store.pushed[slot], tracks.first[place], tracks.column[place],
+                tracks.value[place], tracks.active[place], tracks.count[place], tracks.owner[place], here,
+                ahead, scale, m, tracks.length[which] / m, n, nr,
+            ):  # fmt: skip
+                break
+        else:
+            place = slot * LENGTHS + which
+            if store.ready[place] == 0:
+                _make(store, tracks, None, place, slot, tracks.length[which], n, nr, ny)
+            if store.ready[place] == USELESS:
+                break
+            stale = stale or place != before
+            if not _straight(tracks, place, stale, jumped, scale, n):
+                break
+            stale = False
+        before = place
+        for j in range(n):
+            x[j] = here[j] = ahead[j]
+            size[j] = max(abs(ahead[j]), 0.98 * size[j])
+        done += 1
+        t = t1
+        ticked = next_tick <= t1 + near
+        due = index < tout.shape[0] and tout[index] <= t1 + near
+        if ticked:
+            tick(prog, drive, segment, t, x, mode, work, dx)
+            next_tick = next_sample(prog, t)
+            if due:
+                settle(prog, drive, segment, t, x, mode, work, dx)
+                record(prog, drive, segment, t, x, mode, work, yout[index])
+            slot = recall(prog, store, mode, work, x1, xi, dx, g)
+            stale, before = True, -1
+            for j in range(n):
+                here[j] = x[j]
+        elif due:
+            first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
+            row = margins if store.acting.shape[0] > 0 else n + margins
+            for i in range(ny):
+                yout[index, i] = row_times(first, column, values, row + i, ahead)
+        if due:
+            for j in range(n):
+                xout[index, j] = x[j]
+            index += 1
+    return done, t, segment, index, next_tick, ticked
+
+
+@part(inline=True)
+def _straight(tracks, place, stale, jumped, scale, n):
+    """Take an affine step from `here` to `ahead`; whether no event lies inside.
+
+    `stale`: bounds, slack and the margins here are to be taken anew; `jumped`: the inputs have.
+    """
+    here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
+    for j in range(here.shape[0] - 1):
+        if abs(here[j]) > bound[j]:
+            bound[j] = 2.0 * abs(here[j])
+            stale = True
+    live = tracks.count[place]
+    if stale:
+        for k in range(live):
+            value = 0.0
+            for j in range(here.shape[0]):
+                value += tracks.curved[place, tracks.active[place, k], j] * bound[j]
+            slack[k] = value
+    # margins at the start, where they are not those at the end of the step before
+    first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
+    for k in range(live):
+        m = tracks.active[place, k]
+        if stale or (jumped and tracks.fed[place, m] == 1):
+            if not row_times(first, column, values, n + m, here) > slack[k]:
+                return False
+    for j in range(n):
+        ahead[j] = row_times(first, column, values, j, here)
+        if not abs(ahead[j]) < math.inf:
+            return False
+    for k in range(live):
+        m = tracks.active[place, k]
+        owner, value = tracks.owner[place, m], row_times(first, column, values, n + m, ahead)
+        if not value > slack[k]:
+            return False
+        scale[0, owner] = max(scale[0, owner], value)
+    return True
+
+
+@part
+def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
+    """Try again a curved step that failed: with matrices not made yet, with K taken anew, with more parts.
+
+    Returns the propagator that it succeeded with, -1 where none will do.
+    """
+    state, h = bend.state[slot], tracks.length[which]
+    first = rank = int(state[RANK])
+    lag, fresh, tried = -1.0, False, False
+    before = math.inf
+    while True:
+        place = (slot * LENGTHS + which) * RANKS + rank
+        error = 0.0
+        if store.ready[place] == 0:
+            _make(store, tracks, bend, place, slot, h, x.shape[0], store.b.shape[2], ny)
+            tried = True
+        if store.ready[place] != USABLE:
+            return -1
+        if tried:
+            error = bent_step(
+                prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
+                state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, rank), False, t, h,
+                tracks.here, tracks.ahead, size, grain, rtol, atol,
+            )  # fmt: skip
+            if error <= share:
+                state[RANK] = rank
+                return place
+        tried = True
+        if lag < 0.0:
+            lag = contraction(prog, node, store, bend, slot, t, h, x, mode, size)
+        if not fresh and lag > STIFF and renew(store, bend, slot):
+            fresh = True
+        elif rank + 1 < RANKS and error < GIVEN_UP * before and not (fresh and lag > STIFF):
+            rank += 1
+            state[LEFT] = PATIENCE
+            before = error if error > 0.0 else math.inf
+        elif not fresh and state[0] != 0.0 and lag > MILD and renew(store, bend, slot):
+            fresh, rank, before = True, first, math.inf
+        else:
+            state[RANK] = 0.0
+            return -1
+
+
+@part
+def _clear(nodes, pushed, first, column, values, active, count, owner, here, ahead, scale, m, sigma, n, nr):
+    """Whether no event lies within a step with curved laws, by the margins at its nodes.
+
+    Between two nodes a margin stays within an eighth of its second difference of the chord, if that
+    difference varies little from node to node, as the error allowed has it; twice as much is asked.
+    """
+    nq, nz = pushed.shape[1], n + 2 * nr + 2
+    for k in range(nr):
+        nodes[0, n + k] = here[n + k]
+        for node in range(1, m + 1):
+            nodes[node, n + k] = here[n + k] + node * sigma * here[n + nr + k]
+    for node in range(m + 1):
+        nodes[node, nz - 2] = here[nz - 2] + node * sigma
+    for j in range(n):
+        nodes[0, j], nodes[m, j] = here[j], ahead[j]
+    for a in range(count):
+        i = active[a]
+        before = now = bent = 0.0
+        lowest = math.inf
+        for node in range(m + 1):
+            value = row_times(first, column, values, i, nodes[node])
+            for k in range(nq):
+                value += pushed[i, k] * nodes[node, nz + k]
+            if node > 1:
+                bent = max(bent, abs(before - 2.0 * now + value))
+            before, now = now, value
+            lowest = min(lowest, value)
+        if not lowest > 0.25 * bent:
+            return False
+        scale[0, owner[i]] = max(scale[0, owner[i]], now)
+    return True
+
+
+@part(inline=True)
+def _following(t, time, segment, tout, index, next_tick):
+    """Next point of the grid after `t`: a sample, an output, a tick. Points that rounding parts are one."""
+    following = next_tick
+    if segment + 1 < time.shape[0]:
+        following = min(following, time[segment + 1])
+    if index < tout.shape[0]:
+        following = min(following, tout[index])
+    if segment + 1 < time.shape[0] and time[segment + 1] <= following + 4.0 * EPS * (abs(t) + abs(following)):
+        following = time[segment + 1]
+    return following
+
+
+@part(inline=True)
+def _known(tracks, length, near):
+    """Which of the known lengths a step has; -1: none."""
+    for which in range(LENGTHS):
+        if abs(tracks.length[which] - length) <= near:
+            return which
+    return -1
+
+
+@part
+def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick):
+    """Learn a new length of step in place of the older one, if steps go on like it; -1 if not."""
+    ahead, s, i = t1, segment, index
+    regular = False
+    for _ in range(2):  # every step, or every other one
+        while s + 1 < time.shape[0] and time[s + 1] <= ahead:
+            s += 1
+        while i < tout.shape[0] and tout[i] <= ahead:
+            i += 1
+        beyond = _following(ahead, time, s, tout, i, next_tick if next_tick > ahead else math.inf)
+        regular = regular or abs((beyond - ahead) - (t1 - t)) <= ALIKE * (t1 - t)
+        ahead = beyond
+    if not regular:
+        return -1
+    length = t1 - t
+    if time.shape[0] > 1:
+        # the same wherever in the record a run begins
+        mean = (time[time.shape[0] - 1] - time[0]) / (time.shape[0] - 1)
+        share = mean / max(round(mean / length), 1.0)
+        if abs(share - length) <= near:
+            length = share
+    which = (tracks.newest[0] + 1) % LENGTHS
+    tracks.newest[0] = which
+    tracks.length[which] = length
+    for place in range(store.ready.shape[0]):
+        if place // ranks(store) % LENGTHS == which:
+            store.ready[place] = 0
+    return which
+
+
+@part
+def _make(store, tracks, bend, place, slot, h, n, nr, ny):
+    """Compute the propagator of a mode over `h` seconds, and the rows of its margins and outputs."""
+    nz, margins = n + 2 * nr + 2, store.rows.shape[1]
+    tracks.count[place] = 0
+    for row in range(margins):
+        tracks.fed[place, row] = 0
+        tracks.owner[place, row] = store.owners[row] if store.rows[slot, row, n + nr + 1] < math.inf else -1
+        if tracks.owner[place, row] >= 0:
+            tracks.active[place, tracks.count[place]] = row
+            tracks.count[place] += 1
+    tracks.first[place, 0] = 0
+    begin = count = 0
+    if bend is None:
+        begin, count = n, _make_straight(store, tracks, place, slot, h, n, nr)
+    elif not make_bent(store, bend, place, slot, place % RANKS, h, n, nr):
+        count = -1
+    if count < 0:
+        store.ready[place] = USELESS
+        return
+    for row in range(margins + ny):
+        for j in range(nz):
+            value = 0.0
+            if row >= margins:
+                value = entry(store.outs[slot, row - margins], j, n, nr)
+            elif tracks.owner[place, row] >= 0:
+                value = entry(store.rows[slot, row], j, n, nr)
+                if value != 0.0 and n <= j < n + nr:
+                    tracks.fed[place, row] = 1
+            if value != 0.0:
+                tracks.column[place, count], tracks.value[place, count] = j, value
+                count += 1
+        tracks.first[place, begin + row + 1] = count
+    store.ready[place] = USABLE
+
+
+@part
+def _make_straight(store, tracks, place, slot, h, n, nr):
+    """Compute exp(M h), row after row, and the limits of curvature; returns their entries (-1: none)."""
+    nz, margins = n + 2 * nr + 2, store.rows.shape[1]
+    at, one = nz - 2, nz - 1
+    m, absolute, power, scratch = tracks.matrix[0], tracks.matrix[1], tracks.matrix[2], tracks.matrix[3]
+    whole = tracks.matrix[4]
+    for i in range(nz):
+        for j in range(nz):
+            m[i, j] = 0.0
+    for i in range(n):
+        for j in range(n):
+            m[i, j] = store.a[slot, i, j]
+        for k in range(nr):
+            m[i, n + k] = store.b[slot, i, k]
+        m[i, at], m[i, one] = store.d[slot, i], store.c[slot, i]
+    for k in range(nr):
+        m[n + k, n + nr + k] = 1.0
+    m[at, one] = 1.0
+    for i in range(nz):
+        for j in range(nz):
+            absolute[i, j] = abs(m[i, j])
+    halvings = 0
+    while halvings <= HALVINGS and not _exponential(absolute, h, halvings, whole, power, scratch):
+        halvings += 1
+    usable = halvings <= HALVINGS
+    # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
+    for row in range(margins):
+        for j in range(nz):
+            tracks.curved[place, row, j] = 0.0
+        if not usable or tracks.owner[place, row] < 0:
+            continue
+        for j in range(nz):
+            power[0, j] = power[1, j] = 0.0
+        for i in range(nz):
+            c = entry(store.rows[slot, row], i, n, nr)
+            if c != 0.0:
+                for j in range(nz):
+                    power[0, j] += c * m[i, j]
+        for i in range(nz):
+            if power[0, i] != 0.0:
+                for j in range(nz):
+                    power[1, j] += power[0, i] * m[i, j]
+        for i in range(nz):
+            bend = abs(power[1, i]) * h * h / 8.0
+            if bend > 0.0:
+                for j in range(nz):
+                    tracks.curved[place, row, j] += bend * whole[i, j]
+        for j in range(nz):
+            usable = usable and tracks.curved[place, row, j] < math.inf
+    if not usable:
+        return -1
+    _exponential(m, h, halvings, whole, power, scratch)
+    # --- the rows, zeros left out
+    count = 0
+    for row in range(n):
+        for j in range(nz):
+            if whole[row, j] != 0.0:
+                tracks.column[place, count], tracks.value[place, count] = j, whole[row, j]
+                count += 1
+        tracks.first[place, row + 1] = count
+    return count
+
+
+@part
+def _exponential(m, h, halvings, out, power, scratch):
+    """Sum exp(m h / 2^halvings), squared as often; False where ORDER terms are too few for an element."""
+    nz = m.shape[0]
+    step = h / 2.0**halvings
+    for i in range(nz):
+        for j in range(nz):
+            out[i, j] = power[i, j] = 1.0 if i == j else 0.0
+    small = False
+    for k in range(1, ORDER + 1):
+        small = True
+        multiply(m, power, scratch)
+        for i in range(nz):
+            for j in range(nz):
+                power[i, j] = scratch[i, j] * step / k
+                out[i, j] += power[i, j]
+                small = small and abs(power[i, j]) <= 1e-3 * EPS * abs(out[i, j])
+        if small:
+            break
+    for _ in range(halvings):
+        multiply(out, out, scratch)
+        for i in range(nz):
+            for j in range(nz):
+                out[i, j] = scratch[i, j]
+    return small

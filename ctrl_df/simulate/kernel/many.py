@@ -1,0 +1,233 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""Many runs, one after another, without the interpreter: the kernel behind `ctrl_df.simulate.runs`.
+
+Every run begins from a state of its own, and leaves nothing behind that another could see: its numbers depend
+neither on the runs before it nor on how the runs are shared out among threads. The engine is called through
+its address (`native.py`), so that it is compiled once, for single runs and for many.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.compiled import njit, part
+from ..compiler.native import call_native
+from ..compiler.views import cut, lean
+from ..program.layout import H_NG, Drive, Program
+from . import driver
+
+NOT_BEGUN, UNFINISHED = -1, -2
+"""Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
+
+EVENTS = 256  # of one run, logged before its log is emptied
+_LOGS = 16  # runs' logs that are kept until Python takes them
+_FEW_STEPS = 10_000  # of a small system between two looks whether to stop
+_MOST_OUTPUTS = 100_000  # recorded between two looks whether to stop
+
+
+class Drives(NamedTuple):
+    """External inputs of many runs, as in `layout.Drive`; the first axis: one for each.
+
+    ``time`` (1 or k, nt) [s], ``samples`` (k, nr, nt), ``linear`` 0 (held) or 1, ``harmonics`` (k, nr, nh),
+    ``omega`` (k,) [rad/s].
+    """
+
+    time: np.ndarray
+    samples: np.ndarray
+    linear: int
+    harmonics: np.ndarray
+    omega: np.ndarray
+
+
+class Rows(NamedTuple):
+    """What each of n runs begins with and comes to.
+
+    The output times of run i are ``times[first[i] : first[i] + count[i]]``; its outputs, and its states where
+    they are kept, are the rows from ``at[i]``. Its modes are ``mode[modes[i] : modes[i + 1]]``.
+    """
+
+    x: np.ndarray  # (n, nx) states, moved on
+    mode: np.ndarray  # moved on
+    modes: np.ndarray  # (n + 1,)
+    clock: np.ndarray  # (n, 10) as `driver.run` has it
+    end: np.ndarray  # (n,) [s]
+    max_steps: np.ndarray  # (n,)
+    drive: np.ndarray  # (n,) which of the drives
+    par: np.ndarray  # (n,) which row of the parameters
+    times: np.ndarray  # [s]
+    first: np.ndarray  # (n,)
+    count: np.ndarray  # (n,)
+    at: np.ndarray  # (n,)
+    outputs: np.ndarray  # (total, ny)
+    reason: np.ndarray  # (n,)
+    events: np.ndarray  # (n,)
+
+
+class Desk(NamedTuple):
+    """What one thread works with: the engine's address and program, scratch, its log of events."""
+
+    run: int
+    nodes: np.ndarray
+    ints: np.ndarray
+    space: driver.Space
+    scale: np.ndarray
+    before: np.ndarray
+    spectrum: np.ndarray
+    states: np.ndarray  # (total, nx), shared by all threads; or scratch of the longest run
+    keep: int  # 1: they are shared
+    log_t: np.ndarray
+    log_n: np.ndarray
+    log_k: np.ndarray
+    log_row: np.ndarray
+    tally: np.ndarray  # events in the log, row of the parameters in use
+    chunk: int  # steps between two looks whether to stop
+    stop: np.ndarray  # shared by all threads: 1 asks them to leave
+
+
+class How(NamedTuple):
+    """Options that all runs share; see `ctrl_df.simulate.engine.Engine.run`."""
+
+    order: int
+    rtol: float
+    atol: float
+    max_step: float
+    height: float
+
+
+def make_desk(engine, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray) -> Desk:
+    """Allocate what a thread needs for the runs of one program; `logged`: keep their events."""
+    program = engine.program
+    n, ng = engine.nstates, int(program.ints[H_NG]) + 1
+    space = driver.workspace(program, delays=True)
+    room = _LOGS * EVENTS if logged else 1
+    log_t, log_n, log_k, log_row = (np.zeros(room, kind) for kind in (float, np.int64, np.int64, np.int64))
+    scale, before = np.zeros((4, ng)), np.zeros(n)
+    spectrum = np.zeros((engine.noutputs, 0), complex)
+    return Desk(
+        driver.address(), program.nodes, program.ints, space, scale, before, spectrum, states, int(keep),
+        log_t, log_n, log_k, log_row, np.array([0, -1]), max(int(_FEW_STEPS / (1 + (n / 6) ** 2)), 10), stop,
+    )  # fmt: skip
+
+
+@njit(error_model="numpy", nogil=True)
+def run_rows(desk, rows, drives, par, how, todo, begin):
+    """Run the rows ``todo[begin:]`` one after another; return how many of `todo` are done.
+
+    `par` (k, npar) are the packed parameters that ``rows.par`` refers to. Fewer than all are done where the
+    log of events is full (take it, set ``desk.tally[0]`` to zero, and go on from the number returned, at the
+    same desk) or where ``desk.stop`` asks to leave.
+    """
+    desk, rows, drives, par, todo = lean(desk), lean(rows), lean(drives), lean(par), lean(todo)
+    for i in range(begin, todo.shape[0]):
+        row = todo[i]
+        if desk.stop[0] != 0 or not _one(desk, rows, drives, par, how, row):
+            return i
+    return todo.shape[0]
+
+
+@part
+def _one(desk, rows, drives, par, how, row):
+    """Run one row to its end; False where it has to stop before."""
+    memo = desk.space.memo
+    clock, first = rows.clock[row], rows.first[row]
+    times = cut(rows.times, first, rows.count[row])
+    outputs = cut(rows.outputs, rows.at[row], times.shape[0])
+    at = rows.at[row] if desk.keep else 0
+    mode = cut(rows.mode, rows.modes[row], rows.modes[row + 1] - rows.modes[row])
+    states = cut(desk.states, at, times.shape[0])
+    which = rows.drive[row]
+    time = drives.time[min(which, drives.time.shape[0] - 1)]
+    drive = Drive(time, drives.samples[which], drives.linear, drives.harmonics[which], drives.omega[which], 0)
+    prog = Program(desk.nodes, desk.ints, par[rows.par[row]])
+    fresh = 0
+    if rows.reason[row] == NOT_BEGUN:
+        fresh = 1
+        if desk.tally[1] != rows.par[row]:
+            # maps of modes that were learnt with other parameters
+            desk.space.store.order[0] = desk.space.store.order[1] = 0
+            desk.tally[1] = rows.par[row]
+        for i in range(desk.scale.shape[0]):
+            for j in range(desk.scale.shape[1]):
+                desk.scale[i, j] = 0.0
+        memo[2] = 0.0
+        clock[6] = _segment(time, clock[0])
+    while True:
+        # every part of a run is as long as it would be among other runs: so are its numbers
+        logged = min(EVENTS, desk.log_t.shape[0])
+        used = desk.tally[0]
+        if desk.stop[0] != 0 or used + logged > desk.log_t.shape[0]:
+            if fresh == 0:
+                rows.reason[row] = UNFINISHED
+            return False
+        until = rows.end[row]
+        if times.shape[0] - int(clock[1]) > _MOST_OUTPUTS:
+            until = min(until, times[int(clock[1]) + _MOST_OUTPUTS])
+        budget = min(rows.max_steps[row] - int(clock[3]), desk.chunk)
+        reason = call_native(
+            desk.run,
+            (
+                prog, drive, clock, rows.x[row], mode, until, times, states, outputs, how.order,
+                how.rtol, how.atol, how.max_step, True, False, -1, 0.0, -1, how.height, budget,
+                cut(desk.log_t, used, logged), cut(desk.log_n, used, logged), cut(desk.log_k, used, logged),
+                desk.before, desk.scale, fresh, desk.space, desk.spectrum,
+                0.0,
+            ),
+        )  # fmt: skip
+        fresh = 0
+        if logged > 1:
+            for j in range(used, used + min(int(clock[5]), logged)):
+                desk.log_row[j] = row
+                desk.tally[0] = j + 1
+        goes_on = (
+            reason == driver.FULL
+            or (reason == driver.STEPS and clock[3] < rows.max_steps[row])
+            or (reason == driver.DONE and until < rows.end[row])
+        )
+        if not goes_on:
+            break
+        memo[2] = 1.0  # the same run goes on: so does its count of events without progress
+    right = _finite(outputs, int(clock[1]))
+    if right < int(clock[1]):
+        reason = driver.NAN
+    clock[1] = right
+    _blank(outputs, right)
+    if desk.keep:
+        _blank(states, right)
+    rows.events[row] = int(clock[4])
+    rows.reason[row] = reason
+    return True
+
+
+@part
+def _blank(values, first):
+    """Write NaN from row `first` on."""
+    for i in range(first, values.shape[0]):
+        for j in range(values.shape[1]):
+            values[i, j] = math.nan
+
+
+@part
+def _segment(time, t):
+    """Last sample at or before a time [s]; the first where there is none."""
+    low, high = 0, time.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if time[middle] <= t:
+            low = middle + 1
+        else:
+            high = middle
+    return max(low - 1, 0)
+
+
+@part
+def _finite(outputs, recorded):
+    """Rows up to the first one with a number that is not finite."""
+    for i in range(recorded):
+        for j in range(outputs.shape[1]):
+            if not math.isfinite(outputs[i, j]):
+                return i
+    return recorded

@@ -1,0 +1,244 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""What happens at an event, and how a program settles into consistent modes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiler.compiled import part
+from ..program.layout import (
+    A_BODIES,
+    A_JOINT,
+    AUX,
+    E_BREAKAWAY,
+    E_CONTACT,
+    E_CORNER,
+    E_DISENGAGE,
+    E_ENGAGE,
+    E_RELEASE,
+    E_REVERSAL,
+    E_STICK,
+    E_SWITCH,
+    G_BODY1,
+    G_JOINT_HIGH,
+    G_JOINT_LOW,
+    G_WALL_HIGH,
+    H_SCRATCH,
+    H_U,
+    J_ELASTIC,
+    JOINT,
+    KIND,
+    MECHANISM,
+    MODE,
+    NIN,
+    NOUT,
+    NX,
+    OUT,
+    PAR,
+    PLAY,
+    PWA,
+    QUANTIZER,
+    RATE,
+    STUCK,
+    X,
+)
+from .contact import impact, resolve, stop
+from .flow import external, node_input, product, refresh, signals
+from .mechanics import closed
+
+ROUNDING = 4.0 * np.finfo(float).eps
+
+
+@part
+def settle(prog, drive, segment, t, x, mode, work, dx):
+    """Bring all modes in line with the state; returns False if they keep changing (a sliding mode)."""
+    w, f, trial = work
+    nodes, par = prog.nodes, prog.par
+    for _pass in range(50):
+        changed = False
+        external(prog, drive, t, segment, w)
+        signals(prog, t, x, mode, w)
+        for n in range(nodes.shape[0]):
+            kind, mo, po = nodes[n, KIND], nodes[n, MODE], nodes[n, PAR]
+            if kind == PWA:
+                value = node_input(prog, n, 0, w)
+                region = mode[mo]
+                steps = prog.ints[nodes[n, AUX]]
+                for _i in range(steps):
+                    row = po + 4 * region
+                    at = nodes[n, AUX] + 1 + 2 * region
+                    if value > par[row + 1]:
+                        region = prog.ints[at + 1]
+                    elif value < par[row]:
+                        region = prog.ints[at]
+                    else:
+                        break
+                if region != mode[mo]:
+                    mode[mo] = region
+                    changed = True
+            elif kind == QUANTIZER:
+                value = node_input(prog, n, 0, w) / par[po]
+                if value > mode[mo] + 0.5 or value < mode[mo] - 0.5:
+                    mode[mo] = round(value)
+                    changed = True
+            elif kind == PLAY:
+                gap = node_input(prog, n, 0, w) - x[nodes[n, X]]
+                half = 0.5 * par[po]
+                m = 1 if gap > half else (-1 if gap < -half else mode[mo])
+                if m != 0:
+                    x[nodes[n, X]] += gap - m * half
+                if m != mode[mo]:
+                    mode[mo] = m
+                    changed = True
+            elif kind == RATE:
+                gap = node_input(prog, n, 0, w) - x[nodes[n, X]]
+                if mode[mo] == 0 and gap != 0.0:
+                    # a jump of the input cannot be followed at once
+                    mode[mo] = 1 if gap > 0 else -1
+                    changed = True
+                elif mode[mo] * gap < 0.0:
+                    mode[mo] = -mode[mo]
+                    changed = True
+            elif kind == MECHANISM:
+                changed |= resolve(prog, n, t, x, mode, node_input(prog, n, 0, w), f, trial)
+        if not changed:
+            return True
+    return False
+
+
+@part
+def track(prog, drive, segment, t, x, mode, work):
+    """Write the outputs of engaged plays and tracking rate limiters into their states (end of a step)."""
+    w, _, _ = work
+    nodes = prog.nodes
+    refresh(prog, drive, segment, t, x, mode, w)
+    for n in range(nodes.shape[0]):
+        if nodes[n, KIND] == PLAY or nodes[n, KIND] == RATE:
+            x[nodes[n, X]] = w[nodes[n, OUT]]
+
+
+@part
+def answers_at_once(prog, node):
+    """Whether a sampled controller has a direct path: its new output depends on what it reads (D != 0)."""
+    nodes = prog.nodes
+    ni, no = nodes[node, NIN], nodes[node, NOUT]
+    nd = nodes[node, NX] - no
+    first = nodes[node, PAR] + nd * (nd + ni + no)
+    for i in range(first, first + no * ni):
+        if prog.par[i] != 0.0:
+            return True
+    return False
+
+
+@part
+def hold(prog, node, x, w):
+    """Put out the new output of a sampled controller and hold it."""
+    nodes, par, ou = prog.nodes, prog.par, prog.ints[H_U]
+    ni, no, xo, po = nodes[node, NIN], nodes[node, NOUT], nodes[node, X], nodes[node, PAR]
+    nd = nodes[node, NX] - no
+    for k in range(ni):
+        w[ou + k] = node_input(prog, node, k, w)
+    for i in range(no):
+        from_state = product(par, po + nd * (nd + ni) + i * nd, nd, x, xo)
+        x[xo + nd + i] = from_state + product(par, po + nd * (nd + ni + no) + i * ni, ni, w, ou)
+
+
+@part
+def advance_state(prog, node, x, w):
+    """Take the state of a sampled controller to the next sample, by what it reads now."""
+    nodes, par = prog.nodes, prog.par
+    ou, scratch = prog.ints[H_U], prog.ints[H_SCRATCH]
+    ni, xo, po = nodes[node, NIN], nodes[node, X], nodes[node, PAR]
+    nd = nodes[node, NX] - nodes[node, NOUT]
+    for k in range(ni):
+        w[ou + k] = node_input(prog, node, k, w)
+    for i in range(nd):
+        from_state = product(par, po + i * nd, nd, x, xo)
+        w[scratch + i] = from_state + product(par, po + nd * nd + i * ni, ni, w, ou)
+    for i in range(nd):
+        x[xo + i] = w[scratch + i]
+
+
+@part
+def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, reach):
+    """Apply the event whose margin `slot` of `node` was crossed; returns its kind.
+
+    `height` is the flight, relative to the gap or stroke, below which an impact counts as the end of chatter;
+    `reach` the time [s] over which rates of inputs are taken.
+    """
+    w, f, trial = work
+    nodes, par, aux = prog.nodes, prog.par, prog.ints
+    kind, mo, po, xo = nodes[node, KIND], nodes[node, MODE], nodes[node, PAR], nodes[node, X]
+    if kind == PWA:
+        at = nodes[node, AUX] + 1 + 2 * mode[mo]
+        before = mode[mo]
+        value = par[po + 4 * before + slot]
+        mode[mo] = aux[at + slot]
+        row_a, row_b = po + 4 * before, po + 4 * mode[mo]
+        jump = par[row_a + 3] + par[row_a + 2] * value - par[row_b + 3] - par[row_b + 2] * value
+        sizes = (
+            abs(par[row_a + 3])
+            + abs(par[row_a + 2] * value)
+            + abs(par[row_b + 3])
+            + abs(par[row_b + 2] * value)
+        )
+        return E_SWITCH if abs(jump) > 1e-12 * sizes else E_CORNER
+    if kind == QUANTIZER:
+        mode[mo] += 1 if slot == 1 else -1
+        return E_SWITCH
+    if kind == PLAY:
+        if mode[mo] != 0:
+            # free from here on: rounding must not find the output at that side of the gap still
+            refresh(prog, drive, segment, t, x, mode, w)
+            x[xo] += mode[mo] * ROUNDING * (abs(node_input(prog, node, 0, w)) + abs(x[xo]))
+            mode[mo] = 0
+            return E_DISENGAGE
+        mode[mo] = 1 if slot == 1 else -1
+        return E_ENGAGE
+    if kind == RATE:
+        if mode[mo] != 0:
+            mode[mo] = 0
+            return E_DISENGAGE
+        # the sign of the input's rate tells the direction of the limit
+        refresh(prog, drive, segment, t, x, mode, w)
+        value = node_input(prog, node, 0, w)
+        x[xo] = value
+        for i in range(x.shape[0]):
+            trial[i] = x[i] + reach * dx[i]
+        refresh(prog, drive, segment, t + reach, trial, mode, w)
+        mode[mo] = 1 if node_input(prog, node, 0, w) > value else -1
+        return E_ENGAGE
+
+    bodies = aux[nodes[node, AUX] + A_BODIES]
+    joint = aux[nodes[node, AUX] + A_JOINT]
+    joined = bodies == 2 and closed(prog, node, mode)
+    if slot <= G_BODY1:
+        was_stuck = mode[mo + slot] == STUCK
+        if not was_stuck:
+            x[xo + 2 * slot + 1] = 0.0
+            if joined:
+                x[xo + 1] = x[xo + 3] = 0.0
+        refresh(prog, drive, segment, t, x, mode, w)
+        resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
+        if was_stuck:
+            return E_BREAKAWAY
+        return E_STICK if mode[mo + slot] == STUCK else E_REVERSAL
+    if slot == G_JOINT_LOW or slot == G_JOINT_HIGH:
+        if joint == J_ELASTIC:
+            if mode[mo + JOINT] != 0:
+                mode[mo + JOINT] = 0
+                return E_RELEASE
+            mode[mo + JOINT] = 1 if slot == G_JOINT_HIGH else -1
+            return E_CONTACT
+        if joined:
+            refresh(prog, drive, segment, t, x, mode, w)
+            resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
+            if mode[mo + JOINT] != 0:
+                mode[mo + JOINT] = 0
+                resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
+            return E_RELEASE
+        return impact(
+            prog, drive, segment, t, x, mode, work, dx, g, node, 1 if slot == G_JOINT_HIGH else -1, height
+        )
+    return stop(prog, drive, segment, t, x, mode, work, dx, g, node, 1 if slot == G_WALL_HIGH else -1, height)

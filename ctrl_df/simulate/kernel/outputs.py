@@ -1,0 +1,149 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""What a run does at given instants: controllers tick, outputs are recorded, integrated, remembered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiler.compiled import part
+from ..program.layout import DELAY, H_DELAYS, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
+from . import history
+from .flow import combine, external, node_input, refresh, signals
+from .modes import advance_state, answers_at_once, hold, settle
+from .stepper import inside
+
+NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
+NODES = NODES + 0.5
+
+
+@part
+def next_sample(prog, t):
+    """Time of the next tick of any sampled controller."""
+    nearest = math.inf
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == SAMPLED:
+            dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
+            nearest = min(nearest, (math.floor(t / dt + 1e-6) + 1.0) * dt)
+    return nearest
+
+
+@part
+def _sampled_size(prog, n):
+    """Floats of a sampled node's matrices; its period follows them."""
+    no = prog.nodes[n, NOUT]
+    nd, ni = prog.nodes[n, NX] - no, prog.nodes[n, NIN]
+    return nd * nd + nd * ni + no * nd + no * ni
+
+
+@part
+def tick(prog, drive, segment, t, x, mode, work, dx):
+    """Run the sampled controllers whose tick falls on `t`.
+
+    One without a direct path (D = 0) knows its output before it reads: it puts it out first, and what answers
+    at once (a law without time, the direct path of a plant) is read afterwards, as u[k] = C x[k], y[k] =
+    f(u[k]), x[k+1] = A x[k] + B y[k] have it. One with a direct path reads what stands there just before its
+    tick.
+    """
+    w = work[0]
+    late = False
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == SAMPLED and _ticks(prog, n, t) and not answers_at_once(prog, n):
+            hold(prog, n, x, w)
+            late = True
+    if late:
+        settle(prog, drive, segment, t, x, mode, work, dx)
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == SAMPLED and _ticks(prog, n, t) and answers_at_once(prog, n):
+            refresh(prog, drive, segment, t, x, mode, w)
+            hold(prog, n, x, w)
+            advance_state(prog, n, x, w)
+    if late:
+        for n in range(prog.nodes.shape[0]):
+            if prog.nodes[n, KIND] == SAMPLED and _ticks(prog, n, t) and not answers_at_once(prog, n):
+                refresh(prog, drive, segment, t, x, mode, w)
+                advance_state(prog, n, x, w)
+
+
+@part
+def _ticks(prog, n, t):
+    """Whether a tick of this sampled node falls on `t`."""
+    dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
+    return abs(t / dt - round(t / dt)) < 1e-6
+
+
+@part
+def record(prog, drive, segment, t, x, mode, work, y):
+    """System outputs at one point."""
+    w = work[0]
+    external(prog, drive, t, segment, w)
+    signals(prog, t, x, mode, w)
+    for i in range(y.shape[0]):
+        y[i] = combine(prog, prog.ints[prog.ints[H_OUT] + i], w)
+
+
+@part
+def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, poly, xout, yout):
+    """States and outputs at a fraction of a step."""
+    inside(terms, theta, x, poly, xout)
+    record(prog, drive, segment, t + theta * length, xout, mode, work, yout)
+
+
+@part
+def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, poly, xi, spectrum, omega):
+    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss' quadrature."""
+    w = work[0]
+    for i in range(NODES.shape[0]):
+        at = theta * NODES[i]
+        time = t + at * length
+        inside(terms, at, x, poly, xi)
+        refresh(prog, drive, segment, time, xi, mode, w)
+        share = theta * length * WEIGHTS[i]
+        turn = complex(math.cos(omega * time), -math.sin(omega * time))
+        for row in range(spectrum.shape[0]):
+            value = share * combine(prog, prog.ints[prog.ints[H_OUT] + row], w)
+            rotation = complex(1.0, 0.0)
+            for harmonic in range(spectrum.shape[1]):
+                spectrum[row, harmonic] += value * rotation
+                rotation *= turn
+
+
+@part
+def start_delays(prog, drive, segment, t, x, mode, work):
+    """Begin the history of every delay: its input has always been what it is now."""
+    w = work[0]
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == DELAY:
+            history.begin(prog, n, t, 0.0, w)
+    # a delay behind a delay learns its input one pass later
+    for _pass in range(prog.ints[H_DELAYS]):
+        refresh(prog, drive, segment, t, x, mode, w)
+        for n in range(prog.nodes.shape[0]):
+            if prog.nodes[n, KIND] == DELAY:
+                history.begin(prog, n, t, node_input(prog, n, 0, w), w)
+
+
+@part
+def remember(prog, drive, segment, t, length, theta, generation, x, mode, work, terms, poly, xi):
+    """Keep the inputs of all delays over the fraction `theta` of a step; False if there is no room."""
+    w = work[0]
+    span = theta * length
+    if span <= 0.0:
+        return True
+    for q in range(history.POINTS):
+        at = theta * history.NODES[q]
+        inside(terms, at, x, poly, xi)
+        refresh(prog, drive, segment, t + at * length, xi, mode, w)
+        for n in range(prog.nodes.shape[0]):
+            if prog.nodes[n, KIND] == DELAY:
+                # the values are written while the record is still closed, so that no signal reads it
+                place = history.room(prog, n, w)
+                if place < 0:
+                    return False
+                w[place + q] = node_input(prog, n, 0, w)
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, KIND] == DELAY:
+            history.keep(prog, n, t, span, generation, w)
+    return True
