@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,8 @@ class Candidate:
         Initial states, as corrections (see `Simulator.run`).
     windows : list of Windows
         Where the model was started anew.
-    tangent : Tangent or None
-        The fitted model as a linear map of its parameters and initial states.
+    linear : callable or None
+        Works out `tangent`, once it is asked for.
     """
 
     model: Any
@@ -81,7 +82,16 @@ class Candidate:
     scale: np.ndarray
     starts: list
     windows: list
-    tangent: Tangent | None = field(repr=False, default=None)
+    linear: Callable[[], Tangent] | None = field(repr=False, default=None)
+
+    @cached_property
+    def tangent(self) -> Tangent | None:
+        """The fitted model as a linear map of its parameters and initial states; None without parameters."""
+        return self.linear() if self.linear is not None else None
+
+    def __getstate__(self):
+        # what works it out stays behind with the simulations of the fit
+        return {**self.__dict__, "tangent": self.__dict__.get("tangent"), "linear": None}
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
@@ -255,7 +265,8 @@ def fit_windows(
     problem.round(theta)
     if not errors or problem.slopes is None or not names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
-    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    slopes = problem.linearize(theta)
+    covariance, null = covariance_of(problem, problem.tangent(), *slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
@@ -294,14 +305,17 @@ def _candidate(problem: Problem, theta, central) -> Candidate:
     """Return the outcome with covariance, from derivatives about the solution."""
     if not problem.names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
-    base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
-    problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
-    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    slopes = problem.linearize(theta, central=central, anew=True)
+    covariance, null = covariance_of(problem, problem.tangent(), *slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
 def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
+    def linear():
+        problem.linearize(theta)
+        return problem.tangent()
+
     values = problem.values(theta) or {}
     residual = problem.last
     total, count = problem.power(residual)
@@ -332,5 +346,5 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
         starts=problem.nuisance,
         windows=problem.windows,
-        tangent=problem.tangent() if problem.slopes is not None and problem.names else None,
+        linear=linear if problem.slopes is not None and problem.names else None,
     )
