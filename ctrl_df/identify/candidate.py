@@ -230,6 +230,7 @@ def fit_windows(
     errors: bool = False,
     colour: NoiseModel | None = None,
     begins: str = FITTED,
+    hopeless: float = math.inf,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage.
 
@@ -254,12 +255,14 @@ def fit_windows(
         The `force_errors` whose squares are made least, where the machine's own forces make the error.
     begins : str
         How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+    hopeless : float
+        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there.
 
     Returns
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, colour, begins)
+    problem = Problem(model, records, names, 100_000, limits, colour, begins, hopeless)
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

@@ -18,7 +18,7 @@ import numpy as np
 from .initial_states import FITTED
 from .noise import power
 from .simulator import Simulator, feasible
-from .start_search import rescue, scan_slack
+from .start_search import GOOD, rescue, scan_slack
 from .tangent import Tangent
 from .variables import variables_of
 from .windows import Windows, facts
@@ -40,9 +40,11 @@ class Problem:
     initial states, `slopes` the derivatives of the last step.
     """
 
-    def __init__(self, model, records, names, budget, limits=None, colour=None, begins=FITTED):
+    def __init__(
+        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=math.inf
+    ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.colour, self.begins = colour, begins
+        self.colour, self.begins, self.hopeless = colour, begins, hopeless
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -168,11 +170,16 @@ class Problem:
         again = max(iterations // 2, 3)
         # without parameters a window found lets the next one go on where it ends
         for _ in range(1 if self.names else 4):
-            if not rescue(self, theta):
+            if not self._worth_a_rescue() or not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
         rough = ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names and self.colour is None
-        if rough and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
+        if (
+            rough
+            and self._worth_a_rescue()
+            and self.nfev < self.budget
+            and any(t.min() < 0.5 for t in self._trusts())
+        ):
             theta = self._without_the_lost(theta, again, tolerance, robust)
         return theta
 
@@ -191,11 +198,18 @@ class Problem:
         theta, self.nuisance, self.last, self.slopes, self.updates, self.converged = kept
         return theta
 
+    def _worth_a_rescue(self) -> bool:
+        """Whether the error could come below what is hopeless if all windows erred like the good ones."""
+        if self.colour is not None or math.isinf(self.hopeless):
+            return True
+        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.windows, self.last, strict=True)]
+        return float(np.quantile(np.concatenate(rms), GOOD)) < self.hopeless
+
     def _trusts(self) -> Signals:
         """Return weights of the samples (n,): 1 in windows that err like the rest, less in worse ones."""
         trusts = []
         for windows, e in zip(self.windows, self.last, strict=True):
-            power = np.array([float(np.mean(e[w] ** 2)) for w in windows.slices])
+            power = windows.means(e**2)
             usual = max(float(np.median(power)), self.noise**2)
             trusts.append(
                 np.repeat(
@@ -206,9 +220,11 @@ class Problem:
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):
-        """Levenberg-Marquardt; as long as a Jacobian foretells what steps gain, it is brought up to date
-        by what they showed (Broyden), instead of worked out anew.
-        """  # fmt: skip
+        """Levenberg-Marquardt.
+
+        As long as a Jacobian foretells what steps gain it is brought up to date by what they showed (Broyden)
+        instead of worked out anew.
+        """
         damping, self.converged = 1e-3, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
@@ -216,7 +232,7 @@ class Problem:
             iterations = 0
         # so many updates replace a Jacobian, and so many runs are one
         columns = len(self.names) + max((a.shape[1] for a in nuisance), default=0)
-        worked, secant = 0.0, None
+        worked, before, secant = 0.0, 0.0, None
         while worked < iterations and self.nfev < self.budget:
             weights = self._weights(residual, robust and worked > 0)
             if trusts is not None:
@@ -241,7 +257,10 @@ class Problem:
                 trial_cost = self.cost(trial, trial_nuisance, weights)
                 if trial_cost < cost:
                     gain, accepted = 1 - trial_cost / cost, True
-                    moves = trial_theta - theta, [b - a for a, b in zip(nuisance, trial_nuisance, strict=True)]
+                    moves = (
+                        trial_theta - theta,
+                        [b - a for a, b in zip(nuisance, trial_nuisance, strict=True)],
+                    )
                     foretold = self._foretold(residual, *moves)
                     hoped = 1 - self.cost(foretold, trial_nuisance, weights) / cost
                     errors = [a - b for a, b in zip(foretold, trial, strict=True)]
@@ -253,11 +272,21 @@ class Problem:
                 damping *= 10
                 if self.nfev >= self.budget or damping > 1e4:
                     break
+            if accepted and self._too_far(residual, (1 - max(gain, before)) ** (iterations - worked)):
+                break
+            before = gain
             if gain < tolerance and (secant is not None or not self.updates):
                 self.converged = True
                 break
         self.nuisance, self.last = nuisance, residual
         return theta
+
+    def _too_far(self, residual, left) -> bool:
+        """Whether the error is hopeless still when so much of its square is left."""
+        if math.isinf(self.hopeless):
+            return False
+        total, count = self.power(residual)
+        return total / count * left > self.hopeless**2
 
     def _foretold(self, residual, step, moves) -> Signals:
         """Return the residual to which the Jacobian says that a step leads."""
