@@ -268,8 +268,7 @@ def fit_windows(
     problem.round(theta)
     if not errors or problem.slopes is None or not names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
-    slopes = problem.linearize(theta)
-    covariance, null = covariance_of(problem, problem.tangent(), *slopes)
+    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
@@ -308,17 +307,14 @@ def _candidate(problem: Problem, theta, central) -> Candidate:
     """Return the outcome with covariance, from derivatives about the solution."""
     if not problem.names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
-    slopes = problem.linearize(theta, central=central, anew=True)
-    covariance, null = covariance_of(problem, problem.tangent(), *slopes)
+    base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
+    problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
+    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
 def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
-    def linear():
-        problem.linearize(theta)
-        return problem.tangent()
-
     values = problem.values(theta) or {}
     residual = problem.last
     total, count = problem.power(residual)
@@ -349,5 +345,5 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
         starts=problem.nuisance,
         windows=problem.windows,
-        linear=linear if problem.slopes is not None and problem.names else None,
+        linear=problem.tangent if problem.slopes is not None and problem.names else None,
     )

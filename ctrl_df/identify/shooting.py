@@ -9,7 +9,6 @@ about the noise: far above the roughness that events leave in the cost.
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any
 
@@ -27,10 +26,6 @@ Signals = list[np.ndarray]
 
 # Laws whose events make single windows go lost, and the cost a row of valleys.
 ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck", "load_friction"})
-
-# Error of what a Jacobian foretells of the gain of a step, up to which it is good for another one: what such
-# steps leave is no more than the last of them gained.
-_FORETOLD = 0.5
 
 
 class Problem:
@@ -59,7 +54,6 @@ class Problem:
         self.widest: list[np.ndarray] = []
         self.last: Signals = []
         self.slopes: tuple[list, list] | None = None
-        self.updates = 0  # of these since they were worked out
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
 
     def start(self) -> np.ndarray:
@@ -143,16 +137,6 @@ class Problem:
                 mean[:, simulator.nuisances.index("slack")] = 0.5
         return means
 
-    def linearize(self, theta, *, central=False, anew=False):
-        """Return the derivatives about the last step of `solve`, worked out and not brought up to date.
-
-        `anew`: about its solution `theta`; `central`: by central differences.
-        """
-        if anew or self.updates or self.slopes is None:
-            base = [m - e for m, e in zip(self.measured, self.last, strict=True)]
-            self.slopes, self.updates = self.jacobian(theta, self.nuisance, base, central), 0
-        return self.slopes
-
     def tangent(self) -> Tangent:
         """Return the linear map about the last step of `solve`."""
         assert self.slopes is not None
@@ -189,13 +173,13 @@ class Problem:
         A window whose start lies in a wrong valley pulls the parameters to where it can never leave that
         valley. What is better is kept.
         """
-        kept = theta, self.nuisance, self.last, self.slopes, self.updates, self.converged
+        kept = theta, self.nuisance, self.last, self.slopes, self.converged
         trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
         rescue(self, trial)
         trial = self._descend(trial, iterations, tolerance, robust)
         if power(self.last) < power(kept[2]):
             return trial
-        theta, self.nuisance, self.last, self.slopes, self.updates, self.converged = kept
+        theta, self.nuisance, self.last, self.slopes, self.converged = kept
         return theta
 
     def _worth_a_rescue(self) -> bool:
@@ -220,35 +204,22 @@ class Problem:
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):
-        """Levenberg-Marquardt.
-
-        As long as a Jacobian foretells what steps gain it is brought up to date by what they showed (Broyden)
-        instead of worked out anew.
-        """
-        damping, self.converged = 1e-3, False
+        damping, before, self.converged = 1e-3, 0.0, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
         if not self.names and not any(a.size for a in nuisance):
             iterations = 0
-        # so many updates replace a Jacobian, and so many runs are one
-        columns = len(self.names) + max((a.shape[1] for a in nuisance), default=0)
-        worked, before, secant = 0.0, 0.0, None
-        while worked < iterations and self.nfev < self.budget:
-            weights = self._weights(residual, robust and worked > 0)
+        for iteration in range(iterations):
+            if self.nfev >= self.budget:
+                break
+            weights = self._weights(residual, robust and iteration > 0)
             if trusts is not None:
                 weights = [w * t for w, t in zip(weights, trusts, strict=True)]
             cost = self.cost(residual, nuisance, weights)
-            if secant is None or self.updates >= columns:
-                base = [m - e for m, e in zip(self.measured, residual, strict=True)]
-                self.slopes, self.updates = self.jacobian(theta, nuisance, base), 0
-                worked += 1
-            else:
-                self.slopes = secant()
-                self.updates += 1
-                worked += 1 / (1 + columns)
-            jp, js = self.slopes
-            gain, accepted, secant = 0.0, False, None
-            for _attempt in range(1 if self.updates else 6):
+            base = [m - e for m, e in zip(self.measured, residual, strict=True)]
+            self.slopes = jp, js = self.jacobian(theta, nuisance, base)
+            gain, accepted = 0.0, False
+            for _attempt in range(6):
                 h, g, back = self.normal(jp, js, residual, weights, nuisance, damping)
                 step = self._step(h, g, theta, damping)
                 trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
@@ -257,27 +228,18 @@ class Problem:
                 trial_cost = self.cost(trial, trial_nuisance, weights)
                 if trial_cost < cost:
                     gain, accepted = 1 - trial_cost / cost, True
-                    moves = (
-                        trial_theta - theta,
-                        [b - a for a, b in zip(nuisance, trial_nuisance, strict=True)],
-                    )
-                    foretold = self._foretold(residual, *moves)
-                    hoped = 1 - self.cost(foretold, trial_nuisance, weights) / cost
-                    errors = [a - b for a, b in zip(foretold, trial, strict=True)]
-                    if abs(gain - hoped) < _FORETOLD * hoped:
-                        secant = functools.partial(self._secant, *moves, errors)
                     theta, nuisance, residual = trial_theta, trial_nuisance, trial
                     damping = max(damping / 10, 1e-7)
                     break
                 damping *= 10
                 if self.nfev >= self.budget or damping > 1e4:
                     break
-            if accepted and self._too_far(residual, (1 - max(gain, before)) ** (iterations - worked)):
-                break
-            before = gain
-            if gain < tolerance and (secant is not None or not self.updates):
+            if not accepted or gain < tolerance:
                 self.converged = True
                 break
+            if self._too_far(residual, (1 - max(gain, before)) ** (iterations - iteration - 1)):
+                break
+            before = gain
         self.nuisance, self.last = nuisance, residual
         return theta
 
@@ -287,39 +249,6 @@ class Problem:
             return False
         total, count = self.power(residual)
         return total / count * left > self.hopeless**2
-
-    def _foretold(self, residual, step, moves) -> Signals:
-        """Return the residual to which the Jacobian says that a step leads."""
-        jp, js = self.slopes or ([], [])
-        return [
-            e - jp[k] @ step - np.sum(js[k] * self._on_samples(k, moves[k]), axis=1)
-            for k, e in enumerate(residual)
-        ]
-
-    def _secant(self, step, moves, errors):
-        """Return the Jacobian that would have foretold where a step led, `errors` (n,) off, window by window.
-
-        Broyden's update in the metric of the outputs: a column takes its share of the error by the square of
-        what it contributed to the step.
-        """
-        by_parameter, by_start = [], []
-        for k, (jp, js) in enumerate(zip(*(self.slopes or ([], [])), strict=True)):
-            windows = self.windows[k]
-            lengths = windows.ends - windows.begins
-            begins = np.concatenate(([0], np.cumsum(lengths)[:-1]))
-            moved = np.column_stack((np.broadcast_to(step, (len(windows), len(step))), moves[k]))
-            columns = np.column_stack((jp, js))
-            powers = np.add.reduceat(columns**2, begins, axis=0) * moved**2
-            total = np.maximum(powers.sum(axis=1, keepdims=True), 1e-300)
-            shares = np.divide(powers / total, moved, out=np.zeros_like(moved), where=moved != 0)
-            columns += errors[k][:, None] * np.repeat(shares, lengths, axis=0)
-            by_parameter.append(columns[:, : len(step)])
-            by_start.append(columns[:, len(step) :])
-        return by_parameter, by_start
-
-    def _on_samples(self, k, values) -> np.ndarray:
-        """Return values (nw, m), one a window, at the samples (n, m) of one record."""
-        return np.repeat(values, self.windows[k].ends - self.windows[k].begins, axis=0)
 
     def count(self, runs):
         """Count simulations that seek initial states: bounded by themselves, outside the descent's budget."""
