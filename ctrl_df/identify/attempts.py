@@ -1,7 +1,7 @@
 """Every effect tried: fits from many starts begun, those with a chance brought to their end.
 
-The fits of all effects run side by side in three rounds: a few steps of every start, the two that are then
-ahead to their end, and the rest against them. Which fits these are follows from the data alone, so that
+The fits of all effects run side by side in rounds: a few steps of every start, the two that are then ahead to
+their end, and the rest against them. Which fits these are follows from the data alone, so that
 results are the same however many run at once.
 """
 
@@ -120,11 +120,16 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     begun = run(_begin, jobs)
     attempts = _best([a for found in begun for a in found if a.fit is not None], _JOINTS)
     attempts += [a for found in begun for a in found if a.fit is None]
-    begun = [a for a in run(_first, attempts) if itself(a.trial, span)]
-    begun = _best(begun, _KEPT)
+    # those of few steps first: what they come to tells of the others which need no long look
+    short = [a for a in attempts if a.key not in _CURVED]
+    begun = run(_first, [(a, np.inf) for a in short])
+    least = min((a.error for a in begun), default=np.inf)
+    least = min(least, screen.base.rmse)
+    begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.key in _CURVED])
+    begun = _best([a for a in begun if itself(a.trial, span)], _KEPT)
     ahead = [a for a in _best(begun, 1)][:2]
     found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
-    least = min((t.train.rmse for t in found), default=np.inf)
+    least = min([least, *(t.train.rmse for t in found)])
     rest = [a for a in begun if not any(a is o for o in ahead)]
     found += run(_finish, [(a, screen.data, HOPELESS * least) for a in rest])
     best = {}
@@ -201,15 +206,16 @@ def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
     return Attempt(key, block, names, screen.data, 6, 1e-2, len(added), begin)
 
 
-def _first(attempt: Attempt) -> Attempt:
-    """Take the first steps."""
-    return _on(attempt, min(_BEGUN, attempt.steps), np.inf)
+def _first(job) -> Attempt:
+    """Take the first steps, fewer where all would not lead to an error below `hopeless` at their pace."""
+    attempt, hopeless = job
+    return _on(attempt, min(_BEGUN, attempt.steps), hopeless)
 
 
 def _on(attempt: Attempt, steps, hopeless) -> Attempt:
     fit = attempt.data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
-        hopeless=hopeless,
+        hopeless=hopeless, outlook=attempt.steps - steps,
     )  # fmt: skip
     left = 0 if fit.converged else attempt.steps - steps
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)

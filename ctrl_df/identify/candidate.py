@@ -231,6 +231,7 @@ def fit_windows(
     colour: NoiseModel | None = None,
     begins: str = FITTED,
     hopeless: float = math.inf,
+    outlook: int = 0,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage.
 
@@ -256,13 +257,16 @@ def fit_windows(
     begins : str
         How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
     hopeless : float
-        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there.
+        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there
+        at the pace of its last steps.
+    outlook : int
+        Iterations that are to follow in other fits.
 
     Returns
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, colour, begins, hopeless)
+    problem = Problem(model, records, names, 100_000, limits, colour, begins, (hopeless, outlook))
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

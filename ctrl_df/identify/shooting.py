@@ -36,10 +36,11 @@ class Problem:
     """
 
     def __init__(
-        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=math.inf
+        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=(math.inf, 0)
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.colour, self.begins, self.hopeless = colour, begins, hopeless
+        self.colour, self.begins = colour, begins
+        self.hopeless, self.outlook = hopeless
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -237,7 +238,8 @@ class Problem:
             if not accepted or gain < tolerance:
                 self.converged = True
                 break
-            if self._too_far(residual, (1 - max(gain, before)) ** (iterations - iteration - 1)):
+            left = iterations - iteration - 1 + self.outlook
+            if self._too_far(residual, (1 - max(gain, before)) ** left):
                 break
             before = gain
         self.nuisance, self.last = nuisance, residual

@@ -212,14 +212,23 @@ class Data:
         return any(self.simulator(block, r).chained for r in self.train.records)
 
     def fit(
-        self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3, hopeless=math.inf
+        self,
+        block,
+        names,
+        *,
+        view=None,
+        starts=None,
+        iterations=12,
+        tolerance=1e-3,
+        hopeless=math.inf,
+        outlook=0,
     ) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
-            begins=self.begins, hopeless=hopeless,
+            begins=self.begins, hopeless=hopeless, outlook=outlook,
         )  # fmt: skip
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3, hopeless=math.inf) -> Candidate:
