@@ -67,6 +67,8 @@ class Attempt:
         Initial states with which it begins.
     fit : Candidate or None
         What it has come to.
+    nominal : bool
+        Whether it begins at the user's values.
     """
 
     key: str
@@ -78,6 +80,7 @@ class Attempt:
     extra: int
     starts: list[np.ndarray] | None = None
     fit: Candidate | None = None
+    nominal: bool = False
 
     @property
     def error(self) -> float:
@@ -126,7 +129,11 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     least = min((a.error for a in begun), default=np.inf)
     least = min(least, screen.base.rmse)
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.key in _CURVED])
-    begun = _best([a for a in begun if itself(a.trial, span)], _KEPT)
+    begun = [a for a in begun if itself(a.trial, span)]
+    kept = _best(begun, _KEPT)
+    # few steps from where the user begins tell little: the baseline may have ended in another valley
+    own = _best([a for a in begun if a.nominal], 1)
+    begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
     ahead = [a for a in _best(begun, 1)][:2]
     found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
     least = min([least, *(t.train.rmse for t in found)])
@@ -185,7 +192,8 @@ def _begin(job) -> list[Attempt]:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user
         # does.
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
-            found.append(_from(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free))
+            attempt = _from(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
+            found.append(attempt and replace(attempt, nominal=True))
     return [a for a in found if a is not None]
 
 
@@ -215,9 +223,9 @@ def _first(job) -> Attempt:
 def _on(attempt: Attempt, steps, hopeless) -> Attempt:
     fit = attempt.data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
-        hopeless=hopeless, outlook=attempt.steps - steps,
+        hopeless=hopeless, outlook=attempt.steps if steps < attempt.steps else 0,
     )  # fmt: skip
-    left = 0 if fit.converged else attempt.steps - steps
+    left = 0 if fit.converged else attempt.steps
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)
 
 

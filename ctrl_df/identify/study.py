@@ -225,7 +225,7 @@ class Study:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
         fine = self.data.fine
         pairs = [(t, best) for best in those for t in chosen if t is not best]
-        begun = side_by_side(lambda pair: begun_at(*pair, fine), pairs)
+        begun = side_by_side(lambda pair: begun_at(pair[0], pair[1], fine), pairs)
         judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 

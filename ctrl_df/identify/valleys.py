@@ -101,12 +101,24 @@ def all_hopped(fits, data: Data, floor: float) -> list:
     lost = [floor < f.rmse < HOPELESS * least for f in fits]
     hopeless = NEAR * least
     base = hopped(fits[0], data.fit, rough(fits[0]), hopeless) if lost[0] else fits[0]
-    which = own if base is fits[0] else rough
+    values = {k: base.parameters[k] for k in rough(base)} if base is not fits[0] else {}
     others = side_by_side(
-        lambda pair: hopped(pair[0], data.fit, which(pair[0]), hopeless) if pair[1] else pair[0],
+        lambda pair: _other(pair[0], data, values, hopeless) if pair[1] else pair[0],
         zip(fits[1:], lost[1:], strict=True),
     )
     return [base, *others]
+
+
+def _other(found: Candidate, data: Data, values, hopeless: float) -> Candidate:
+    """Return a fit in its best valley; `values`: of what it shares with the baseline, if that has hopped."""
+    table = found.model.parameters
+    shared = {k: v for k, v in values.items() if k in table}
+    if shared:
+        model = found.model.with_parameters(feasible(found.model, shared))
+        near = data.fit(model, (), starts=found.starts, iterations=4, hopeless=hopeless)
+        again = data.fit(model, found.names, starts=near.starts, iterations=6, hopeless=hopeless)
+        found = min(found, again, key=lambda f: f.rmse)
+    return hopped(found, data.fit, own(found), hopeless)
 
 
 def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
