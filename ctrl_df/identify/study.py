@@ -182,7 +182,7 @@ class Study:
         """
         shortest, middle, longest = self.levels
         short = side_by_side(shortest.moved, fits)
-        floor = _FLOOR * min(_deviation(f) for f in short)
+        floor = _FLOOR * min(f.rmse for f in short)
         if self.data.forced:
             return [short], floor
         near = self._stage(middle, fits, short, floor)
@@ -275,12 +275,6 @@ def _longest_coherent(stages) -> int:
     if at + 1 < len(errors) and best[at] > 0.8 * base[at] and _left(base, best, at) > _left(base, best, -1):
         return len(errors) - 1
     return at
-
-
-def _deviation(found: Candidate) -> float:
-    """Return the error of a fit with the degrees of freedom given back that its initial states take."""
-    free = len(found.names) + sum(a.size for a in found.starts)
-    return found.rmse / math.sqrt(max(1 - free / found.count, 0.5))
 
 
 def _left(base, best, at) -> float:
