@@ -17,7 +17,7 @@ from .regression import force_regression, motion_of
 from .screen import Screen
 from .simulator import feasible
 from .trial import FORCED, Data, Trial, prepare
-from .valleys import HOPELESS, NEAR, all_hopped, begun_at, hopped, own, settled
+from .valleys import HOPELESS, NEAR, all_hopped, begun_at, beyond, hopped, own, settled
 
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
@@ -218,7 +218,7 @@ class Study:
         if exactly:
             fit = fine.moved(fit, 8, 1e-6)
         if own(fit) and fit.rmse > floor and least > floor and not fine.forced:
-            fit = hopped(fit, fine.fit, own(fit), NEAR * least)
+            fit = hopped(fit, fine.fit, own(fit), beyond(fit, least))
         return settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
 
     def _again(self, chosen, those) -> list[Trial]:

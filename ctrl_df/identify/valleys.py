@@ -86,6 +86,14 @@ def hopped(
     return found
 
 
+def beyond(found: Candidate, least: float) -> float:
+    """Return the error above which other valleys of a fit are of no use; `least`: that of the best fit.
+
+    The best one itself tries all of them to their end.
+    """
+    return NEAR * least if found.rmse > least else math.inf
+
+
 def _on(begun: Candidate, fit, names, hopeless) -> Candidate:
     return fit(begun.model, names, starts=begun.starts, iterations=4, hopeless=hopeless)
 
@@ -99,11 +107,10 @@ def all_hopped(fits, data: Data, floor: float) -> list:
     if least <= floor:
         return list(fits)
     lost = [floor < f.rmse < HOPELESS * least for f in fits]
-    hopeless = NEAR * least
-    base = hopped(fits[0], data.fit, rough(fits[0]), hopeless) if lost[0] else fits[0]
+    base = hopped(fits[0], data.fit, rough(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
     values = {k: base.parameters[k] for k in rough(base)} if base is not fits[0] else {}
     others = side_by_side(
-        lambda pair: _other(pair[0], data, values, hopeless) if pair[1] else pair[0],
+        lambda pair: _other(pair[0], data, values, beyond(pair[0], least)) if pair[1] else pair[0],
         zip(fits[1:], lost[1:], strict=True),
     )
     return [base, *others]
