@@ -12,6 +12,7 @@ for _name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 import contextlib  # noqa: E402
+import json  # noqa: E402
 import platform  # noqa: E402
 import shutil  # noqa: E402
 import statistics  # noqa: E402
@@ -497,6 +498,15 @@ def batches() -> None:
         row(f"{what}, two cores, wall", f"{two:.2f} x, {cores:.1f} cores to be had", "0.4 x", two <= 0.4)
 
 
+def diagnoses() -> None:
+    """Time `diagnose` and `improve` on two cores, in a process that may use them."""
+    command = [sys.executable, str(Path(__file__).with_name("studies.py"))]
+    cores = {**os.environ, "NUMBA_NUM_THREADS": "2"}
+    done = subprocess.run(command, env=cores, check=True, capture_output=True, text=True)
+    for line in done.stdout.splitlines():
+        row(*json.loads(line))
+
+
 def imports() -> None:
     """Import time beyond python-control's, and the first family of a fresh process."""
     timed = "import time, control; t = time.perf_counter(); import ctrl_df; print(time.perf_counter() - t)"
@@ -535,6 +545,7 @@ def main() -> int:
         records,
         against_c,
         batches,
+        diagnoses,
         imports,
     ]
     chosen = [p for p in parts if not sys.argv[1:] or p.__name__ in sys.argv[1:]]

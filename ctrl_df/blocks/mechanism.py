@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -100,6 +100,10 @@ class Mechanism(ct.NonlinearIOSystem):
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Ordered mapping of name (``mass``, ``coulomb.level``, ...) to `Parameter` (value, unit, bounds)."""
+        return self._parameters
+
+    @cached_property
+    def _parameters(self) -> Mapping[str, Parameter]:
         table = {
             k: self._own(Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}))
             for k, v in self._values.items()

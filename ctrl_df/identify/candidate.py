@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,8 @@ class Candidate:
         Initial states, as corrections (see `Simulator.run`).
     windows : list of Windows
         Where the model was started anew.
-    tangent : Tangent or None
-        The fitted model as a linear map of its parameters and initial states.
+    linear : callable or None
+        Works out `tangent`, once it is asked for.
     """
 
     model: Any
@@ -81,7 +82,16 @@ class Candidate:
     scale: np.ndarray
     starts: list
     windows: list
-    tangent: Tangent | None = field(repr=False, default=None)
+    linear: Callable[[], Tangent] | None = field(repr=False, default=None)
+
+    @cached_property
+    def tangent(self) -> Tangent | None:
+        """The fitted model as a linear map of its parameters and initial states; None without parameters."""
+        return self.linear() if self.linear is not None else None
+
+    def __getstate__(self):
+        # what works it out stays behind with the simulations of the fit
+        return {**self.__dict__, "tangent": self.__dict__.get("tangent"), "linear": None}
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
@@ -220,6 +230,8 @@ def fit_windows(
     errors: bool = False,
     colour: NoiseModel | None = None,
     begins: str = FITTED,
+    hopeless: float = math.inf,
+    outlook: int = 0,
 ) -> Candidate:
     """Fit the named parameters over given windows in one stage.
 
@@ -244,12 +256,17 @@ def fit_windows(
         The `force_errors` whose squares are made least, where the machine's own forces make the error.
     begins : str
         How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+    hopeless : float
+        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there
+        at the pace of its last steps.
+    outlook : int
+        Iterations that are to follow in other fits.
 
     Returns
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, colour, begins)
+    problem = Problem(model, records, names, 100_000, limits, colour, begins, (hopeless, outlook))
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)
@@ -332,5 +349,5 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
         starts=problem.nuisance,
         windows=problem.windows,
-        tangent=problem.tangent() if problem.slopes is not None and problem.names else None,
+        linear=problem.tangent if problem.slopes is not None and problem.names else None,
     )

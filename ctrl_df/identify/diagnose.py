@@ -60,7 +60,7 @@ def diagnose(
         Parameters of the model that may be refitted, by name or by effect id, as for `refit`; None: all that
         are free.
     executor : concurrent.futures.Executor or None
-        Runs candidates side by side.
+        Runs candidates side by side; None: threads of this process do.
     limits : mapping or None
         ``force`` [N] and ``stroke`` [m] for `next_experiment`.
 

@@ -6,8 +6,6 @@ begin a factor away from the resonance end in other valleys. Its frequency is wh
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from ..blocks.effects import Compliance
@@ -22,13 +20,23 @@ RATES = np.geomspace(1.5, 40.0, 12)
 DAMPING = 0.1
 
 
-def resonant(screen: Screen, count: int) -> list[Candidate]:
-    """Return the baseline with the joints that fit best, their parameters as tried, initial states fitted."""
+# Iterations of all, more of the best of them, and how many these are.
+_LINEAR, _FITTED, _BEST = 1, 2, 4
+
+
+def resonant(screen: Screen, share: float, count: int) -> list[Candidate]:
+    """Return the baseline with the joints that fit best, as many as `count`: initial states alone fitted.
+
+    `share`: of the mass, behind the joint; one of `SHARES`. Initial states are all but linear: one step tells
+    which joints to look at again.
+    """
     scales, found = screen.scales, []
-    for share, rate in itertools.product(SHARES, RATES * scales.speed / scales.position):
-        reduced = share * (1 - share) * scales.mass
+    reduced = share * (1 - share) * scales.mass
+    for rate in RATES * scales.speed / scales.position:
         stiffness = reduced * rate**2
         block = attach(screen.block, Compliance(stiffness, 2 * DAMPING * reduced * rate, share))
         if block is not None:
-            found.append(screen.data.fit(block, (), iterations=3, tolerance=3e-2))
-    return sorted(found, key=lambda f: f.rmse)[:count]
+            found.append(screen.data.fit(block, (), iterations=_LINEAR, tolerance=3e-2))
+    near = sorted(found, key=lambda f: f.rmse)[:_BEST]
+    again = [screen.data.fit(f.model, (), starts=f.starts, iterations=_FITTED, tolerance=3e-2) for f in near]
+    return sorted(again, key=lambda f: f.rmse)[:count]

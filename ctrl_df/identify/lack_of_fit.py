@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..simulate.crew import side_by_side
 from .noise import NoiseModel, noise_model
 from .trial import Data, Trial
 
@@ -60,9 +61,11 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
         return []
     scene = _Scene(tried, data)
     residual = tangent.project(tried.train.residual)
-    tables = []
-    for kind, families in scene.kinds():
-        answers = [[(tangent.project(scene.response(s)), span) for s, span in family] for family in families]
+    kinds, tables = list(scene.kinds()), []
+    shapes = [shape for _, families in kinds for family in families for shape, _ in family]
+    changes = iter(side_by_side(lambda shape: tangent.project(scene.response(shape)), shapes))
+    for kind, families in kinds:
+        answers = [[(next(changes), span) for _, span in family] for family in families]
         if len(answers) > 1:
             answers.append([a for family in answers for a in family])
         for family in answers:

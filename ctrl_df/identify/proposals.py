@@ -139,7 +139,7 @@ def _quantization(screen):
     count = int(min(max((1 / low - 1 / high) * span * 6, 10), 4000))
     inverse = np.linspace(1 / high, 1 / low, count)
     some = y[:: max(1, len(y) // 4000)]
-    contrast = np.array([abs(np.mean(np.exp(2j * math.pi * some * q))) for q in inverse])
+    contrast = _contrast(some, inverse)
     # Finer grids that hold this one fit as well: of all that stand out, the coarsest.
     inner = contrast[1:-1]
     tops = 1 + np.flatnonzero(
@@ -147,8 +147,18 @@ def _quantization(screen):
     )
     at = int(tops[0]) if len(tops) else int(np.argmax(contrast))
     fine = np.linspace(inverse[max(at - 1, 0)], inverse[min(at + 1, count - 1)], 201)
-    value = [abs(np.mean(np.exp(2j * math.pi * some * q))) for q in fine]
-    return [library.SensorQuantization(1 / fine[int(np.argmax(value))])]
+    return [library.SensorQuantization(1 / fine[int(np.argmax(_contrast(some, fine)))])]
+
+
+def _contrast(values, inverse) -> np.ndarray:
+    """Return how well values keep to grids of the steps ``1 / inverse``, evenly spaced: 1 on the grid."""
+    phases = np.exp(2j * math.pi * values * inverse[0])
+    turn = np.exp(2j * math.pi * values * (inverse[1] - inverse[0]))
+    found = np.empty(len(inverse))
+    for i in range(len(inverse)):
+        found[i] = abs(np.mean(phases))
+        phases *= turn
+    return found
 
 
 def _ripple(screen):

@@ -225,10 +225,11 @@ class _Beside:
     def __init__(self, records, windows):
         self.records, self.windows = records, windows
 
-    def __call__(self, model, names, *, starts, iterations) -> Candidate:
+    def __call__(self, model, names, *, starts, iterations, hopeless) -> Candidate:
         return fit_windows(
-            model, self.records, self.windows, names, thin=1, starts=starts, iterations=iterations
-        )
+            model, self.records, self.windows, names, thin=1, starts=starts, iterations=iterations,
+            hopeless=hopeless,
+        )  # fmt: skip
 
 
 def _fitted_model(model, records):

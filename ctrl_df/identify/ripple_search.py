@@ -14,6 +14,7 @@ position resolves.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -172,13 +173,18 @@ class WaveSearch:
             for i, j in runs:
                 d = np.diff(s[i:j].reshape(-1, self._size).mean(axis=1), 2)
                 # faded at the ends: sensor noise is a million times stronger at high than at low frequencies
-                parts.append(d * np.hanning(len(d)) ** 0.25)
+                parts.append(d * _fade(len(d)))
         return parts
 
     def _white(self, parts) -> np.ndarray:
         """Return the weighted spectra of parts, real and imaginary."""
         spectra = [np.fft.rfft(s, _length(s)) * w for s, w in zip(parts, self._weights, strict=True)]
         return np.concatenate([c for s in spectra for c in (s.real, s.imag)])
+
+
+@functools.lru_cache(maxsize=64)
+def _fade(length: int) -> np.ndarray:
+    return np.hanning(length) ** 0.25
 
 
 def _forces(record, place) -> list[np.ndarray]:

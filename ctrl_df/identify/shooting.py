@@ -17,7 +17,7 @@ import numpy as np
 from .initial_states import FITTED
 from .noise import power
 from .simulator import Simulator, feasible
-from .start_search import rescue, scan_slack
+from .start_search import GOOD, rescue, scan_slack
 from .tangent import Tangent
 from .variables import variables_of
 from .windows import Windows, facts
@@ -35,9 +35,12 @@ class Problem:
     initial states, `slopes` the derivatives of the last step.
     """
 
-    def __init__(self, model, records, names, budget, limits=None, colour=None, begins=FITTED):
+    def __init__(
+        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=(math.inf, 0)
+    ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.colour, self.begins = colour, begins
+        self.hopeless, self.outlook = hopeless
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -152,11 +155,16 @@ class Problem:
         again = max(iterations // 2, 3)
         # without parameters a window found lets the next one go on where it ends
         for _ in range(1 if self.names else 4):
-            if not rescue(self, theta):
+            if not self._worth_a_rescue() or not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
         rough = ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names and self.colour is None
-        if rough and self.nfev < self.budget and any(t.min() < 0.5 for t in self._trusts()):
+        if (
+            rough
+            and self._worth_a_rescue()
+            and self.nfev < self.budget
+            and any(t.min() < 0.5 for t in self._trusts())
+        ):
             theta = self._without_the_lost(theta, again, tolerance, robust)
         return theta
 
@@ -175,11 +183,18 @@ class Problem:
         theta, self.nuisance, self.last, self.slopes, self.converged = kept
         return theta
 
+    def _worth_a_rescue(self) -> bool:
+        """Whether the error could come below what is hopeless if all windows erred like the good ones."""
+        if self.colour is not None or math.isinf(self.hopeless):
+            return True
+        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.windows, self.last, strict=True)]
+        return float(np.quantile(np.concatenate(rms), GOOD)) < self.hopeless
+
     def _trusts(self) -> Signals:
         """Return weights of the samples (n,): 1 in windows that err like the rest, less in worse ones."""
         trusts = []
         for windows, e in zip(self.windows, self.last, strict=True):
-            power = np.array([float(np.mean(e[w] ** 2)) for w in windows.slices])
+            power = windows.means(e**2)
             usual = max(float(np.median(power)), self.noise**2)
             trusts.append(
                 np.repeat(
@@ -190,7 +205,7 @@ class Problem:
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):
-        damping, self.converged = 1e-3, False
+        damping, before, self.converged = 1e-3, 0.0, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
         if not self.names and not any(a.size for a in nuisance):
@@ -223,8 +238,19 @@ class Problem:
             if not accepted or gain < tolerance:
                 self.converged = True
                 break
+            left = iterations - iteration - 1 + self.outlook
+            if self._too_far(residual, (1 - max(gain, before)) ** left):
+                break
+            before = gain
         self.nuisance, self.last = nuisance, residual
         return theta
+
+    def _too_far(self, residual, left) -> bool:
+        """Whether the error is hopeless still when so much of its square is left."""
+        if math.isinf(self.hopeless):
+            return False
+        total, count = self.power(residual)
+        return total / count * left > self.hopeless**2
 
     def count(self, runs):
         """Count simulations that seek initial states: bounded by themselves, outside the descent's budget."""

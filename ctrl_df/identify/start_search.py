@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
+
+GOOD = 0.25
+"""Share of the windows that are taken to be right when others are compared with them."""
 
 # Speeds to begin a window with, over how far the estimate may be off.
 _SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
@@ -26,8 +28,8 @@ def rescue(problem, theta) -> bool:
         if "v" not in simulator.nuisances or simulator.chained:
             continue
         column, windows, starts = simulator.nuisances.index("v"), problem.windows[k], problem.nuisance[k]
-        rms = np.array([math.sqrt(float(np.mean(problem.last[k][w] ** 2))) for w in windows.slices])
-        bad = (rms > 1.5 * np.quantile(rms, 0.25)) & (rms > 2 * problem.noise)
+        rms = np.sqrt(windows.means(problem.last[k] ** 2))
+        bad = (rms > 1.5 * np.quantile(rms, GOOD)) & (rms > 2 * problem.noise)
         if not bad.any():
             continue
         some = windows.only(bad)
@@ -44,16 +46,17 @@ def rescue(problem, theta) -> bool:
         if "slack" in simulator.nuisances:
             at = simulator.nuisances.index("slack")
             tries += [(slice(at, at + 2), pair) for pair in _slacks(problem, k)]
-        for which, value in tries:
-            trial = starts[bad].copy()
+        trials = [starts[bad].copy() for _ in tries]
+        for trial, (which, value) in zip(trials, tries, strict=True):
             trial[:, which] = value
-            e = measured - simulator.run(some, values, trial)
-            for w, where in enumerate(some.slices):
-                shift = 0.0 if simulator.tied else float(np.mean(e[where]))
-                power = float(np.mean((e[where] - shift) ** 2))
-                if power < least[w]:
-                    least[w], chosen[w], found = power, trial[w], True
-                    chosen[w, 0] += shift
+        for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
+            e = measured - y
+            shift = np.zeros(len(some)) if simulator.tied else some.means(e)
+            powers = some.means(e**2) - shift**2
+            better = powers < least
+            trial[:, 0] += shift
+            chosen[better], least = trial[better], np.minimum(least, powers)
+            found = found or bool(better.any())
         starts[bad] = chosen
         problem.count(len(tries) * len(some) / len(windows))
     return found
@@ -67,11 +70,12 @@ def scan_slack(problem, theta):
         at = simulator.nuisances.index("slack")
         windows, chosen = problem.windows[k], problem.nuisance[k].copy()
         least, values, tries = np.full(len(windows), np.inf), problem.values(theta), _slacks(problem, k)
-        for place, rate in tries:
-            trial = problem.nuisance[k].copy()
-            trial[:, at], trial[:, at + 1] = place, rate
-            e = problem.measured[k] - simulator.run(windows, values, trial)
-            errors = np.array([np.sum((e[w] - e[w].mean()) ** 2) for w in windows.slices])
+        trials = [problem.nuisance[k].copy() for _ in tries]
+        for trial, slack in zip(trials, tries, strict=True):
+            trial[:, at : at + 2] = slack
+        for trial, y in zip(trials, simulator.run_all([(windows, values, t) for t in trials]), strict=True):
+            e = problem.measured[k] - y
+            errors = windows.means(e**2) - windows.means(e) ** 2
             better = errors < least
             chosen[better], least = trial[better], np.minimum(least, errors)
         problem.nuisance[k] = chosen

@@ -211,22 +211,37 @@ class Data:
         """Whether the block has hidden states that go on from window to window."""
         return any(self.simulator(block, r).chained for r in self.train.records)
 
-    def fit(self, block, names, *, view=None, starts=None, iterations=12, tolerance=1e-3) -> Candidate:
+    def fit(
+        self,
+        block,
+        names,
+        *,
+        view=None,
+        starts=None,
+        iterations=12,
+        tolerance=1e-3,
+        hopeless=math.inf,
+        outlook=0,
+    ) -> Candidate:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
-            begins=self.begins,
+            begins=self.begins, hopeless=hopeless, outlook=outlook,
         )  # fmt: skip
 
-    def moved(self, found: Candidate, iterations=6, tolerance=5e-3) -> Candidate:
+    def moved(self, found: Candidate, iterations=6, tolerance=5e-3, hopeless=math.inf) -> Candidate:
         """Fit a model found over other windows to these; those that begin at one sample share states."""
         starts = same_begins(found, self.train.windows)
         if sum(map(len, self.train.windows)) > sum(map(len, found.windows)):
             # The initial states of new windows first: parameters would bend to make up for them.
-            starts = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2).starts
-        return self.fit(found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance)
+            states = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2, hopeless=hopeless)
+            starts = states.starts
+        return self.fit(
+            found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance,
+            hopeless=hopeless,
+        )  # fmt: skip
 
     def judged(self, tried: Trial) -> Trial:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""

@@ -7,11 +7,14 @@ away.
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from ..simulate.crew import side_by_side
 from .candidate import Candidate
 from .shooting import ROUGH
 from .simulator import feasible
@@ -25,7 +28,12 @@ _SHARED = "load_friction.level"
 
 _HOPS = (0.6, 0.8, 1.25, 1.6)
 _SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
-_HOPELESS = 3.0  # error over the best candidate's beyond which another try is not worth it
+HOPELESS = 3.0
+"""Error over the best candidate's beyond which another try is not worth it."""
+
+NEAR = 1.5
+"""Error over the best candidate's up to which another may yet turn out to be the right one."""
+
 _AGAIN = 2  # times that a parameter that found a better valley is moved once more
 _TRIED = 3  # of the hops along one parameter: those that begin best
 _WORTH = 0.99  # error over the one before that counts as a better valley
@@ -44,32 +52,50 @@ def own(found: Candidate) -> list[str]:
     return [name for name in rough(found) if name.startswith(last)]
 
 
-def hopped(found: Candidate, fit: Callable[..., Candidate], names: list[str]) -> Candidate:
+def hopped(
+    found: Candidate, fit: Callable[..., Candidate], names: list[str], hopeless: float = math.inf
+) -> Candidate:
     """Return the best of the fits that begin beside `found`, one rough parameter moved at a time; or itself.
 
     Parameters
     ----------
     found : Candidate
     fit : callable
-        ``fit(model, names, starts=, iterations=)`` over the windows of `found`.
+        ``fit(model, names, starts=, iterations=, hopeless=)`` over the windows of `found`.
     names : list of str
         Parameters to move.
+    hopeless : float
+        Error above which a valley is of no use.
     """
     queue = [(name, 0) for name in names]
     for name, times in queue:
         at, best = found.parameters[name], found
-        near = []
-        for factor in _SMALL if name in _THRESHOLDS else _HOPS:
-            moved = _moved(found.model, name, _within(found, name, factor * at))
-            near.append(fit(moved, (), starts=found.starts, iterations=2))
-        for begun in sorted(near, key=lambda f: f.rmse)[:_TRIED]:
-            tried = fit(begun.model, found.names, starts=begun.starts, iterations=4)
+        moved = [
+            _moved(found.model, name, _within(found, name, factor * at))
+            for factor in (_SMALL if name in _THRESHOLDS else _HOPS)
+        ]
+        starts_only = functools.partial(fit, names=(), starts=found.starts, iterations=2, hopeless=hopeless)
+        begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:_TRIED]
+        on = functools.partial(_on, fit=fit, hopeless=hopeless, names=found.names)
+        for tried in side_by_side(on, begun):
             if tried.rmse < _WORTH * best.rmse:
                 best = tried
         if best is not found and times < _AGAIN:
             queue.append((name, times + 1))
         found = best
     return found
+
+
+def beyond(found: Candidate, least: float) -> float:
+    """Return the error above which other valleys of a fit are of no use; `least`: that of the best fit.
+
+    The best one itself tries all of them to their end.
+    """
+    return NEAR * least if found.rmse > least else math.inf
+
+
+def _on(begun: Candidate, fit, names, hopeless) -> Candidate:
+    return fit(begun.model, names, starts=begun.starts, iterations=4, hopeless=hopeless)
 
 
 def all_hopped(fits, data: Data, floor: float) -> list:
@@ -80,11 +106,26 @@ def all_hopped(fits, data: Data, floor: float) -> list:
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
-    lost = [floor < f.rmse < _HOPELESS * least for f in fits]
-    base = hopped(fits[0], data.fit, rough(fits[0])) if lost[0] else fits[0]
-    which = own if base is fits[0] else rough
-    others = zip(fits[1:], lost[1:], strict=True)
-    return [base, *(hopped(f, data.fit, which(f)) if is_lost else f for f, is_lost in others)]
+    lost = [floor < f.rmse < HOPELESS * least for f in fits]
+    base = hopped(fits[0], data.fit, rough(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
+    values = {k: base.parameters[k] for k in rough(base)} if base is not fits[0] else {}
+    others = side_by_side(
+        lambda pair: _other(pair[0], data, values, beyond(pair[0], least)) if pair[1] else pair[0],
+        zip(fits[1:], lost[1:], strict=True),
+    )
+    return [base, *others]
+
+
+def _other(found: Candidate, data: Data, values, hopeless: float) -> Candidate:
+    """Return a fit in its best valley; `values`: of what it shares with the baseline, if that has hopped."""
+    table = found.model.parameters
+    shared = {k: v for k, v in values.items() if k in table}
+    if shared:
+        model = found.model.with_parameters(feasible(found.model, shared))
+        near = data.fit(model, (), starts=found.starts, iterations=4, hopeless=hopeless)
+        again = data.fit(model, found.names, starts=near.starts, iterations=6, hopeless=hopeless)
+        found = min(found, again, key=lambda f: f.rmse)
+    return hopped(found, data.fit, own(found), hopeless)
 
 
 def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
@@ -104,6 +145,8 @@ def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
         return None
     block = tried.block.with_parameters(feasible(tried.block, values))
     near = data.fit(block, (), starts=best.train.starts, iterations=4)
+    if near.rmse > HOPELESS * best.train.rmse:
+        return None
     fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
     return settled(data.judged(replace(tried, train=fitted)), data)
 
@@ -116,7 +159,7 @@ def settled(tried: Trial, data: Data) -> Trial:
         low, high = _open_range(tried.train, data.fit, name)
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, 7)
-            runs = [_with_level(tried, name, v, data) for v in values]
+            runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
             i = min(range(len(runs)), key=lambda k: runs[k].held_rmse)
             if runs[i].held_rmse < tried.held_rmse:
                 tried = runs[i]

@@ -112,6 +112,11 @@ class Windows:
         at = np.concatenate(([0], np.cumsum(self.ends - self.begins)))
         return [slice(int(i), int(j)) for i, j in zip(at[:-1], at[1:], strict=True)]
 
+    def means(self, x) -> np.ndarray:
+        """Return the mean over each window of a signal (n,) at the samples within the windows."""
+        lengths = self.ends - self.begins
+        return np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1]))) / lengths
+
     def only(self, which) -> Windows:
         """Return some of the windows; `which` a boolean array (nw,)."""
         return Windows(*(getattr(self, name)[which] for name in self.__dataclass_fields__))

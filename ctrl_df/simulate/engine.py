@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -138,8 +139,12 @@ class Engine:
         self._flat = flatten(system, values)
         self.nstates = system.nstates or 0
         self.program, self.par, self._initial, self.node_names = pack(self._flat, self.nstates)
-        self._space = driver.workspace(self.program, delays=True)
         self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
+
+    @cached_property
+    def _space(self) -> driver.Space:
+        """Scratch of runs made from here; `ctrl_df.simulate.runs` has its own."""
+        return driver.workspace(self.program, delays=True)
 
     @property
     def delayed(self) -> bool:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from collections import deque
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import wait
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba.core import config
 
 from ..status import Status
+from . import crew
+from .crew import processors
 from .engine import FAR, RTOL, STATUS
 from .groups import Group
 from .kernel import driver, many
@@ -144,18 +144,6 @@ def run_many(
     )  # fmt: skip
 
 
-@functools.lru_cache(maxsize=4)
-def _pool(process: int, threads: int) -> ThreadPoolExecutor:
-    """Threads for all calls of one process (those of its parent do not survive a fork)."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="ctrl_df")
-
-
-def processors() -> int:
-    """Return how many processors this process may use; ``NUMBA_NUM_THREADS`` bounds it."""
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return max(min(available or 1, getattr(config, "NUMBA_NUM_THREADS", 1)), 1)
-
-
 def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine):
     def each(values, kind: Any = float):
         return np.array(np.broadcast_to(np.asarray(values, kind), (runs,)), order="C")
@@ -194,13 +182,20 @@ class _Work:
         self.failed: dict[int, Exception] = {}
 
     def on_threads(self, threads: int) -> None:
-        """Make all runs, so many at once."""
+        """Make all runs, so many at once; in this thread where others have their own."""
+        flag = crew.flag()
+        if flag is not None:
+            self.stop = flag
+            self._work(deque((group, group.runs.astype(np.int64)) for group in self.groups))
+            if flag[0]:
+                raise crew.Stopped
+            return
         todo = deque(self._parts(threads))
         threads = max(min(threads, len(todo)), 1)
         # compiled, or read from its file, before any thread asks for it
         self._run(self._desk(self.groups[0]), self.groups[0], np.zeros(0, np.int64))
         # this thread only waits: it is the one that hears Ctrl-C
-        workers = [_pool(os.getpid(), threads).submit(self._work, todo) for _ in range(threads)]
+        workers = [crew.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)]
         try:
             for worker in workers:
                 worker.result()

@@ -1,0 +1,85 @@
+"""Jobs side by side: in order, each with its runs in one thread, the first failure told, Ctrl-C heard."""
+
+import signal
+import threading
+import time
+
+import control as ct
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.simulator import Simulator
+from ctrl_df.identify.windows import cut
+from ctrl_df.simulate import crew
+
+T = 1e-3 * np.arange(2000)
+RECORD = cdf.Measurement(T, np.sin(9 * T), 0.01 * np.sin(9 * T) + 1e-5 * np.cos(777 * T))
+BLOCK = cdf.Mass(2.0, [cdf.Coulomb(0.2), cdf.Viscous(3.0)])
+
+
+@pytest.fixture(autouse=True)
+def two_threads(monkeypatch):
+    monkeypatch.setattr(crew, "processors", lambda: 2)
+
+
+def output(mass):
+    block = BLOCK.with_parameters({"mass": mass})
+    return Simulator(block, RECORD).run(cut(RECORD, 4))
+
+
+def test_numbers_are_those_of_one_thread_and_in_order():
+    masses = np.linspace(1, 3, 9)
+    first, second = (crew.side_by_side(output, masses) for _ in range(2))
+    for a, b, mass in zip(first, second, masses, strict=True):
+        assert np.array_equal(a, b)
+        # runs shared out among threads differ by the last bit: 7e-17
+        assert np.allclose(a, output(mass), rtol=0, atol=1e-15)
+
+
+def test_jobs_within_jobs_are_done_in_their_thread():
+    def inner(_):
+        return threading.get_ident()
+
+    for ids in crew.side_by_side(lambda _: crew.side_by_side(inner, range(3)), range(4)):
+        assert len(set(ids)) == 1 and ids[0] != threading.get_ident()
+
+
+def test_the_first_failure_in_order_is_told():
+    def job(i):
+        if i:
+            raise ValueError(f"job {i}")
+        time.sleep(0.05)
+
+    with pytest.raises(ValueError, match="job 1"):
+        crew.side_by_side(job, range(4))
+
+
+def test_runs_that_call_python_back_are_done_where_ctrl_c_is_heard():
+    python = ct.nlsys(
+        lambda t, x, u, p: [x[1], u[0] - x[1]],
+        lambda t, x, u, p: [x[0]], states=2, inputs=1, outputs=1,
+    )  # fmt: skip
+    seen = []
+
+    def job(i):
+        y = Simulator(python, RECORD).run(cut(RECORD, 1))
+        seen.append(threading.current_thread() is threading.main_thread())
+        return y
+
+    first, second = crew.side_by_side(job, range(2))
+    assert seen == [True, True] and np.array_equal(first, second)
+
+
+def test_ctrl_c_ends_all_jobs():
+    def job(_):
+        for _ in range(2000):
+            output(2.0)
+
+    main = threading.main_thread().ident
+    threading.Timer(0.5, lambda: signal.pthread_kill(main, signal.SIGINT)).start()
+    began = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        crew.side_by_side(job, range(4))
+    assert time.perf_counter() - began < 5
+    assert len(crew.side_by_side(output, (1.0, 2.0))) == 2
