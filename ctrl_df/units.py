@@ -123,6 +123,14 @@ def _power(base: str, exponent: int) -> str:
     return base if exponent == 1 else f"{base}^{exponent}"
 
 
+def size(unit: str, sizes: Mapping[str, float]) -> float:
+    """Return the typical size of what has this unit, given those of `BASE` (default 1)."""
+    value = 1.0
+    for base, exponent in dimension(unit).items():
+        value *= sizes.get(base, 1.0) ** exponent
+    return value
+
+
 def si_unit(unit: str) -> tuple[float, str]:
     """Return the factor to SI and the SI unit.
 

@@ -62,6 +62,17 @@ class Effect:
     affine : bool
         Whether a force or friction law is an affine function of place and speed as long as the direction of
         motion stays: such laws run on constant propagators, exactly.
+    place_free : bool
+        Whether a force law is the same wherever the machine stands.
+    proportional : bool
+        Whether the effect vanishes as its first parameter goes to zero, in proportion to it.
+    nonsmooth : bool
+        Whether events of its law come and go with its parameters, so that the error jumps over them.
+    multimodal : bool
+        Whether the error has many local minima over its parameters in long segments: fits begin in short
+        ones.
+    repeatable : bool
+        Whether a block may hold several; a second of any other is the first one again.
     """
 
     id: ClassVar[str] = ""
@@ -72,6 +83,11 @@ class Effect:
     side: ClassVar[str] = "motor"
     states: ClassVar[int] = 0
     affine: ClassVar[bool] = False
+    place_free: ClassVar[bool] = False
+    proportional: ClassVar[bool] = False
+    nonsmooth: ClassVar[bool] = False
+    multimodal: ClassVar[bool] = False
+    repeatable: ClassVar[bool] = False
     law: ClassVar[Callable | None] = None
 
     def __init_subclass__(cls, **kwargs):

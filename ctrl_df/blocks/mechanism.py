@@ -76,6 +76,16 @@ class Mechanism(ct.NonlinearIOSystem):
         return self._effects
 
     @property
+    def named_effects(self) -> dict[str, Effect]:
+        """The effects by the names that their parameters begin with; a second of a kind has a number."""
+        return dict(zip(self._keys, self._effects, strict=True))
+
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last."""
+        return self._keys[-1]
+
+    @property
     def core(self) -> Core:
         """The mechanism as numbers, for the engine."""
         return self._core

@@ -29,6 +29,9 @@ class Parameter:
         Whether a refit moves it unless told otherwise.
     meaning : str
         What it is, in a few words.
+    threshold : bool
+        Whether nothing but breaking away shows it: records leave ranges of it open. It is a level that may
+        not lie below the kinetic one.
     line_unit : str
         Unit of the same parameter in a machine on a line, `unit` by default; its size follows from that.
     """
@@ -40,6 +43,7 @@ class Parameter:
     strict: bool = False
     free: bool = True
     meaning: str = ""
+    threshold: bool = False
     line_unit: str = ""
 
     def __post_init__(self):
@@ -59,6 +63,7 @@ def parameter(
     free=True,
     default: Any = dataclasses.MISSING,
     meaning="",
+    threshold=False,
 ) -> Any:
     """Declare a dataclass field that is a physical parameter (unit, bounds, what it means).
 
@@ -68,8 +73,10 @@ def parameter(
         The unit is unknown: the sizes that a fit begins with follow from it.
     """
     dimension(unit)
-    bounds = dict(unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning)
-    return dataclasses.field(default=default, metadata={"parameter": bounds})
+    stated = dict(
+        unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning, threshold=threshold
+    )
+    return dataclasses.field(default=default, metadata={"parameter": stated})
 
 
 def checked(owner: str, name: str, value, spec: dict, remedy: str = "") -> float:

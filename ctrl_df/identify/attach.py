@@ -7,14 +7,11 @@ import dataclasses
 from ..blocks.core import is_kinetic, kinetic_level
 from .simulator import feasible, tied
 
-# Effects of which a block may hold several; a second of any other is the first one again.
-_REPEATABLE = ("position_ripple",)
-
 
 def applicable(cls, block) -> bool:
     """Whether adding an effect of this class to the block can change anything."""
     ids = [e.id for e in block.effects]
-    if cls.id in ids and cls.id not in _REPEATABLE:
+    if cls.id in ids and not cls.repeatable:
         return False
     two = block.core.bodies == 2
     if cls.id == "load_friction":

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..blocks.effect import effect_class
 from ..simulate.crew import side_by_side
 from .attach import applicable, attach
 from .candidate import Candidate
@@ -29,20 +30,6 @@ _BEGUN, _KEPT = 2, 2
 
 # Joints that resonate with which fits begin.
 _JOINTS = 3
-
-# Effects whose error has many valleys over long windows: short ones first.
-_CURVED = frozenset(
-    {
-        "stribeck",
-        "stiction",
-        "bristle",
-        "backlash",
-        "compliance",
-        "position_ripple",
-        "hard_stop",
-        "load_friction",
-    }  # fmt: skip
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +111,11 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     attempts = _best([a for found in begun for a in found if a.fit is not None], _JOINTS)
     attempts += [a for found in begun for a in found if a.fit is None]
     # those of few steps first: what they come to tells of the others which need no long look
-    short = [a for a in attempts if a.key not in _CURVED]
+    short = [a for a in attempts if not effect_class(a.key).multimodal]
     begun = run(_first, [(a, np.inf) for a in short])
     least = min((a.error for a in begun), default=np.inf)
     least = min(least, screen.base.rmse)
-    begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.key in _CURVED])
+    begun += run(_first, [(a, HOPELESS * least) for a in attempts if effect_class(a.key).multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
     kept = _best(begun, _KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another valley
@@ -153,7 +140,7 @@ def itself(tried: Trial, span) -> bool:
     it (or before it) is a dashpot.
     """
     bounds = dict(zip(tried.train.names, tried.train.at_bound, strict=True))
-    if bounds.get(f"{tried.block._keys[-1]}.load_fraction", False):
+    if bounds.get(f"{tried.block.newest}.load_fraction", False):
         return False
     return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
 
@@ -188,7 +175,7 @@ def _begin(job) -> list[Attempt]:
         if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
             break
         found.append(_from(start, screen, shortest, free))
-    if cls.id in _CURVED or screen.block.core.bodies == 2:
+    if cls.multimodal or screen.block.core.bodies == 2:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user
         # does.
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
@@ -205,7 +192,7 @@ def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
         return None
     added = own_names(block)
     names = (*free, *(() if key == ROUNDED else added))
-    if key in _CURVED:
+    if start.effect.multimodal:
         # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
         bent = start.effect.role in ("contact", "coupling") or key == "load_friction"
         steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
@@ -250,5 +237,5 @@ def _spread(effects, count):
 
 def own_names(block) -> tuple[str, ...]:
     """Return the parameters of a block's newest effect that a fit may move."""
-    key = block._keys[-1] + "."
+    key = block.newest + "."
     return tuple(k for k, p in block.parameters.items() if k.startswith(key) and p.free)

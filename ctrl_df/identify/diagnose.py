@@ -197,7 +197,7 @@ def _errors(tried: Trial) -> tuple[float, float]:
 def _entry(t: Trial, study: Study, probability, same) -> CandidateEffect:
     effect = t.block.effects[-1]
     values = {k: p.value for k, p in effect.parameters.items()}
-    key = list(t.block._keys)[-1]
+    key = t.block.newest
     known = t.train.standard_errors if len(t.train.covariance) else {}
     return CandidateEffect(
         effect, effect.id, *_errors(t), t.evidence, probability, values, same, t.block, t.confirmed,

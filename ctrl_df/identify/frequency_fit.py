@@ -280,7 +280,9 @@ def fit_table(
         Bounds on the work of one point, `ROUGH`, `QUICK` or `CAREFUL` (the default).
     """
     table = block.parameters
-    job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)
+    job = _Job(
+        block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit)) for k in names], work
+    )
     z = np.array([v.q(table[v.name].value) for v in job.variables])
     e = job.errors(z)
     jacobian = np.zeros((len(e), len(z)))
@@ -317,7 +319,9 @@ def fit_table(
 def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.ndarray:
     """Return the slopes (2 n, p) of the weighted errors by scaled parameters."""
     table = block.parameters
-    job = _Job(block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].unit)) for k in names], work)
+    job = _Job(
+        block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit)) for k in names], work
+    )
     z = np.array([v.q(table[v.name].value) for v in job.variables])
     return job.slopes(z, job.errors(z)) if len(z) else np.zeros((2 * len(points), 0))
 

@@ -62,7 +62,7 @@ def _without_idle(block, added, study):
     dropped: list[str] = []
     for key in added:
         less = block.without_effect(key)
-        last = less._keys[-1] + "."
+        last = less.newest + "."
         names = [k for k, p in less.parameters.items() if k in study.free or (k.startswith(last) and p.free)]
         without = study.refitted(less, names)
         if study.evidence(study.refitted(block, ()), without) < SIGNIFICANT:

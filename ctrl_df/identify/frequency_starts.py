@@ -197,7 +197,7 @@ def _any(cls):
             sized = {}
             for f, multiple in zip(grids, multiples, strict=True):
                 unit = f.metadata["parameter"]["unit"]
-                sized[f.name] = multiple * (1.0 if unit == "" else p.scales.of(unit))
+                sized[f.name] = multiple * p.scales.of(unit)
             yield sized, 1.0
 
     return starts

@@ -76,7 +76,7 @@ def improve(
         known = set(found.model.parameters) - set(names)
         if best is not None and worth:
             confirmed = [c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > SIGNIFICANT]
-            rivals[best.model._keys[-1]] = confirmed[:RIVALS]
+            rivals[best.model.newest] = confirmed[:RIVALS]
         return Found(found, worth, lambda block, ids: _revised(block, ids, fits, known, rivals))
 
     steps = climb(start, free, max_effects, ask)
@@ -118,7 +118,7 @@ def _revised(block, added, fits, known, rivals):
     def fitted(model, iterations):
         free = [k for k in free_names(model) if k not in known]
         found = data.fit(model, free, iterations=iterations)
-        return data.judged(Trial(model._keys[-1], found, extra=len(free)))
+        return data.judged(Trial(model.newest, found, extra=len(free)))
 
     for key in added:
         less = fitted(block.without_effect(key), 8)
@@ -136,7 +136,7 @@ def _revised(block, added, fits, known, rivals):
         elif judged[0].evidence > kept.evidence + (0.0 if judged[0].extra < kept.extra else SIGNIFICANT):
             block = judged[0].block
             dropped.append(key)
-            instead.append(block._keys[-1])
+            instead.append(block.newest)
         if key in dropped:
             fits.base = less
     return block, tuple(dropped), tuple(instead)

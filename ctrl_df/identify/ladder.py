@@ -86,8 +86,8 @@ class Study:
     @property
     def effects(self) -> tuple[str, ...]:
         """Ids of the effects that were added and kept."""
-        before = list(self.start._keys)
-        return tuple(k for k in self.model._keys if k not in before)
+        before = list(self.start.named_effects)
+        return tuple(k for k in self.model.named_effects if k not in before)
 
     @property
     def measure(self) -> str:
@@ -184,7 +184,7 @@ def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
     """
     if int(max_effects) != max_effects or max_effects < 0:
         raise ValueError(f"improve needs max_effects as an integer >= 0; got {max_effects!r}.")
-    kept, own = set(start.parameters) - set(free_names(start, free)), set(start._keys)
+    kept, own = set(start.parameters) - set(free_names(start, free)), set(start.named_effects)
     block, steps, effect, evidence, dropped, same, instead = start, [], "", 0.0, (), (), ()
     while True:
         names = tuple(k for k in free_names(block) if k not in kept)
@@ -198,7 +198,7 @@ def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
             return tuple(steps)
         best = d.ranking[0]
         effect, evidence, same = best.id, best.evidence, best.equivalents
-        added = [k for k in best.model._keys[:-1] if k not in own]
+        added = [k for k in list(best.model.named_effects)[:-1] if k not in own]
         block, dropped, instead = found.revise(best.model, added) if added else (best.model, (), ())
 
 

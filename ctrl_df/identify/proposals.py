@@ -21,13 +21,6 @@ from .attach import attach
 if TYPE_CHECKING:
     from .screen import Screen
 
-# Effects that vanish as their main parameter goes to zero, in proportion to it.
-PROPORTIONAL = frozenset({
-    "viscous", "coulomb", "quadratic_drag", "asymmetric_coulomb", "asymmetric_viscous", "load_friction",
-    "constant_force", "linear_spring", "cubic_spring", "input_dead_zone", "input_delay", "input_lag",
-    "sensor_delay", "sensor_offset", "drift",
-})  # fmt: skip
-
 
 def proposals(cls, screen: Screen):
     """Return effects of one class to begin with."""
@@ -56,8 +49,8 @@ def _generic(cls, screen: Screen):
         return
     name, spec = main
     usual = screen.scales.of(spec["unit"])
-    sizes = (0.02, 0.1, 0.4) if cls.id in PROPORTIONAL else (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-    signs = (1.0, -1.0) if spec["lower"] < 0 and cls.id not in PROPORTIONAL else (1.0,)
+    sizes = (0.02, 0.1, 0.4) if cls.proportional else (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+    signs = (1.0, -1.0) if spec["lower"] < 0 and not cls.proportional else (1.0,)
     for size, sign in itertools.product(sizes, signs):
         try:
             yield cls(**{name: sign * size * usual, **values})

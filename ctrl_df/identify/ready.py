@@ -55,7 +55,7 @@ def of_block(block, record, u, thin: int) -> Ready:
     """Return a mechanism, driven by the input `u` (n,) in steps of `thin` samples."""
     t, held, static = record.t, u, record.input_hold == "zoh"
     outside, input_delay = [], 0.0
-    for key, effect in zip(block._keys, block.effects, strict=True):
+    for key, effect in block.named_effects.items():
         if effect.role != "input":
             continue
         channel = effect.channel()
@@ -70,7 +70,7 @@ def of_block(block, record, u, thin: int) -> Ready:
         else:
             static = False
     tail = []
-    for key, effect in reversed(list(zip(block._keys, block.effects, strict=True))):
+    for key, effect in reversed(list(block.named_effects.items())):
         if effect.role == "output":
             channel = effect.channel()
             if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
@@ -82,8 +82,8 @@ def of_block(block, record, u, thin: int) -> Ready:
     output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
     inner = block
     if outside:
-        kept = [e for k, e in zip(block._keys, block.effects, strict=True) if k not in outside]
-        inner = block._remade(block._values, kept)
+        kept = [e for k, e in block.named_effects.items() if k not in outside]
+        inner = block.with_effects(kept)
     time, value, hold = t, held, record.input_hold
     if thin > 1:
         time, value, hold = _thinned(record, held, thin)

@@ -24,7 +24,7 @@ def rephased(near: Candidate, fit) -> Candidate:
         ``fit(block, names, starts, iterations)`` over the same windows.
     """
     best = near
-    for key in [k for k in near.model._keys if k.startswith("position_ripple")]:
+    for key in [k for k in near.model.named_effects if k.startswith("position_ripple")]:
         name = f"{key}.phase"
         own, found = best.model.parameters[name].value, best
         for i in range(1, TRIED):

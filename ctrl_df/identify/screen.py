@@ -13,7 +13,7 @@ import numpy as np
 
 from .attach import attach
 from .candidate import Candidate
-from .proposals import PROPORTIONAL, proposals
+from .proposals import proposals
 from .regression import Start, motion_of, regressed
 from .trial import Data, Scales, carried
 
@@ -100,7 +100,7 @@ def _judged(effect, screen, total) -> Iterator[Start]:
         return
     left = screen.residual - change
     yield Start(block.effects[-1], float(left @ left) / total)
-    if effect.id in PROPORTIONAL:
+    if effect.proportional:
         # For a small effect the change is proportional to it: scale it to the residual.
         factor = float(change @ screen.residual) / power
         scaled = _scaled(effect, factor)

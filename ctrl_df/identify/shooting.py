@@ -24,9 +24,6 @@ from .windows import Windows, facts
 
 Signals = list[np.ndarray]
 
-# Laws whose events make single windows go lost, and the cost a row of valleys.
-ROUGH = frozenset({"backlash", "hard_stop", "stiction", "stribeck", "load_friction"})
-
 
 class Problem:
     """Records, windows and free parameters of one fit.
@@ -94,7 +91,7 @@ class Problem:
 
     def round(self, theta):
         """Let an encoder of the model round the solution's outputs (fits leave it out: it has no slope)."""
-        if "sensor_quantization" not in getattr(self.block, "_keys", ()):
+        if "sensor_quantization" not in getattr(self.block, "named_effects", ()):
             return
         values = self.values(theta)
         runs = zip(self.simulators, self.windows, self.nuisance, self.measured, strict=True)
@@ -158,7 +155,8 @@ class Problem:
             if not self._worth_a_rescue() or not rescue(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
-        rough = ROUGH.intersection(getattr(self.block, "_keys", ())) and self.names and self.colour is None
+        rough = any(e.nonsmooth for e in getattr(self.block, "effects", ()))
+        rough = rough and self.names and self.colour is None
         if (
             rough
             and self._worth_a_rescue()

@@ -25,7 +25,6 @@ Request = tuple[Windows, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
 
 _PREPARED = 4  # parameter sets whose models are kept ready
-_TIED = {"linear_spring", "cubic_spring", "position_ripple", "hard_stop"}
 
 
 class Simulator:
@@ -401,26 +400,18 @@ def free_run(
 
 def tied(block: Mechanism) -> bool:
     """Whether a law of the block depends on the place, or may do so."""
-    from ..blocks import effects
-
-    names = {e.id for e in block.effects}
-    foreign = any(not hasattr(effects, type(e).__name__) for e in block.effects if e.role == "force")
-    return bool(names & _TIED) or foreign
+    return block.core.stop is not None or any(e.role == "force" and not e.place_free for e in block.effects)
 
 
 def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
     """Return the values with static levels raised to the kinetic one where they fell below it."""
     values = dict(values)
     current = block.parameters
-    statics = [
-        f"{k}.level"
-        for k, e in zip(block._keys, block.effects, strict=True)
-        if e.id in ("stiction", "stribeck")
-    ]
+    statics = [name for name, p in current.items() if p.threshold]
     if statics:
         kinetic = sum(
             values.get(f"{k}.level", current[f"{k}.level"].value)
-            for k, e in zip(block._keys, block.effects, strict=True)
+            for k, e in block.named_effects.items()
             if is_kinetic(e) and f"{k}.level" in current
         )
         for name in statics:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..units import size
 from . import derivatives
 from .candidate import Candidate, fit_windows
 from .initial_states import CHAINED, FITTED, MEASURED
@@ -55,13 +56,9 @@ class Scales:
     mass: float
 
     def of(self, unit: str) -> float:
-        """Return the typical size of a parameter of that unit."""
-        f, x, v = self.force, self.position, self.speed
-        table = {
-            "N": f, "N s/m": f / v, "N s^2/m^2": f / v**2, "N/m": f / x, "N/m^3": f / x**3, "m": x, "m/s": v,
-            "s": x / v, "kg": self.mass, "1/s": v / x, "rad/s": v / x, "N/m^2": f / x**2, "m/s^2": v * v / x,
-        }  # fmt: skip
-        return table.get(unit, 1.0)
+        """Return the typical size of a parameter of that unit (of a machine on a line)."""
+        time = self.position / self.speed
+        return size(unit, {"N": self.force, "m": self.position, "s": time, "kg": self.mass})
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,8 @@ import numpy as np
 
 from ..simulate.crew import side_by_side
 from .candidate import Candidate
-from .shooting import ROUGH
 from .simulator import feasible
 from .trial import Data, Trial
-
-# levels that nothing but breaking away shows: records leave ranges of them open
-_THRESHOLDS = ("stiction.level", "stribeck.level")
 
 # friction of which the sum with the motor's shows best
 _SHARED = "load_friction.level"
@@ -43,12 +39,13 @@ _REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a thresh
 
 def rough(found: Candidate) -> list[str]:
     """Return the free parameters over which the cost has many valleys."""
-    return [name for name in found.names if name.partition(".")[0] in ROUGH]
+    effects = found.model.named_effects
+    return [n for n in found.names if "." in n and effects[n.partition(".")[0]].nonsmooth]
 
 
 def own(found: Candidate) -> list[str]:
     """Return the rough parameters of the last effect of a model."""
-    last = list(found.model._keys)[-1] + "."
+    last = found.model.newest + "."
     return [name for name in rough(found) if name.startswith(last)]
 
 
@@ -72,7 +69,7 @@ def hopped(
         at, best = found.parameters[name], found
         moved = [
             _moved(found.model, name, _within(found, name, factor * at))
-            for factor in (_SMALL if name in _THRESHOLDS else _HOPS)
+            for factor in (_SMALL if found.model.parameters[name].threshold else _HOPS)
         ]
         starts_only = functools.partial(fit, names=(), starts=found.starts, iterations=2, hopeless=hopeless)
         begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:_TRIED]
@@ -134,7 +131,7 @@ def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
     Stiction is that of a narrow Stribeck bump. The cost of stick and slip is rough: of two fits of one law
     each may end in its own valley.
     """
-    table, mine, its = tried.block.parameters, list(tried.block._keys)[-1], list(best.block._keys)[-1]
+    table, mine, its = tried.block.parameters, tried.block.newest, best.block.newest
     values = {}
     for name, p in best.block.parameters.items():
         name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
@@ -153,9 +150,8 @@ def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
 
 def settled(tried: Trial, data: Data) -> Trial:
     """Choose thresholds by the windows to be judged by, within what the windows fitted leave open."""
-    for name in _THRESHOLDS:
-        if name not in tried.train.names:
-            continue
+    table = tried.block.parameters
+    for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = _open_range(tried.train, data.fit, name)
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, 7)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..units import dimension, size
 from .windows import Facts
 
 
@@ -64,9 +65,9 @@ def variables_of(block, names, records, known: Facts, limits=None) -> list[Varia
         return []
     table = block.parameters
     limits = limits or {}
-    found = [Variable(k, table[k], natural_scale(table[k].unit, known), limits.get(k)) for k in names]
+    found = [Variable(k, table[k], natural_scale(table[k].line_unit, known), limits.get(k)) for k in names]
     for variable in found:
-        if variable.name == "hard_stop.limit" and not {"sensor_offset", "drift"} & set(block._keys):
+        if variable.name == "hard_stop.limit" and not {"sensor_offset", "drift"} & set(block.named_effects):
             # No body has been where a stop would not let it.
             reach = max(float(np.max(np.abs(r.y))) for r in records) - 4 * known.noise
             variable.lower = max(variable.lower, reach)
@@ -75,10 +76,12 @@ def variables_of(block, names, records, known: Facts, limits=None) -> list[Varia
 
 def natural_scale(unit: str, known: Facts) -> float:
     """Return the size a parameter of this unit has when it matters on a record with these facts."""
-    length, speed, force = known.spread, known.speed, known.force
-    return {
-        "N": 0.1 * force, "m": 0.1 * length, "m/s": 0.1 * speed, "s": 5 * known.dt,
-        "N/m": 0.1 * force / length,
-        "N s/m": 0.1 * force / speed, "N s^2/m^2": 0.1 * force / speed**2, "N/m^3": 0.1 * force / length**3,
-        "kg": force * length / speed**2, "rad": 1.0,
-    }.get(unit, 1.0)  # fmt: skip
+    powers = dimension(unit)
+    if powers == {"s": 1}:
+        return 5 * known.dt  # times are seen from a few samples on
+    if powers.keys() <= {"rad"}:
+        return 1.0
+    time = known.spread / known.speed
+    mass = known.force * time**2 / known.spread
+    whole = size(unit, {"N": known.force, "m": known.spread, "s": time, "kg": mass})
+    return whole if powers == {"kg": 1} else 0.1 * whole

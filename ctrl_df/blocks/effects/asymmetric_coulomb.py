@@ -25,6 +25,7 @@ class AsymmetricCoulomb(Effect):
     difference: float = parameter("N", lower=-math.inf, meaning="level for v > 0 minus level for v < 0")
 
     role: ClassVar[str] = "friction"
+    proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     rank: ClassVar[int] = 1
     shows: ClassVar[str] = "a constant error whose two directions of motion do not mirror each other"

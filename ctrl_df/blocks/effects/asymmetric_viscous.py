@@ -22,6 +22,8 @@ class AsymmetricViscous(Effect):
     difference: float = parameter("N s/m", lower=-math.inf, meaning="slope for v > 0 minus slope for v < 0")
 
     role: ClassVar[str] = "force"
+    place_free: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "error growing with speed, of the same sign in both directions"
     source: ClassVar[str] = "Janot, Gautier & Brunot (2019), asymmetric friction model"
 

@@ -32,6 +32,8 @@ class Backlash(Effect):
     )
 
     role: ClassVar[str] = "contact"
+    nonsmooth: ClassVar[bool] = True
+    multimodal: ClassVar[bool] = True
     shows: ClassVar[str] = "error after reversals that lasts as long as the gap is crossed"
     source: ClassVar[str] = "Azenha & Machado (1997), eqs. (9)-(13)"
     remedy: ClassVar[str] = "For a tight joint leave the effect out."

@@ -32,6 +32,7 @@ class Bristle(Effect):
     level: float = parameter("N", default=0.0, free=False, meaning="level beyond the block's dry friction")
 
     role: ClassVar[str] = "presliding"
+    multimodal: ClassVar[bool] = True
     states: ClassVar[int] = 1
     shows: ClassVar[str] = (
         "error around every reversal, where the real friction builds up over a small stroke"

@@ -32,6 +32,7 @@ class Compliance(Effect):
     )
 
     role: ClassVar[str] = "coupling"
+    multimodal: ClassVar[bool] = True
     shows: ClassVar[str] = "a resonance in the error spectrum, ringing after every step of force"
     source: ClassVar[str] = "two-mass drive, e.g. Vukosavic & Stojic (1998)"
     remedy: ClassVar[str] = "For a stiff joint leave the effect out."

@@ -22,6 +22,8 @@ class ConstantForce(Effect):
     force: float = parameter("N", lower=-math.inf, meaning="constant force along +x")
 
     role: ClassVar[str] = "force"
+    place_free: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     shows: ClassVar[str] = "an error of constant sign, in motion and at rest"
     source: ClassVar[str] = "Newton"

@@ -26,6 +26,7 @@ class Coulomb(Effect):
     level: float = parameter("N", meaning="Coulomb level")
 
     role: ClassVar[str] = "friction"
+    proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     shows: ClassVar[str] = "a step in the error at every reversal of velocity, flat in between"
     source: ClassVar[str] = "Azenha & Machado (1997), eq. (6)"

@@ -25,6 +25,7 @@ class CubicSpring(Effect):
     center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
 
     role: ClassVar[str] = "force"
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "error near the ends of the stroke, growing faster than the position"
     source: ClassVar[str] = "Duffing (1918)"
 

@@ -29,6 +29,8 @@ class HardStop(Effect):
     lower: float | None = None
 
     role: ClassVar[str] = "contact"
+    nonsmooth: ClassVar[bool] = True
+    multimodal: ClassVar[bool] = True
     shows: ClassVar[str] = "error at the ends of the stroke only: the measured position stops short"
     source: ClassVar[str] = "Newton's law of restitution"
 

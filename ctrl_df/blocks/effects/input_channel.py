@@ -45,6 +45,7 @@ class InputDeadZone(Effect):
     threshold: float = parameter("N", meaning="half width of the dead zone")
 
     role: ClassVar[str] = "input"
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = (
         "error when the commanded force is small, and a force short by the threshold beyond"
     )
@@ -92,6 +93,7 @@ class InputLag(Effect):
     time_constant: float = parameter("s", strict=True, meaning="time constant of the drive")
 
     role: ClassVar[str] = "input"
+    proportional: ClassVar[bool] = True
     states: ClassVar[int] = 1
     shows: ClassVar[str] = "error in phase with the rate of the applied force, at high frequency"
     source: ClassVar[str] = "current loop of the amplifier"
@@ -116,6 +118,7 @@ class InputDelay(Effect):
     delay: float = parameter("s", meaning="dead time of the drive")
 
     role: ClassVar[str] = "input"
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "error proportional to the rate of the output, everywhere"
     source: ClassVar[str] = "dead time"
 

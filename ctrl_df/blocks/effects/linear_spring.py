@@ -25,6 +25,7 @@ class LinearSpring(Effect):
     center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
 
     role: ClassVar[str] = "force"
+    proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     shows: ClassVar[str] = "error proportional to position"
     source: ClassVar[str] = "Hooke"

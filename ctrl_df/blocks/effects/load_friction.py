@@ -21,6 +21,9 @@ class LoadFriction(Effect):
     level: float = parameter("N", meaning="Coulomb level on the load")
 
     role: ClassVar[str] = "friction"
+    proportional: ClassVar[bool] = True
+    nonsmooth: ClassVar[bool] = True
+    multimodal: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     side: ClassVar[str] = "load"
     shows: ClassVar[str] = "a step in the error when the load reverses, later than the motor does"

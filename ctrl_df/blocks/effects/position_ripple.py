@@ -28,6 +28,8 @@ class PositionRipple(Effect):
     phase: float = parameter("rad", lower=-math.inf, default=0.0, meaning="phase at x = 0")
 
     role: ClassVar[str] = "force"
+    multimodal: ClassVar[bool] = True
+    repeatable: ClassVar[bool] = True
     shows: ClassVar[str] = "error periodic over position, whatever the time and the speed"
     source: ClassVar[str] = "cogging force, first harmonic"
 

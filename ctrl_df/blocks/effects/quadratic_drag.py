@@ -21,6 +21,8 @@ class QuadraticDrag(Effect):
     coefficient: float = parameter("N s^2/m^2", meaning="drag coefficient")
 
     role: ClassVar[str] = "force"
+    place_free: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "error at high speed that grows faster than the speed itself"
     source: ClassVar[str] = "Rayleigh's drag law"
 

@@ -23,6 +23,7 @@ class SensorDelay(Effect):
     delay: float = parameter("s", meaning="delay of the sensor")
 
     role: ClassVar[str] = "output"
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "error proportional to velocity in the measured position"
     source: ClassVar[str] = "dead time"
 
@@ -68,6 +69,7 @@ class SensorOffset(Effect):
     offset: float = parameter("m", lower=-math.inf, meaning="reported minus true position")
 
     role: ClassVar[str] = "output"
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "a constant error of position"
     source: ClassVar[str] = "zero of the scale"
 
@@ -90,6 +92,7 @@ class Drift(Effect):
     rate: float = parameter("m/s", lower=-math.inf, meaning="rate of the sensor's drift")
 
     role: ClassVar[str] = "output"
+    proportional: ClassVar[bool] = True
     shows: ClassVar[str] = "an error of position that grows in proportion to time"
     source: ClassVar[str] = "thermal drift of the sensor"
 

@@ -18,9 +18,11 @@ class Stiction(Effect):
         Breakaway level Ks [N], >= the kinetic level of the block it is added to.
     """
 
-    level: float = parameter("N", meaning="breakaway level")
+    level: float = parameter("N", meaning="breakaway level", threshold=True)
 
     role: ClassVar[str] = "friction"
+    nonsmooth: ClassVar[bool] = True
+    multimodal: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     rank: ClassVar[int] = 1
     shows: ClassVar[str] = "error just after standstill: the real mass stays longer at rest, then jumps off"

@@ -23,10 +23,12 @@ class Stribeck(Effect):
         Stribeck velocity vs [m/s], > 0.
     """
 
-    level: float = parameter("N", meaning="static level")
+    level: float = parameter("N", meaning="static level", threshold=True)
     velocity: float = parameter("m/s", strict=True, default=0.01, meaning="Stribeck velocity")
 
     role: ClassVar[str] = "friction"
+    nonsmooth: ClassVar[bool] = True
+    multimodal: ClassVar[bool] = True
     rank: ClassVar[int] = 1
     shows: ClassVar[str] = "error concentrated at low speed: more friction there than at full speed"
     source: ClassVar[str] = "Armstrong-Helouvry, Dupont & Canudas de Wit (1994), eq. (2)"

@@ -21,6 +21,8 @@ class Viscous(Effect):
     coefficient: float = parameter("N s/m", meaning="viscous coefficient")
 
     role: ClassVar[str] = "force"
+    place_free: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     shows: ClassVar[str] = "error proportional to velocity, the same in both directions"
     source: ClassVar[str] = "Azenha & Machado (1997), eq. (6)"

@@ -1,0 +1,97 @@
+"""Effects state what is known of them; what they state is true."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.trial import Scales
+from ctrl_df.units import dimension
+
+LIBRARY = cdf.effect_library()
+SIZES = {"N": 2.0, "m": 0.3, "s": 0.7, "kg": 1.9}
+
+
+def _made(cls, factor=1.0):
+    """An effect with every parameter of a typical size; its first one times a factor."""
+    values = {}
+    for i, field in enumerate(fields(cls)):
+        value = 0.4 if field.metadata["parameter"]["upper"] == 1.0 else 1.3
+        values[field.name] = value * (factor if i == 0 else 1.0)
+    return cls(**values)
+
+
+def _laws():
+    return [(k, c) for k, c in LIBRARY.items() if c.law is not None and c.role in ("force", "friction")]
+
+
+@pytest.mark.parametrize(("key", "cls"), _laws())
+def test_laws_said_to_be_affine_are(key, cls):
+    if not cls.affine:
+        pytest.skip("says nothing")
+    effect, rng = _made(cls), np.random.default_rng(3)
+    for direction in (-1.0, 1.0):
+
+        def at(x, v, direction=direction):
+            if cls.role == "friction":
+                return cls.law(1.0, direction, abs(v), 2.0, effect.values)
+            return cls.law(0.0, x, v, np.zeros(1), effect.values, np.zeros(1))
+
+        for _ in range(20):
+            (x, v), (a, b) = rng.uniform(0.1, 9, 2), rng.uniform(0.1, 9, 2)
+            v, b = direction * v, direction * b
+            assert at((x + a) / 2, (v + b) / 2) == pytest.approx((at(x, v) + at(a, b)) / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize(("key", "cls"), [(k, c) for k, c in _laws() if c.role == "force"])
+def test_laws_said_to_be_free_of_the_place_are_and_the_others_are_not(key, cls):
+    effect = _made(cls)
+    forces = {
+        cls.law(0.0, x, 0.8, np.zeros(1), effect.values, np.zeros(1)) for x in (-3.0, -0.4, 0.1, 0.9, 7.0)
+    }
+    assert (len(forces) == 1) == cls.place_free
+
+
+@pytest.mark.parametrize(("key", "cls"), _laws())
+def test_effects_said_to_vanish_in_proportion_do(key, cls):
+    if not cls.proportional:
+        pytest.skip("says nothing")
+
+    def at(factor):
+        p = _made(cls, factor).values
+        if cls.role == "friction":
+            return cls.law(1.0, 1.0, 0.8, 20.0, p) - 20.0
+        return cls.law(0.0, 2.0, 0.8, np.zeros(1), p, np.zeros(1))
+
+    assert at(0.1) == pytest.approx(0.1 * at(1.0), rel=1e-9)
+
+
+def test_thresholds_are_static_levels():
+    marked = {
+        k for k, c in LIBRARY.items() for f in fields(c)
+        if f.metadata.get("parameter", {}).get("threshold")
+    }  # fmt: skip
+    assert marked == {k for k, c in LIBRARY.items() if c.role == "friction" and _static(c)}
+
+
+def _static(cls):
+    """Whether a friction law holds a resting body by more than a moving one."""
+    p = tuple(9.0 for _ in fields(cls))
+    return cls.law(0.0, 1.0, 0.0, 5.0, p) > cls.law(1.0, 1.0, 1e9, 5.0, p)
+
+
+def test_sizes_follow_from_the_unit_whatever_it_is():
+    scales = Scales(SIZES["N"], SIZES["m"], SIZES["m"] / SIZES["s"], SIZES["kg"])
+    assert scales.of("N s^3/m^3") == pytest.approx(SIZES["N"] * (SIZES["s"] / SIZES["m"]) ** 3)
+    assert scales.of("N/m^2") == pytest.approx(SIZES["N"] / SIZES["m"] ** 2) and scales.of("") == 1.0
+    with pytest.raises(ValueError, match="a unit must be one of"):
+        scales.of("furlong")
+    for cls in LIBRARY.values():
+        for f in fields(cls):
+            unit = f.metadata.get("parameter", {"unit": ""})["unit"]
+            in_mm = scales.__class__(
+                1e3 * SIZES["N"], 1e3 * SIZES["m"], 1e3 * SIZES["m"] / SIZES["s"], SIZES["kg"]
+            )
+            power = sum(dimension(unit).get(b, 0) for b in ("N", "m"))
+            assert in_mm.of(unit) == pytest.approx(1e3**power * scales.of(unit))
