@@ -263,7 +263,7 @@ def test_verify_and_picture_tell_them_apart():
     check = cdf.verify(response, search=False)
     row = next(r for r in check if r.predicted is not None and r.predicted.branch)
     assert row.verdict == "not found" and "Newton from the motion it stands on" in row.why
-    assert row.why in check.table()
+    assert "Newton from the motion it stands on" in check.table()
     ax = response.plot().axes[0, 0]
     diamonds = [line for line in ax.lines if line.get_marker() == "D"]
     assert len(diamonds) == 1 and diamonds[0].get_markerfacecolor() == "white"

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.df import threads, work
+from ctrl_df.df import threads
+from ctrl_df.df.dispatch import method_for
 from ctrl_df.df.forced_orbit import attractors
 from ctrl_df.df.forced_orbit.attractors import orbit_attractors
 from ctrl_df.limit_cycles.finder import OrbitFinder
@@ -42,9 +43,8 @@ def test_coexisting_motions_do_not_depend_on_the_number_of_threads(monkeypatch):
 
 def test_a_law_that_calls_python_is_asked_in_one_thread():
     block = cdf.friction_mass(9, 5, 0.5)
-    method = work.Method("orbit", HARDENING, "x")
-    assert method.compiled() and work.Method("friction", block).compiled()
-    assert not work.Method("law", np.sin).compiled()
+    assert method_for(HARDENING, "x").compiled() and method_for(block).compiled()
+    assert not method_for(np.sin).compiled()
 
 
 def test_work_on_threads_stops_where_one_part_fails():
