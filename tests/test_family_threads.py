@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.df import threads
+from ctrl_df.df import threads, work
 from ctrl_df.df.dispatch import method_for
 from ctrl_df.df.forced_orbit import attractors
 from ctrl_df.df.forced_orbit.attractors import orbit_attractors
