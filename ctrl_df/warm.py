@@ -142,7 +142,9 @@ def _orbit():
     from .limit_cycles.finder import find_limit_cycle
     from .simulate.loop import closed_loop
 
-    find_limit_cycle(closed_loop(pid(2000, 44250, 130), friction_mass(9, 5, 0.5)), (11, 13.8))
+    loop = closed_loop(pid(2000, 44250, 130), friction_mass(9, 5, 0.5))
+    find_limit_cycle(loop, (11, 13.8))
+    find_limit_cycle(loop)
 
 
 def _many_runs():

@@ -109,3 +109,23 @@ def test_dimensions():
         and over("rad", "N m") == "rad/(N m)"
         and turning("m/(N s)") == "rad/(N m s)"
     )
+
+
+def test_a_diagnosis_is_that_of_the_line_in_units_of_rotation():
+    rng, t = np.random.default_rng(0), np.arange(0, 4, 4e-3)
+    u = sum(0.3 * np.sin(w * t + p) for w, p in zip((2.1, 5.3, 9.7, 17.0), rng.uniform(0, 6, 4), strict=True))
+    noise = rng.normal(size=t.size)
+    found = []
+    for cls, units in ((cdf.Mass, {}), (cdf.Inertia, dict(input_unit="N m", output_unit="rad"))):
+        true = cls(0.02, [cdf.Coulomb(0.05), cdf.Viscous(0.03), cdf.LinearSpring(0.4)])
+        y = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
+        data = cdf.Measurement(t, u, y + 1e-3 * y.std() * noise, **units)
+        model = cls(0.022, [cdf.Coulomb(0.04), cdf.Viscous(0.04)])
+        found.append(
+            cdf.diagnose(model, data, candidates=["linear_spring", "cubic_spring", "quadratic_drag"])
+        )
+    line, axis = found
+    assert line.best.id == axis.best.id == "linear_spring" and line.verdict == axis.verdict
+    assert axis.best.evidence == pytest.approx(line.best.evidence, rel=1e-3)
+    assert "N m/rad" in axis.explanation and "N/m" not in axis.explanation
+    assert axis.best.model.parameters["inertia"].value == pytest.approx(0.02, rel=5e-3)

@@ -33,11 +33,11 @@ def named(effect) -> str:
     return effect.id.replace("_", " ")
 
 
-def values_of(effect) -> str:
-    """Return fitted parameters as text with units."""
-    return ", ".join(
-        f"{k.replace('_', ' ')} {p.value:.4g} {p.unit}".rstrip() for k, p in effect.parameters.items()
-    )
+def values_of(candidate) -> str:
+    """Return a candidate's fitted parameters as text, in the units of its machine."""
+    table, key = candidate.model.parameters, candidate.model.newest
+    fitted = ((k, table[f"{key}.{k}"]) for k in candidate.parameters if f"{key}.{k}" in table)
+    return ", ".join(f"{k.replace('_', ' ')} {p.value:.4g} {p.unit}".rstrip() for k, p in fitted)
 
 
 def remains(diagnosis, missed) -> str:
@@ -82,7 +82,7 @@ def explain(diagnosis, missed) -> str:
     if d.verdict == "effect":
         sure = certainty(d.ranking)
         return (
-            f"Missing: {named(first.effect)} ({values_of(first.effect)}). It shows as {first.effect.shows}. "
+            f"Missing: {named(first.effect)} ({values_of(first)}). It shows as {first.effect.shows}. "
             f"With it the error falls from {size}; probability {sure:.1%}.{same}"
             + (f" Before, {where[0].lower() + where[1:]}" if where else "")
         )

@@ -50,7 +50,7 @@ def _verdict(d: Diagnosis) -> str:
     if d.verdict == EFFECT:
         sure = certainty(d.ranking)
         return (
-            f"Missing: {named(first.effect)} ({values_of(first.effect)}). With it the error falls from "
+            f"Missing: {named(first.effect)} ({values_of(first)}). With it the error falls from "
             f"{size}; "
             f"probability {sure:.1%}.{same}" + (f" Before, {places}" if places else "")
         )

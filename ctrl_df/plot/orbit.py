@@ -64,7 +64,8 @@ def orbit_plot(orbit, *, ax=None, title=None, **line) -> ct.ControlPlot:
     x, name, unit = (output, names[0], length) if mechanical else (drive, names[-1], "")
     drawn.append(axes[2].plot(x, np.gradient(x, orbit.time), **style))
     axes[2].set_xlabel(name + (f" [{unit}]" if unit else ""))
-    axes[2].set_ylabel(f"d{name}/dt" + (f" [{unit}/s]" if unit else " [1/s]"))
+    rate = f"d{name}/dt" if len(name) == 1 else f"rate of {name}"
+    axes[2].set_ylabel(rate + (f" [{unit}/s]" if unit else " [1/s]"))
     axes[2].locator_params(nbins=5)
     if title is None:
         kind = {True: "stable", False: "unstable", None: "irregular"}[orbit.stable]
