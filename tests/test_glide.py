@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from steps import compared, record
 
 import ctrl_df as cdf
 from ctrl_df.simulate.kernel import driver
@@ -41,13 +42,6 @@ def rigs(rng):
     }
 
 
-def record(rng, name, times):
-    """Two sines, for a loop the reference."""
-    scale = 0.01 if "loop" in name or "sampled" in name else 15.0
-    low, high = rng.uniform(2, 6), rng.uniform(9, 30)
-    return scale * (np.sin(low * times) + 0.6 * np.sin(high * times + 1))
-
-
 @pytest.mark.parametrize("hold", ["zoh", "linear"])
 @pytest.mark.parametrize("name", list(rigs(np.random.default_rng(0))))
 def test_the_same_as_the_general_steps(name, hold):
@@ -55,16 +49,8 @@ def test_the_same_as_the_general_steps(name, hold):
         rng = np.random.default_rng([seed, 5])
         system = rigs(rng)[name]
         t = np.arange(1500) * STEP
-        u = record(rng, name, t)
-        fast = cdf.event_response(system, t, u, input_hold=hold)
-        slow = cdf.event_response(system, t, u, input_hold=hold, max_step=SHORT)
-        assert fast.propagated > 200 and slow.propagated == 0
-        assert [(e.subsystem, e.kind) for e in fast.events] == [(e.subsystem, e.kind) for e in slow.events]
-        np.testing.assert_allclose(
-            [e.time for e in fast.events], [e.time for e in slow.events], rtol=0, atol=1e-8 * t[-1]
-        )
-        size = np.max(np.abs(slow.outputs), axis=-1, keepdims=True)
-        error = np.max(np.abs(fast.outputs - slow.outputs) / size)
+        u = record(rng, t, 0.01 if "loop" in name or "sampled" in name else 15.0)
+        error = compared(system, t, u, hold, SHORT, 200, 1e-8)
         assert error < 2e-7, error
 
 
@@ -75,7 +61,7 @@ def test_outputs_off_the_samples(late, every):
 
     block = cdf.friction_mass(2, 3, 0.4)
     t = np.arange(1500) * STEP
-    u = record(np.random.default_rng(3), "", t)
+    u = record(np.random.default_rng(3), t, 15.0)
     times = np.arange(late, t[-1], every * STEP)
     engine = Engine(block)
     drive = sampled_drive(t, u, "linear")
@@ -106,7 +92,7 @@ def test_a_touch_inside_a_sample_is_met():
 def test_units_do_not_matter():
     """Lengths and forces in other units by 1e9: the same steps, the same answers."""
     t = np.arange(1500) * STEP
-    u = record(np.random.default_rng(4), "", t)
+    u = record(np.random.default_rng(4), t, 15.0)
     found = []
     for unit in (1e-9, 1.0, 1e9):
         block = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0 * unit)).with_effect(cdf.LinearSpring(80.0))

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import threading
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future
+
+from ..simulate.crew import pool
 
 _here = threading.local()
-
-
-@functools.lru_cache(maxsize=4)
-def _pool(process: int, threads: int) -> ThreadPoolExecutor:
-    """Threads for all families of one process (those of its parent do not survive a fork)."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="ctrl_df family")
 
 
 class Threads:
@@ -32,7 +27,7 @@ class Threads:
 
     def __init__(self, count: int):
         self.ahead = count + 1
-        self._pool, self._stop = _pool(os.getpid(), count), threading.Event()
+        self._pool, self._stop = pool(os.getpid(), count, "family"), threading.Event()
 
     def submit(self, function, *arguments) -> Future:
         """As `concurrent.futures.Executor.submit`."""

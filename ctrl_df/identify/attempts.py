@@ -121,7 +121,7 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     # few steps from where the user begins tell little: the baseline may have ended in another valley
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
-    ahead = [a for a in _best(begun, 1)][:2]
+    ahead = _best(begun, 1)[:2]
     found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
     least = min([least, *(t.train.rmse for t in found)])
     rest = [a for a in begun if not any(a is o for o in ahead)]
