@@ -142,8 +142,8 @@ def _row(row) -> dict[str, Any]:
 
 
 def _improve(options) -> int:
+    from .identify.data.measurement import Measurement
     from .identify.improve import improve
-    from .identify.measurement import Measurement
 
     model = read_model(options.model)
     if options.report:

@@ -14,6 +14,11 @@ PICTURES = {
     "harmonics": "harmonics.plot_harmonics",
     "analysis": "describing.describing_function_plot",
     "orbit": "orbit.orbit_plot",
+    "comparison": "compare.comparison_plot",
+    "table comparison": "table.table_comparison_plot",
+    "diagnosis": "diagnosis.plot_diagnosis",
+    "table diagnosis": "table.plot_frequency_diagnosis",
+    "ladder": "ladder.plot_ladder",
 }
 
 

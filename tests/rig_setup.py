@@ -33,7 +33,7 @@ class Record:
 
     def measurement(self):
         """Return the record as the library's `Measurement`."""
-        from ctrl_df.identify.measurement import Measurement
+        from ctrl_df.identify.data.measurement import Measurement
 
         return Measurement(self.t, self.u, self.y, name=self.name, velocity=self.v)
 

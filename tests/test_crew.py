@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.simulator import Simulator
-from ctrl_df.identify.windows import cut
+from ctrl_df.identify.estimation.segments import cut
+from ctrl_df.identify.estimation.simulator import Simulator
 from ctrl_df.simulate import crew
 
 T = 1e-3 * np.arange(2000)

@@ -7,13 +7,13 @@ import pytest
 import rigs
 
 import ctrl_df as cdf
+from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.lack_of_fit import lacks
-from ctrl_df.identify.measurement import Measurement
-from ctrl_df.identify.noise import whitener
-from ctrl_df.identify.simulator import feasible
-from ctrl_df.identify.trial import Trial, prepare
-from ctrl_df.identify.variables import default_free
+from ctrl_df.identify.estimation.noise_model import whitener
+from ctrl_df.identify.estimation.simulator import feasible
+from ctrl_df.identify.estimation.trial import Trial, prepare
+from ctrl_df.identify.estimation.variables import default_free
+from ctrl_df.identify.residuals.missing_forces import lacks
 
 FEW = ("constant_force", "asymmetric_coulomb", "linear_spring", "input_delay", "sensor_delay")
 

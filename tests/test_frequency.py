@@ -10,9 +10,9 @@ import rig_physics as physics
 import ctrl_df as cdf
 from ctrl_df.identify.compare import compare
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.frequency_compare import FrequencyComparison, scatter
 from ctrl_df.identify.improve import improve
 from ctrl_df.identify.refit import refit
+from ctrl_df.identify.tables.compare import FrequencyComparison, scatter
 
 TRUE = dict(MOTOR=9.0, COULOMB=5.0, VISCOUS=20.0)
 A = np.geomspace(9.0, 60.0, 5)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ctrl_df.identify.measurement import FrequencyMeasurement, Measurement
+from ctrl_df.identify.data.measurement import FrequencyMeasurement, Measurement
 from ctrl_df.units import si_unit
 
 

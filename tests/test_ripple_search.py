@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.ripple_search import WaveSearch
-from ctrl_df.identify.trial import prepare
-from ctrl_df.identify.windows import cut, facts
+from ctrl_df.identify.estimation.segments import cut, facts
+from ctrl_df.identify.estimation.trial import prepare
+from ctrl_df.identify.starting.ripple_spectrum import WaveSearch
 
 MASS, DRY, VISCOUS, DT = 5.0, 0.5, 20.0, 1e-3
 

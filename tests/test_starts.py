@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify import initial_states
-from ctrl_df.identify.attach import applicable
-from ctrl_df.identify.joint_search import SHARES, resonant
-from ctrl_df.identify.rounding import rounding_evidence
-from ctrl_df.identify.screen import Screen
-from ctrl_df.identify.simulator import Simulator, free_run
-from ctrl_df.identify.trial import prepare
-from ctrl_df.identify.variables import default_free
-from ctrl_df.identify.windows import make_windows
+from ctrl_df.identify.estimation import initial_states
+from ctrl_df.identify.estimation.segments import make_windows
+from ctrl_df.identify.estimation.simulator import Simulator, free_run
+from ctrl_df.identify.estimation.trial import prepare
+from ctrl_df.identify.estimation.variables import default_free
+from ctrl_df.identify.selection.rounding import rounding_evidence
+from ctrl_df.identify.starting.attach import applicable
+from ctrl_df.identify.starting.resonance_grid import SHARES, resonant
+from ctrl_df.identify.starting.screen import Screen
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
 BLOCKS = {

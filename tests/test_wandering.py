@@ -8,10 +8,10 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.initial_states import MEASURED
-from ctrl_df.identify.noise import force_errors, noise_model, whitened_power, whitener
-from ctrl_df.identify.simulator import Simulator
-from ctrl_df.identify.windows import make_windows
+from ctrl_df.identify.estimation.initial_states import MEASURED
+from ctrl_df.identify.estimation.noise_model import force_errors, noise_model, whitened_power, whitener
+from ctrl_df.identify.estimation.segments import make_windows
+from ctrl_df.identify.estimation.simulator import Simulator
 
 DT = 1e-3
 

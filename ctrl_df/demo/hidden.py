@@ -26,7 +26,7 @@ def model() -> Mechanism:
 
 def embedded_data():
     """Measure the rig for 5 s at 200 Hz: a multisine force, 60 dB of white sensor noise."""
-    from ..identify.measurement import Measurement
+    from ..identify.data.measurement import Measurement
     from ..simulate.response import event_response
 
     t = np.arange(0, 5, 5e-3)

@@ -7,8 +7,8 @@ from typing import Any
 
 from ..blocks.effect import Effect, effect_class, effect_library
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
-from .measurement import Measurement
-from .variables import default_free
+from .data.measurement import Measurement
+from .estimation.variables import default_free
 
 MODES = ("auto", "free", "windows")
 _LEAST = 20  # samples of a window, below which nothing is left once its start is fitted

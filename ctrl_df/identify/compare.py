@@ -9,17 +9,26 @@ from functools import cached_property
 import numpy as np
 
 from ..checks import unknown_keywords
+from ..drawing import draw
 from .arguments import check_window
-from .candidate import window_lengths
-from .compared import Compared
-from .derivatives import automatic_cutoff, derivative
-from .measurement import Measurement
-from .records import as_records, has_tables
-from .residual_tests import InputTest, Whiteness, fit_percent, input_residual_test, nrmse, rmse, whiteness
-from .shooting import Problem
-from .simulator import Simulator
-from .where import Regions, error_regions
-from .windows import Windows, facts, make_windows
+from .data.derivatives import automatic_cutoff, derivative
+from .data.measurement import Measurement
+from .data.records import as_records, has_tables
+from .estimation.candidate import window_lengths
+from .estimation.multiple_shooting import Problem
+from .estimation.segments import Windows, facts, make_windows
+from .estimation.simulator import Simulator
+from .residuals.compared import Compared
+from .residuals.regions import Regions, error_regions
+from .residuals.residual_tests import (
+    InputTest,
+    Whiteness,
+    fit_percent,
+    input_residual_test,
+    nrmse,
+    rmse,
+    whiteness,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,9 +223,7 @@ class Comparison(Compared):
         record : int or None
             Which record; None: the worst.
         """
-        from ..plot.compare import comparison_plot
-
-        return comparison_plot(self, record, **keywords)
+        return draw("comparison", self, record=record, **keywords)
 
 
 def compare(model, data, *, mode: str = "auto", window: float | None = None, **keywords) -> Comparison:
@@ -242,7 +249,7 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     """
     unknown_keywords(keywords)
     if has_tables(data):
-        from .frequency_compare import compare_frequency
+        from .tables.compare import compare_frequency
 
         return compare_frequency(model, data)  # pyright: ignore[reportReturnType]
     records = as_records(data)

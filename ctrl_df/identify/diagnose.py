@@ -13,14 +13,14 @@ from ..checks import executor as checked_executor
 from ..checks import unknown_keywords
 from .arguments import check_held_out, check_limits, effect_classes
 from .arguments import free_parameters as free_names
-from .diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
-from .evidence import ROUNDED
-from .explain import explain, find_regions, remains
-from .lack_of_fit import lacks
-from .records import as_records, has_tables
-from .study import Study
-from .trial import Trial
-from .windows import EXACT, facts
+from .data.records import as_records, has_tables
+from .estimation.segments import EXACT, facts
+from .estimation.trial import Trial
+from .residuals.missing_forces import lacks
+from .results.diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
+from .results.explain import explain, find_regions, remains
+from .selection.evidence import ROUNDED
+from .selection.structure_search import Study
 
 SIGNIFICANT = 20.0
 """Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
@@ -79,7 +79,7 @@ def diagnose(
     candidates = effect_classes(candidates)
     began = time.perf_counter()
     if has_tables(data):
-        from .frequency_diagnosis import diagnose_frequency
+        from .tables.diagnosis import diagnose_frequency
 
         return diagnose_frequency(
             model, data, holdout=holdout, candidates=candidates, free=free, executor=executor, limits=limits

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .simulator import free_run
+from .estimation.simulator import free_run
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def next_experiment(
     models += [c.model for c in remaining]
     names = tuple(c.id for c in remaining)
     if hasattr(diagnosis.train[0], "omega"):
-        from .frequency_experiment import stepped_sines
+        from .tables.experiment import stepped_sines
 
         return stepped_sines(diagnosis, models, names, force, stroke, duration, dt)
     record = diagnosis.train[0]
@@ -234,7 +234,7 @@ def _rms(values) -> float:
 
 def _references(t, record):
     """Return references of peak one that begin at rest and turn no faster than the records did."""
-    from .windows import facts
+    from .estimation.segments import facts
 
     swing = max(facts(record).swing, 40 * (t[1] - t[0]))
     half = max(int(round(0.25 * swing / (t[1] - t[0]))), 1)
@@ -249,7 +249,7 @@ def _references(t, record):
 
 def _shapes(t, record):
     """Return inputs of peak one, each ending its motion near where it began."""
-    from .windows import facts
+    from .estimation.segments import facts
 
     f0 = 1.0 / max(facts(record).swing, 10 * (t[1] - t[0]))
     span = t[-1] + t[1]

@@ -9,14 +9,14 @@ from typing import Any
 from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
 from .arguments import check_held_out
-from .attach import attach
+from .data.records import as_records, has_tables
 from .diagnose import HELD, SIGNIFICANT, block_of, effect_classes, free_names, verdict_of
-from .diagnosis import NONE
-from .evidence import ranked
-from .ladder import Found, Step, Study, climb, last_diagnosis, outcome
-from .records import as_records, has_tables
-from .study import Study as Fits
-from .trial import Trial
+from .estimation.trial import Trial
+from .results.diagnosis import NONE
+from .results.ladder import Found, Step, Study, climb, last_diagnosis, outcome
+from .selection.evidence import ranked
+from .selection.structure_search import Study as Fits
+from .starting.attach import attach
 
 RIVALS = 2
 """Candidates of a step that are tried again when a later step is taken."""
@@ -48,7 +48,7 @@ def improve(
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     if has_tables(train):
-        from .frequency_improve import improve_frequency
+        from .tables.improve import improve_frequency
 
         return improve_frequency(
             model, train, holdout, max_effects, candidates=candidates, free=free, executor=executor

@@ -13,14 +13,14 @@ import numpy as np
 from ..blocks.mechanism import Mechanism
 from ..checks import unknown_keywords
 from .arguments import check_fit, check_window, free_parameters
-from .candidate import Candidate, fit_candidate, fit_windows
 from .compare import Comparison, comparison_of
-from .ready import REFERENCE
-from .records import as_records, has_tables
-from .simulator import Simulator
-from .trial import brief_window
-from .valleys import hopped, rough
-from .variables import default_free
+from .data.records import as_records, has_tables
+from .estimation.candidate import Candidate, fit_candidate, fit_windows
+from .estimation.multistart import hopped, rough
+from .estimation.prepared import REFERENCE
+from .estimation.simulator import Simulator
+from .estimation.trial import brief_window
+from .estimation.variables import default_free
 
 __all__ = ["Candidate", "Fit", "FittedParameter", "default_free", "fit_candidate", "refit"]
 
@@ -167,7 +167,7 @@ def refit(
     """
     unknown_keywords(keywords)
     if has_tables(data):
-        from .frequency_refit import refit_frequency
+        from .tables.refit import refit_frequency
 
         return refit_frequency(model, data, free, start=start, budget=budget)
     records = as_records(data)
@@ -250,7 +250,7 @@ def _as_given(model, fitted):
 
 def _with_steps(found: Candidate, records, block, free) -> Candidate:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
-    from .derivatives import step_of
+    from .data.derivatives import step_of
 
     key = "sensor_quantization.step"
     if key not in block.parameters or (free is not None and key not in free_parameters(block, free)):

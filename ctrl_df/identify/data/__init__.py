@@ -1,0 +1,1 @@
+"""Records as they come: measurements, their files, checks and derivatives."""

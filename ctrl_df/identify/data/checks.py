@@ -1,0 +1,112 @@
+"""What a recorded channel must be; every complaint gives rule, value, remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...checks import is_number, shown
+
+MINIMUM = 10
+
+
+def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
+    """Return a private 1-D float array without NaN or infinity, of the given length."""
+    if values is None or isinstance(values, str | bytes | Mapping | set) or is_number(values):
+        raise TypeError(f"{owner} needs {name} as a 1-D array of numbers; got {shown(values)}.")
+    hidden = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else np.zeros(0, bool)
+    masked = np.flatnonzero(hidden)
+    if len(masked):
+        raise ValueError(
+            f"{owner} needs every sample; {name} has {len(masked)} masked, the first at sample {masked[0]}. "
+            "Take the parts between them as records of their own, or fill them yourself where that is honest."
+        )
+    try:
+        raw = np.asarray(values)
+    except ValueError:
+        raise ValueError(
+            f"{owner} needs {name} as a 1-D array of numbers; got rows of unequal length."
+        ) from None
+    if raw.dtype.kind == "c":
+        raise ValueError(
+            f"{owner} needs real numbers in {name}; got complex ones. Is this a frequency response?"
+        )
+    if name == "t" and raw.dtype.kind in "mM" and raw.ndim == 1 and len(raw):
+        raw = (raw - raw[0]) / np.timedelta64(1, "s")  # dates and durations: seconds from the first
+    mixed = raw.dtype.kind == "O" and not all(is_number(v) for v in raw.ravel())
+    if mixed or raw.dtype.kind not in "fiuO" + ("b" if name not in ("t", "u", "y") else ""):
+        kind = {"U": "text", "S": "text", "b": "truth values", "M": "dates", "m": "durations"}
+        got = kind.get(raw.dtype.kind, f"dtype {raw.dtype}")
+        raise TypeError(f"{owner} needs numbers in {name}; got {got}. Convert the column first.")
+    array = np.array(raw, dtype=float)
+    if array.ndim == 2 and 1 in array.shape:
+        array = array.ravel()
+    if array.ndim != 1:
+        raise ValueError(
+            f"{owner} needs {name} as a 1-D array, one number a sample; got shape {array.shape}."
+        )
+    if length is not None and len(array) != length:
+        raise ValueError(
+            f"{owner} needs arrays of equal length; t has {length} samples and {name} {len(array)}."
+        )
+    if length is None and len(array) < MINIMUM:
+        raise ValueError(f"{owner} needs at least {MINIMUM} samples; got {len(array)}. Record longer.")
+    bad = np.flatnonzero(~np.isfinite(array))
+    if len(bad):
+        raise ValueError(
+            f"{owner} needs finite numbers; {name} has {len(bad)} NaN or infinite, the first at "
+            f"sample {bad[0]}. "
+            "Cut them off, or interpolate them yourself where that is honest."
+        )
+    return array
+
+
+def check_times(owner: str, t: np.ndarray) -> None:
+    """Check that times rise strictly and that regular sampling has no hole."""
+    steps = np.diff(t)
+    if np.any(steps < 0):
+        i = int(np.argmax(steps < 0))
+        raise ValueError(
+            f"{owner} needs increasing times; t falls from {t[i]:.9g} to {t[i + 1]:.9g} s at sample {i + 1}. "
+            "Sort the rows, or split the file where a new run begins."
+        )
+    if np.any(steps == 0):
+        i = int(np.argmax(steps == 0))
+        count = int(np.count_nonzero(steps == 0))
+        raise ValueError(
+            f"{owner} needs each time once; t = {t[i]:.9g} s appears twice at sample {i + 1} "
+            f"({count} repetitions in all). "
+            "Drop the repeated rows, or write the times with more digits."
+        )
+    middle = float(np.median(steps))
+    low, high = np.quantile(steps, [0.05, 0.95])
+    if high > 1.5 * low:
+        return  # irregular on purpose: every interval is as good as another
+    limit = max(1.5 * middle, 1.5 * high)
+    holes = np.flatnonzero(steps > limit)
+    if len(holes):
+        i = int(holes[0])
+        raise ValueError(
+            f"{owner} needs gapless sampling; {len(holes)} gap(s) in a regular {middle:.6g} s grid, "
+            f"the first from {t[i]:.9g} to {t[i + 1]:.9g} s ({steps[i] / middle:.3g} intervals). "
+            "Give the parts as separate records."
+        )
+
+
+def check_input(owner: str, u: np.ndarray) -> None:
+    """Check that the input moves at all."""
+    if np.ptp(u) == 0:
+        raise ValueError(
+            f"{owner} needs an input that varies; u is {u[0]:g} throughout, which teaches nothing. "
+            "Check the column, or excite the drive."
+        )
+
+
+def check_output(owner: str, y: np.ndarray) -> None:
+    """Check that the output moves at all."""
+    if np.ptp(y) == 0:
+        raise ValueError(
+            f"{owner} needs an output that varies; y is {y[0]:g} throughout. "
+            "Check the column and the sensor, or apply a larger force."
+        )

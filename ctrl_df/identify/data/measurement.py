@@ -1,0 +1,375 @@
+"""Recorded runs as values: checked once, in SI units, ready to be compared with a model."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ...checks import choice, count, mapping, number, shown, unknown_keywords
+from ...units import si_unit, to_si
+from . import derivatives, readers
+from .checks import as_channel, check_input, check_output, check_times
+from .frequency_measurement import FrequencyMeasurement
+
+__all__ = ["FrequencyMeasurement", "Measurement"]
+
+HOLDS = ("zoh", "linear")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurement:
+    """One recorded run: time, input, output, and whatever else was measured.
+
+    All arrays are converted to SI (angles in rad) and read-only; sampling may be irregular.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Sample times, strictly increasing, n >= 10.
+    u : array_like, shape (n,)
+        Applied force (or whatever drives the model), not constant.
+    y : array_like, shape (n,)
+        Measured output, usually the position, not constant.
+    name : str
+        Shown in tables and pictures.
+    input_unit, output_unit, time_unit : str
+        Units of the arrays given, such as ``mm``, ``um``, ``deg``, ``kN``, ``ms``; afterwards the SI unit.
+    input_hold : {'zoh', 'linear'}
+        What the input did between samples: held its value, or ran straight to the next.
+    velocity : array_like or None, shape (n,)
+        Measured velocity, if there was a sensor for it.
+    velocity_unit : str or None
+        Its unit; None: output unit per second.
+    channels : mapping or None
+        Further signals by name, each an array in SI or a pair (array, unit).
+
+    Raises
+    ------
+    ValueError
+        NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a constant
+        input or output, fewer than 10 samples, an unknown unit; the message gives rule, value, remedy.
+    """
+
+    t: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+    name: str = "measurement"
+    input_unit: str = "N"
+    output_unit: str = "m"
+    input_hold: str = "zoh"
+    velocity: np.ndarray | None = None
+    channels: Mapping[str, Any] | None = None
+    time_unit: str = "s"
+    velocity_unit: str | None = None
+
+    def __post_init__(self):
+        choice("Measurement", "input_hold", self.input_hold, HOLDS)
+        if not isinstance(self.name, str):
+            raise TypeError(f"Measurement needs name as text; got {shown(self.name)}.")
+        if self.channels is not None:
+            mapping("Measurement", "channels", self.channels, "{'current': (i, 'A')}")
+        owner = f"Measurement {self.name!r}"
+        t = as_channel(owner, "t", self.t)
+        n = len(t)
+        u, y = (as_channel(owner, k, getattr(self, k), n) for k in ("u", "y"))
+        scale_u, input_unit = si_unit(self.input_unit)
+        scale_y, output_unit = si_unit(self.output_unit)
+        t = to_si(t, self._seconds())[0]
+        check_times(owner, t)
+        check_input(owner, u)
+        check_output(owner, y)
+        values: dict[str, Any] = dict(
+            t=t, u=u * scale_u, y=y * scale_y, input_unit=input_unit, output_unit=output_unit
+        )
+        velocity_unit = f"{output_unit}/s"
+        if self.velocity is not None:
+            v = as_channel(owner, "velocity", self.velocity, n)
+            scale_v, velocity_unit = (
+                (scale_y, velocity_unit) if self.velocity_unit is None else si_unit(self.velocity_unit)
+            )
+            values["velocity"] = v * scale_v
+        values["velocity_unit"], values["time_unit"] = velocity_unit, "s"
+        extra = {}
+        for key, given in (self.channels or {}).items():
+            array, unit = (
+                given
+                if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str)
+                else (given, "")
+            )
+            extra[key] = to_si(as_channel(owner, f"channel {key!r}", array, n), unit)[0]
+        values["channels"] = MappingProxyType({k: _frozen(v) for k, v in extra.items()})
+        for key, value in values.items():
+            object.__setattr__(self, key, _frozen(value) if isinstance(value, np.ndarray) else value)
+
+    def _seconds(self):
+        if si_unit(self.time_unit)[1] != "s":
+            raise ValueError(
+                f"Measurement needs a unit of time for t, such as s or ms; got {self.time_unit!r}."
+            )
+        return self.time_unit
+
+    # --- from files and other objects -------------------------------------------------------------
+
+    @classmethod
+    def from_csv(
+        cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), delimiter=None,
+        decimal=None, **keywords,
+    ):  # fmt: skip
+        """Read a text table with a header line.
+
+        Read rightly, or refused with the line that is wrong: UTF-8, UTF-16 or Latin-1; units in the header or
+        in a row below it; decimal commas; thousands marks; times as numbers, ISO (``2026-01-31T12:00:00.5``)
+        or clock times (``12:00:00.5``), the last two in seconds from the first.
+
+        Parameters
+        ----------
+        path : path-like
+            Comma, semicolon, tab or blank separated; lines starting with ``#`` are skipped.
+        time, input, output, velocity : str or int
+            Column names, or numbers from 0. A unit in the header, as in ``x [mm]``, is used unless one is
+            given, and need not be repeated in the name.
+        channels : sequence of str
+            Further columns to keep.
+        delimiter : str or None
+            None: found from the first lines.
+        decimal : {'.', ','} or None
+            Decimal mark; None: as the numbers show it.
+        **keywords
+            As for `Measurement`: ``name``, ``input_unit``, ``output_unit``, ``time_unit``, ``input_hold`` ...
+
+        Raises
+        ------
+        ValueError
+            An unknown column (the message lists those there are), one column asked for twice, a cell that
+            is no number (with its line), a file that is no text.
+        """
+        cls._check_keywords(keywords)
+        table = readers.read_csv(path, delimiter, decimal)
+        keywords.setdefault("name", readers.stem(path))
+        return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
+
+    @classmethod
+    def from_mat(cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), **keywords):
+        """Read variables of a MATLAB file (version 4 to 7.2).
+
+        ``data.x`` reaches into a struct, ``data.0`` is the first column of a matrix.
+
+        See `from_csv` for the parameters.
+        """
+        cls._check_keywords(keywords)
+        table = readers.read_mat(path)
+        keywords.setdefault("name", readers.stem(path))
+        return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
+
+    @classmethod
+    def from_dataframe(
+        cls, frame, *, time="t", input="u", output="y", velocity=None, channels=(), **keywords
+    ):
+        """Take columns of a pandas DataFrame; ``time=None`` takes its index.
+
+        See `from_csv` for the parameters.
+        """
+        cls._check_keywords(keywords)
+        table = readers.read_dataframe(frame, time)
+        time = readers.INDEX if time is None else time
+        return cls(
+            **readers.select(table, time, input, output, velocity, channels, keywords, "the DataFrame")
+        )
+
+    @classmethod
+    def from_response(cls, response, *, input=0, output=0, **keywords):
+        """Take one input and one output of a ``ct.TimeResponseData``, by number or label.
+
+        The input of python-control's simulations runs straight between samples: ``input_hold='linear'``
+        unless told otherwise.
+        """
+        cls._check_keywords(keywords)
+        t, u, y = readers.read_response(response, input, output)
+        keywords.setdefault("input_hold", "linear")
+        keywords.setdefault("name", getattr(response, "sysname", None) or "response")
+        return cls(t, u, y, **keywords)
+
+    @classmethod
+    def _check_keywords(cls, keywords):
+        known = [f.name for f in dataclasses.fields(cls) if f.name not in ("t", "u", "y")]
+        unknown_keywords([k for k in keywords if k not in known])
+
+    # --- what it is -------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def duration(self) -> float:
+        """Time from first to last sample [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def dt(self) -> float:
+        """Sample time [s]; for irregular sampling the median interval."""
+        return self.duration / (len(self.t) - 1) if self.regular else float(np.median(np.diff(self.t)))
+
+    @property
+    def regular(self) -> bool:
+        """Whether all intervals agree within 1 %."""
+        steps = np.diff(self.t)
+        middle = np.median(steps)
+        return bool(np.all(np.abs(steps - middle) <= 0.01 * middle))
+
+    def noise_floor(self) -> float:
+        """Estimate the rms of the output's noise [output unit] from the top of its spectrum.
+
+        The level found between half and 95 % of the Nyquist frequency is extended over the whole band: right
+        for white noise, too low for noise that fades with frequency. An encoder's rounding is found from the
+        smallest step in the record and counted as step/sqrt(12), the larger of both being returned.
+        """
+        return derivatives.noise_floor(self.t, self.y)
+
+    def velocity_estimate(self, cutoff=None) -> np.ndarray:
+        """Estimate the velocity [output unit/s] from the output.
+
+        Central differences of the output passed forwards and backwards (no lag) through a 4th-order
+        Butterworth low-pass; irregular sampling is interpolated to the median interval first. The ends (about
+        1/`cutoff` seconds) are less exact.
+
+        Parameters
+        ----------
+        cutoff : float or None
+            [Hz]; None: where the spectrum of the output sinks into its noise floor.
+        """
+        return derivatives.derivative(self.t, self.y, 1, cutoff)
+
+    def acceleration_estimate(self, cutoff=None) -> np.ndarray:
+        """Estimate the acceleration [output unit/s^2]; see `velocity_estimate`."""
+        return derivatives.derivative(self.t, self.y, 2, cutoff)
+
+    # --- parts ------------------------------------------------------------------------------------
+
+    def slice(self, start=None, stop=None) -> Measurement:
+        """Return the samples with ``start <= t <= stop`` [s]; at least 10 must remain."""
+        low = self.t[0] if start is None else number("slice", "start", start, "s", infinite=True)
+        high = self.t[-1] if stop is None else number("slice", "stop", stop, "s", infinite=True)
+        margin = 1e-9 * max(self.dt, abs(low), abs(high))
+        first = int(np.searchsorted(self.t, low - margin, "left"))
+        last = int(np.searchsorted(self.t, high + margin, "right"))
+        if last - first < 10:
+            raise ValueError(
+                f"a slice needs 10 samples or more; {low:g} to {high:g} s holds {max(last - first, 0)} of "
+                f"{self.name!r}, which runs from {self.t[0]:g} to {self.t[-1]:g} s. Widen it."
+            )
+        return self._part(slice(first, last), self.name)
+
+    def windows(self, length, overlap=0.0) -> tuple[Measurement, ...]:
+        """Cut the record into windows.
+
+        Parameters
+        ----------
+        length : float
+            [s], at least 10 samples; a record shorter than that is one window.
+        overlap : float
+            Share of a window that the next one repeats, 0 <= overlap < 1.
+
+        Returns
+        -------
+        tuple of Measurement
+            Of `length` each; what is left at the end joins the last one.
+        """
+        length, overlap = number("windows", "length", length, "s"), number("windows", "overlap", overlap)
+        if not 0 <= overlap < 1:
+            raise ValueError(f"windows needs 0 <= overlap < 1 (share of a window); got overlap={overlap!r}.")
+        if not length > 9 * self.dt:
+            raise ValueError(
+                f"windows needs a length over 9 samples ({9 * self.dt:g} s); got length={length!r}."
+            )
+        if not length * (1 - overlap) > 0.5 * self.dt:
+            raise ValueError(
+                f"windows needs an overlap that moves on by a sample at least; got overlap={overlap!r} of "
+                f"{length:g} s. Lower it."
+            )
+        number_of = max(int((self.duration - length) / (length * (1 - overlap)) + 1 + 1e-9), 1)
+        starts = self.t[0] + length * (1 - overlap) * np.arange(number_of)
+        edges = np.searchsorted(self.t, starts - 1e-9 * self.dt)
+        ends = np.searchsorted(self.t, starts + length - 1e-9 * self.dt)
+        ends[-1] = len(self.t)
+        pairs = [(a, b) for a, b in zip(edges, ends, strict=True) if b - a >= 10]
+        return tuple(self._part(slice(a, b), f"{self.name} [{i}]") for i, (a, b) in enumerate(pairs))
+
+    def decimate(self, factor) -> Measurement:
+        """Return every `factor`-th sample.
+
+        Output, velocity and channels pass a zero-phase low-pass at 70 % of the new Nyquist frequency first.
+        A held input is averaged over each new interval, which keeps its impulse; a linear one is filtered
+        like the output.
+
+        Raises
+        ------
+        ValueError
+            Irregular sampling, a factor that is no integer >= 1, or fewer than 10 samples left.
+        """
+        factor = count("decimate", "factor", factor)
+        if not self.regular:
+            raise ValueError(
+                "decimate needs regular sampling; these intervals differ by more than 1 %. Resample first."
+            )
+        if len(self.t) // factor < 10:
+            raise ValueError(
+                f"decimate needs 10 samples left; {len(self.t)} samples over {factor} are too few."
+            )
+        if factor == 1:
+            return self
+        thin = {
+            k: derivatives.thinned(getattr(self, k), factor)
+            for k in ("y", "velocity")
+            if getattr(self, k) is not None
+        }
+        channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
+        held = self.input_hold == "zoh"
+        u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
+        return self._with(t=self.t[::factor], u=u, channels=MappingProxyType(channels), **thin)
+
+    def _part(self, where, name):
+        channels = MappingProxyType({k: v[where] for k, v in self.channels.items()})  # type: ignore[union-attr]
+        velocity = None if self.velocity is None else self.velocity[where]
+        return self._with(
+            t=self.t[where], u=self.u[where], y=self.y[where], velocity=velocity, channels=channels, name=name
+        )
+
+    def _with(self, **changes):
+        """Copy without checking again: a part of a good record may well have a constant input."""
+        part = object.__new__(type(self))
+        for field in dataclasses.fields(self):
+            value = changes.get(field.name, getattr(self, field.name))
+            object.__setattr__(part, field.name, _frozen(value) if isinstance(value, np.ndarray) else value)
+        return part
+
+    def __getstate__(self):
+        """Return the fields for pickling (worker processes); a mapping proxy cannot be."""
+        state = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return {**state, "channels": dict(state["channels"])}
+
+    def __setstate__(self, state):
+        """Take the fields back, read-only again."""
+        state = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in state.items()}
+        state["channels"] = MappingProxyType({k: _frozen(v) for k, v in state["channels"].items()})
+        for key, value in state.items():
+            object.__setattr__(self, key, value)
+
+    def __repr__(self) -> str:
+        rate = f"dt {self.dt:g} s" if self.regular else f"irregular, median dt {self.dt:g} s"
+        extra = "" if self.velocity is None else ", velocity"
+        extra += "".join(f", {k}" for k in self.channels)  # type: ignore[union-attr]
+        return (
+            f"Measurement({self.name!r}: {len(self)} samples, {self.t[0]:g} to {self.t[-1]:g} s, {rate}, "
+            f"input [{self.input_unit}] {self.input_hold}, output [{self.output_unit}]{extra})"
+        )
+
+
+def _frozen(array: np.ndarray) -> np.ndarray:
+    view = array.view()
+    view.flags.writeable = False
+    return view

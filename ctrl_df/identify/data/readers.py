@@ -1,0 +1,199 @@
+"""Tables of named columns out of files and other objects, and the choice of columns from them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...checks import is_number, names, path_of, shown
+from .text_table import read_csv, refuse_text
+
+__all__ = ["find_column", "read_csv", "read_dataframe", "read_mat", "read_response", "select", "stem"]
+
+_MOST_COLUMNS = 99  # of a matrix
+INDEX = "index of the frame"
+_UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+
+
+def stem(path) -> str:
+    """Return the file's name without folder and ending."""
+    return Path(path).stem
+
+
+def read_mat(path) -> dict[str, np.ndarray]:
+    """Return the numeric variables of a MATLAB file, struct fields as ``struct.field``.
+
+    Columns of a matrix are ``name.0``, ``name.1`` ...; of one wider than long, its rows.
+    """
+    from scipy.io import loadmat
+
+    path = path_of("from_mat", "path", path)
+    if not path.exists() and not path.suffix:
+        path = path.with_suffix(".mat")
+    with open(path, "rb") as file:
+        head = file.read(128)
+    if b"MATLAB 7.3" in head or head.startswith(b"\x89HDF"):
+        raise ValueError(
+            f"a .mat file must be version 7.2 or older; {path} is version 7.3 (HDF5). Save it again with "
+            "save(..., '-v7') in MATLAB."
+        )
+    if not head:
+        raise ValueError(f"a .mat file must hold variables; {path} is empty. Save it again.")
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False, appendmat=False)
+    except Exception as error:  # SciPy's reader fails on junk in many ways
+        raise ValueError(
+            f"a .mat file must be one that MATLAB wrote (version 4 to 7.2); {path} cannot be read as such "
+            f"({type(error).__name__}). Save it again, or read text with from_csv."
+        ) from None
+    table: dict[str, np.ndarray] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _flatten(name, value, table)
+    return table
+
+
+def _flatten(name, value, table):
+    if hasattr(value, "_fieldnames"):
+        for field in value._fieldnames:
+            _flatten(f"{name}.{field}", getattr(value, field), table)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 1:
+        table[name] = value.astype(float)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2:
+        wide = value.shape[1] > value.shape[0]
+        for k, line in enumerate((value if wide else value.T)[:_MOST_COLUMNS]):
+            table[f"{name}.{k}"] = line.astype(float)
+
+
+def read_dataframe(frame, time) -> dict[str, np.ndarray]:
+    """Return the columns of a DataFrame by name, its index too where that is the time."""
+    if not hasattr(frame, "columns") or not hasattr(frame, "to_numpy"):
+        raise TypeError(f"from_dataframe needs a pandas DataFrame; got {type(frame).__name__}.")
+    table = {str(name): frame[name].to_numpy() for name in frame.columns}
+    if len(table) < len(frame.columns):
+        raise ValueError("column names must differ; the DataFrame has some more than once. Rename them.")
+    if time is None:
+        index = frame.index
+        if index.dtype.kind in "mM":  # dates or durations: seconds from the first
+            table[INDEX] = (index - index[0]).total_seconds().to_numpy()
+        else:
+            table[INDEX] = index.to_numpy()
+    return table
+
+
+def read_response(response, input, output):
+    """Return time, one input, one output of a response of python-control."""
+    if not all(hasattr(response, k) for k in ("time", "inputs", "outputs")):
+        raise TypeError(
+            f"from_response needs a ct.TimeResponseData, as event_response returns; got {shown(response)}."
+        )
+    t = np.asarray(response.time, dtype=float)
+    u, y = response.inputs, response.outputs
+    if u is None:
+        raise ValueError(
+            "from_response needs a response that kept its input; got none. Simulate with an input."
+        )
+    u, y = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
+    ku = _row(input, getattr(response, "input_labels", None), u, "input")
+    ky = _row(output, getattr(response, "output_labels", None), y, "output")
+    return t, _pick(u, ku, t, "inputs"), _pick(y, ky, t, "outputs")
+
+
+def _row(which, labels, array, kind):
+    rows = 1 if array.ndim == 1 else array.shape[0]
+    if isinstance(which, str):
+        labels = list(labels or [])
+        if which not in labels:
+            raise ValueError(
+                f"the {kind} must be one of {', '.join(labels) or 'the numbers'}; got {which!r}."
+            )
+        return labels.index(which)
+    if not (is_number(which) and which in range(rows)):
+        raise (ValueError if is_number(which) else TypeError)(
+            f"the {kind} must be a label or a number from 0 to {rows - 1}; got {shown(which)}."
+        )
+    return int(which)
+
+
+def _pick(array, row, t, kind):
+    if array.ndim == 1:
+        return array
+    if array.ndim == 2:
+        return array[row]
+    if array.ndim == 3 and array.shape[1] == 1:
+        return array[row, 0]
+    raise ValueError(
+        f"from_response needs one trace of {kind}; got shape {array.shape}. Select one trace first."
+    )
+
+
+def select(
+    table: Mapping[str, Any], time, input, output, velocity, channels, keywords: dict[str, Any], source: str
+) -> dict[str, Any]:
+    """Return the keyword arguments of a `Measurement` for the columns asked for."""
+    wanted_of = {"t": time, "u": input, "y": output}
+    if velocity is not None:
+        wanted_of["velocity"] = velocity
+    unit_of = {"t": "time_unit", "u": "input_unit", "y": "output_unit", "velocity": "velocity_unit"}
+    chosen: dict[str, Any] = {}
+    taken: dict[str, str] = {}
+    said = {"t": "time", "u": "input", "y": "output", "velocity": "velocity"}
+    for field, wanted in wanted_of.items():
+        column, unit = find_column(table, wanted, source)
+        if column in taken:
+            raise ValueError(
+                f"{taken[column]} and {said[field]} need a column each; both are {column!r} of {source}. "
+                f"{_exist(list(table), source)}"
+            )
+        taken[column] = said[field]
+        refuse_text(table, column, source)
+        chosen[field] = table[column]
+        if unit and keywords.get(unit_of[field]) is None:
+            chosen[unit_of[field]] = unit
+    extra = {}
+    for wanted in _several(channels):
+        column, unit = find_column(table, wanted, source)
+        refuse_text(table, column, source)
+        extra[str(wanted)] = (table[column], unit) if unit else table[column]
+    if extra:
+        chosen["channels"] = extra
+    return {**chosen, **{k: v for k, v in keywords.items() if v is not None}}
+
+
+def _several(channels):
+    if isinstance(channels, int) and not isinstance(channels, bool):
+        return (channels,)
+    if isinstance(channels, list | tuple) and any(isinstance(c, int) for c in channels):
+        return tuple(channels)
+    return names("a record", "channels", channels)
+
+
+def find_column(table: Mapping[str, Any], wanted, source: str) -> tuple[str, str]:
+    """Return the column's full name and the unit its header states."""
+    known = list(table)
+    if not isinstance(wanted, str | int | np.integer) or isinstance(wanted, bool):
+        raise TypeError(
+            f"a column must be given by name or number; got {shown(wanted)}. {_exist(known, source)}"
+        )
+    if not isinstance(wanted, str):
+        if not 0 <= wanted < len(known):
+            raise ValueError(
+                f"a column number must be 0 to {len(known) - 1}; got {wanted}. {_exist(known, source)}"
+            )
+        wanted = known[wanted]
+    plain = {name: _UNIT.match(name) for name in known}
+    matches = [n for n in known if n == wanted] or [
+        n for n, m in plain.items() if m and m.group(1).strip() == wanted
+    ]
+    if len(matches) != 1:
+        raise ValueError(f"a column must be named as in the file; got {wanted!r}. {_exist(known, source)}")
+    m = plain[matches[0]]
+    return matches[0], m.group(2) if m else ""
+
+
+def _exist(known, source):
+    return f"Columns of {source}: {', '.join(map(str, known)) or 'none'}."

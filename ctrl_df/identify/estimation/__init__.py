@@ -1,0 +1,1 @@
+"""Fits of one model: segments, multiple shooting, initial states, noise, uncertainty."""

@@ -1,0 +1,353 @@
+"""Fit a model to records: stages from short windows and a thinned input to whole ones at full rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..data.measurement import Measurement
+from .covariance import covariance_of
+from .initial_states import FITTED
+from .multiple_shooting import Problem
+from .noise_model import NoiseModel
+from .segments import Windows, facts, make_windows, usual_window
+from .sensitivity import Tangent
+from .simulator import Simulator
+from .variables import default_free
+
+MODES = ("auto", "free", "windows")
+
+
+@dataclass
+class Candidate:
+    """Outcome of `fit_candidate`.
+
+    Attributes
+    ----------
+    model : block
+        With the parameters found.
+    names, values : tuple of str, (p,) array
+        The free parameters.
+    covariance : (p, p) array
+        Of `values`, for residuals of the colour seen.
+    residual, simulated : list of (n,) array
+        Per record, measured minus simulated.
+    count : int
+        Values that the cost is of.
+    unit : float
+        Of these values, where they are not in the unit of `rmse`.
+    colour : NoiseModel or None
+        What the cost sees of the output where it is of forces (see `fit_windows`).
+    rmse, nrmse : float
+        Error over all records; nrmse over the rms of the centred outputs. Where the cost is of forces (see
+        `fit_windows`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
+    nfev : int
+        Simulations of all records together.
+    converged : bool
+        Whether the last step promised less than a thousandth of the cost.
+    at_bound : tuple of bool
+        Per parameter.
+    null : list of (float, array)
+        Relative singular value and direction (in scaled parameters) the data do not determine.
+    scale : (p,) array
+        Natural scale of each parameter.
+    starts : list of (nw, ns) array
+        Initial states, as corrections (see `Simulator.run`).
+    windows : list of Windows
+        Where the model was started anew.
+    linear : callable or None
+        Works out `tangent`, once it is asked for.
+    """
+
+    model: Any
+    names: tuple[str, ...]
+    values: np.ndarray
+    covariance: np.ndarray
+    residual: list
+    simulated: list
+    count: int
+    unit: float
+    colour: NoiseModel | None
+    rmse: float
+    nrmse: float
+    nfev: int
+    converged: bool
+    at_bound: tuple[bool, ...]
+    null: list
+    scale: np.ndarray
+    starts: list
+    windows: list
+    linear: Callable[[], Tangent] | None = field(repr=False, default=None)
+
+    @cached_property
+    def tangent(self) -> Tangent | None:
+        """The fitted model as a linear map of its parameters and initial states; None without parameters."""
+        return self.linear() if self.linear is not None else None
+
+    def __getstate__(self):
+        # what works it out stays behind with the simulations of the fit
+        return {**self.__dict__, "tangent": self.__dict__.get("tangent"), "linear": None}
+
+    @property
+    def residual_pieces(self) -> list[np.ndarray]:
+        """The residual as evidence takes it: of every record, or every window where errors are of forces."""
+        return self.by_window(self.residual) if self.colour is not None else list(self.residual)
+
+    @property
+    def simulated_pieces(self) -> list[np.ndarray]:
+        """The simulated output, as `residual_pieces`."""
+        return self.by_window(self.simulated) if self.colour is not None else list(self.simulated)
+
+    def by_window(self, signals) -> list[np.ndarray]:
+        """Return signals, one a record, window by window."""
+        return [x[where] for w, x in zip(self.windows, signals, strict=True) for where in w.slices]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Free parameters by name."""
+        return dict(zip(self.names, map(float, self.values), strict=True))
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard errors by name."""
+        return dict(
+            zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True)
+        )
+
+
+def window_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
+    """Return per record the length of window [s] that `mode` means; None: the whole record."""
+    if mode not in MODES:
+        raise ValueError(f"mode must be one of {', '.join(MODES)}; got {mode!r}.")
+    if window is not None and not window > 0:
+        raise ValueError(
+            f"window needs a length > 0 [s]; got {window!r}. Leave it out for one that fits the motion."
+        )
+    lengths: list[float | None] = []
+    for record in records:
+        simulator = Simulator(model, record)
+        usual = float(window) if window is not None else usual_window(record)
+        free = mode == "free" or simulator.closed
+        if mode == "auto" and window is None:
+            free = free or simulator.anchored or record.duration < 1.5 * usual
+        lengths.append(None if free else usual)
+    return lengths
+
+
+def fit_candidate(
+    model,
+    records: Sequence[Measurement],
+    start: Mapping[str, float] | None = None,
+    free: Sequence[str] | None = None,
+    *,
+    budget: int = 120,
+    mode: str = "auto",
+    window: float | None = None,
+    thin: int = 4,
+    polish: int = 2,
+    coarse: bool | None = None,
+    robust: bool = True,
+    starts: Sequence[np.ndarray] | None = None,
+    tolerance: float = 1e-3,
+    central: bool = False,
+    iterations: int = 12,
+) -> Candidate:
+    """Fit a model to records, fast.
+
+    Parameters
+    ----------
+    model : block or loop
+        Structure and start values.
+    records : sequence of Measurement
+    start : mapping or None
+        Parameters that start elsewhere than the model's own values (all others keep theirs).
+    free : sequence of str or None
+        Parameters to move; None: `default_free`.
+    budget : int
+        Bound on the simulations of all records.
+    mode, window
+        As for `compare`.
+    thin : int
+        Samples a step of the input in all but the last iterations; 1: never thinned.
+    polish : int
+        Iterations at full rate at the end; 0 leaves the fit at the thinned input.
+    coarse : bool or None
+        Whether to begin with short windows, which converge from far off; None: unless `start` is given.
+    robust : bool
+        Huber's loss beyond four times the median deviation.
+    starts : sequence of arrays or None
+        Initial states of an earlier fit with the same windows, to begin with.
+    tolerance : float
+        Relative decrease of the cost that is not worth another iteration.
+    central : bool
+        Whether the last Jacobian is by central differences.
+    iterations : int
+        Bound on the iterations over the full windows.
+    """
+    records = list(records)
+    first = Simulator(model, records[0])
+    model = first.with_values(dict(start)) if start else model
+    block = first.block if not start else Simulator(model, records[0]).block
+    names = tuple(default_free(block) if free is None else free)
+    table = block.parameters
+    for name in names:
+        if name not in table:
+            raise ValueError(f"a free parameter must be one of {', '.join(table)}; got {name!r}.")
+    lengths = window_lengths(model, records, mode, window)
+    problem = Problem(model, records, names, budget)
+    theta = problem.start()
+    if coarse is None:
+        coarse = start is None
+    if coarse and names and not first.closed:
+        for short in _short_windows(first, records, lengths):
+            problem.stage(_cut(records, short), thin)
+            theta = problem.solve(theta, iterations=6, tolerance=0.02, robust=False)
+    problem.stage(_cut(records, lengths), thin if polish else max(thin, 1), starts)
+    theta = problem.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
+    if polish and thin > 1:
+        problem.stage(problem.windows, 1, problem.nuisance)
+        theta = problem.solve(theta, iterations=polish, tolerance=tolerance, robust=robust)
+    return _candidate(problem, theta, central)
+
+
+def fit_windows(
+    model,
+    records: Sequence[Measurement],
+    windows: Sequence[Windows],
+    names: Sequence[str],
+    *,
+    thin: int = 4,
+    starts: Sequence[np.ndarray] | None = None,
+    iterations: int = 12,
+    tolerance: float = 1e-3,
+    robust: bool = False,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    errors: bool = False,
+    colour: NoiseModel | None = None,
+    begins: str = FITTED,
+    hopeless: float = math.inf,
+    outlook: int = 0,
+) -> Candidate:
+    """Fit the named parameters over given windows in one stage.
+
+    Parameters
+    ----------
+    model : block
+    records, windows : sequences
+        Records and the parts of each that count.
+    names : sequence of str
+        Parameters to move; an empty one fits the initial states alone.
+    thin : int
+        Samples a step of the input.
+    starts : sequence of arrays or None
+        Initial states to begin with.
+    iterations, tolerance, robust
+        As for `fit_candidate`.
+    limits : mapping or None
+        Least and largest values of some parameters, within their ranges.
+    errors : bool
+        Whether to work out the covariance, from the derivatives of the last step; else it is empty.
+    colour : NoiseModel or None
+        The `force_errors` whose squares are made least, where the machine's own forces make the error.
+    begins : str
+        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+    hopeless : float
+        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there
+        at the pace of its last steps.
+    outlook : int
+        Iterations that are to follow in other fits.
+
+    Returns
+    -------
+    Candidate
+    """
+    problem = Problem(model, records, names, 100_000, limits, colour, begins, (hopeless, outlook))
+    problem.stage(list(windows), thin, starts)
+    theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
+    problem.round(theta)
+    if not errors or problem.slopes is None or not names:
+        return _outcome(problem, theta, np.zeros((0, 0)), [])
+    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
+    return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
+
+
+def _cut(records, lengths) -> list[Windows]:
+    return [make_windows(r, n) for r, n in zip(records, lengths, strict=True)]
+
+
+def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
+    """Return the lengths of windows of the stages before the last, shortest first.
+
+    Over half a stroke an error of a parameter has not grown beyond what its slope tells. An elastic joint
+    rings faster than the drive turns: there a few periods of it come first, then more of them.
+    """
+    spans = [r.duration if n is None else n for r, n in zip(records, lengths, strict=True)]
+    first = [0.5 * facts(r).swing for r in records]
+    core = simulator.block.core if simulator.mechanism else None
+    if core is not None and core.stiffness > 0:
+        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
+        first = [min(f, 4 * 2 * math.pi * math.sqrt(mass / core.stiffness)) for f in first]
+    first = [max(f, 40 * facts(r).dt) for f, r in zip(first, records, strict=True)]
+    stages: list[list[float | None]] = []
+    factor = 1.0
+    while any(1.5 * factor * f < span for f, span in zip(first, spans, strict=True)) and len(stages) < 4:
+        stages.append([min(factor * f, span) for f, span in zip(first, spans, strict=True)])
+        if core is None or core.stiffness == 0:
+            break
+        factor *= 4
+    return stages
+
+
+# --- the answer -----------------------------------------------------------------------------------
+
+
+def _candidate(problem: Problem, theta, central) -> Candidate:
+    """Return the outcome with covariance, from derivatives about the solution."""
+    if not problem.names:
+        return _outcome(problem, theta, np.zeros((0, 0)), [])
+    base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
+    problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
+    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
+    return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
+
+
+def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
+    values = problem.values(theta) or {}
+    residual = problem.last
+    total, count = problem.power(residual)
+    spread, _ = problem.power([y - y.mean() for y in problem.measured])
+    return Candidate(
+        model=problem.simulators[0].with_values(values),
+        names=problem.names,
+        values=np.array([values[k] for k in problem.names]),
+        covariance=covariance,
+        residual=residual,
+        simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
+        count=count,
+        unit=problem.unit,
+        colour=problem.colour,
+        rmse=math.sqrt(total / count),
+        nrmse=math.sqrt(total / spread),
+        nfev=round(problem.nfev),
+        converged=problem.converged,
+        at_bound=tuple(
+            bool(
+                v.clip(q + 1e-6) == q
+                or v.clip(q - 1e-6) == q
+                or abs(values[v.name] - v.p(q)) > 1e-9 * v.scale
+            )
+            for v, q in zip(problem.variables, theta, strict=True)
+        ),
+        null=null,
+        scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
+        starts=problem.nuisance,
+        windows=problem.windows,
+        linear=problem.tangent if problem.slopes is not None and problem.names else None,
+    )

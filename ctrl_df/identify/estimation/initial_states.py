@@ -1,0 +1,146 @@
+"""Initial states of a window: what the data say of them, corrected by what a fit finds, and back.
+
+Position and speed of the body that is measured are estimated from the record; the corrections of these, and
+all that is hidden (where the other body stands in a gap, how far a joint or the bristles are bent), are
+nuisance parameters of each window.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...blocks.core import ELASTIC, IMPACT, level
+
+SEEN: tuple[str, ...] = ("x", "v")
+"""Names of those that the record tells of; all others are hidden."""
+
+SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "bristle"})
+"""Names of those hidden that come to be what the motion makes them, wherever they began."""
+
+FITTED, CHAINED, MEASURED = "fitted", "chained", "measured"
+"""How windows begin: every state is fitted, window by window; all but those that settle are, which go on from
+one window into the next; none is: windows begin as the record says, and what is hidden goes on.
+"""
+
+
+def names(core) -> tuple[str, ...]:
+    """Return the names of the initial states of a mechanism, in the order of the corrections."""
+    found = list(SEEN)
+    if core.joint == IMPACT:
+        found += ["slack", "slack_rate"]
+    elif core.joint == ELASTIC:
+        found += ["stretch", "stretch_rate"]
+    if core.bristle is not None:
+        found.append("bristle")
+    return tuple(found)
+
+
+def fitted_names(core, begins: str) -> tuple[str, ...]:
+    """Return the names of those that are fitted where windows begin so."""
+    if begins == MEASURED:
+        return ()
+    return tuple(n for n in names(core) if begins == FITTED or n not in SETTLING)
+
+
+def carried_names(core, begins: str) -> tuple[str, ...]:
+    """Return the names of those that go on from one window into the next."""
+    fitted = fitted_names(core, begins)
+    return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
+
+
+def reach(which, core, known, windows) -> np.ndarray:
+    """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
+
+    `known`: `windows.facts` of the record.
+    """
+    one = np.ones(len(windows))
+    table = {
+        "x": 5 * windows.x_error + 0.02 * known.spread,
+        "v": 2 * windows.v_error + 0.01 * known.speed,
+        "slack": one,
+        "slack_rate": 0.7 * known.speed * one,
+        "bristle": 0.5 * one,
+    }
+    if core.joint == ELASTIC:
+        bend = known.force / max(core.stiffness, 1e-300)
+        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
+        table["stretch"] = 0.6 * bend * one
+        table["stretch_rate"] = 0.6 * bend * math.sqrt(core.stiffness / mass) * one
+    return np.column_stack([table[name] for name in which])
+
+
+def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
+    """Write the states (nw, nx) of a mechanism at the begin of windows.
+
+    `usual`: positions, speeds and accelerations (nw,) of the body measured; `given`: corrections by name,
+    each (nw,) or one number; `speed` [m/s] is typical of the record.
+    """
+    x, v, a = usual
+    x, v = x + given.get("x", 0.0), v + given.get("v", 0.0)
+    if core.stop is not None:
+        x = np.clip(x, *core.stop.span)
+    stretch, rate = _joint(core, a)
+    if core.joint == IMPACT:
+        stretch = np.clip(given.get("slack", stretch / core.gap), 0.0, 1.0) * core.gap
+        rate = given.get("slack_rate", 0.0)
+    elif core.joint == ELASTIC:
+        stretch, rate = stretch + given.get("stretch", 0.0), given.get("stretch_rate", 0.0)
+    if core.bodies == 2 and core.measured == 1:
+        states[:, 2], states[:, 3] = x, v
+        states[:, 0], states[:, 1] = x - stretch, v - rate
+    else:
+        states[:, 0], states[:, 1] = x, v
+        if core.bodies == 2:
+            states[:, 2], states[:, 3] = x + stretch, v + rate
+    if core.bodies == 2 and core.stop is not None:
+        beyond = np.clip(states[:, 2], *core.stop.span) - states[:, 2]
+        states[:, 2] += beyond
+        states[:, 0] += beyond
+    if core.bristle is not None:
+        slip, full = np.array([_bristles(row, core) for row in states]).T
+        share = np.tanh(3 * slip / speed) + given.get("bristle", 0.0)
+        states[:, core.bristle_state] = np.clip(share, -1.0, 1.0) * full
+
+
+def corrections(states, core, usual, speed: float) -> dict[str, float]:
+    """Return the corrections by name that `fill` makes these states of."""
+    x, v, a = (float(s) for s in usual)
+    at = 2 if core.bodies == 2 and core.measured == 1 else 0
+    found = {"x": states[at] - x, "v": states[at + 1] - v}
+    if core.bodies == 2:
+        stretch, rate = states[2] - states[0], states[3] - states[1]
+        found |= {"slack": stretch / core.gap if core.gap else 0.0, "slack_rate": rate}
+        found |= {"stretch": stretch - _joint(core, a)[0], "stretch_rate": rate}
+    if core.bristle is not None:
+        slip, full = _bristles(states, core)
+        share = states[core.bristle_state] / full if full > 0 else 0.0
+        found["bristle"] = share - math.tanh(3 * slip / speed)
+    return found
+
+
+def at_rest(core, usual, speed: float) -> dict[str, float]:
+    """Return the corrections, by name, of a mechanism at rest at the measured position, nothing bent."""
+    states = np.zeros(4 + (core.bristle_state + 1 if core.bristle is not None else 0))
+    states[[0, 2]] = float(usual[0])
+    return corrections(states, core, usual, speed)
+
+
+def _joint(core, acceleration) -> tuple[Any, float]:
+    """Return how far a joint is bent by the load that it accelerates, and at what rate."""
+    if core.joint == IMPACT:
+        return core.gap * (acceleration > 0), 0.0
+    if core.joint == ELASTIC:
+        pull = core.masses[0] * acceleration
+        return pull / core.stiffness + core.gap * (pull > 0), 0.0
+    return 0.0, 0.0
+
+
+def _bristles(states, core) -> tuple[float, float]:
+    """Return the speed over the bristles, and their full deflection [m]."""
+    slip = float(states[2 * core.driven + 1])
+    full = level(core.friction[core.driven], 1.0, math.copysign(1.0, slip), abs(slip)) + core.bristle.level
+    return slip, full / core.bristle.stiffness

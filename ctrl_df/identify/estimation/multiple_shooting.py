@@ -1,0 +1,425 @@
+"""Simulation-error least squares by multiple shooting.
+
+Each window of each record starts from a state of its own. Those states enter linearly near the solution; they
+are eliminated window by window from the normal equations (variable projection), so that the work grows with
+the number of parameters only. Steps are Levenberg-Marquardt, bounds are kept by projection, outliers are
+bent to Huber's loss once the fit is near. Derivatives are differences of a size that moves the output by
+about the noise: far above the roughness that events leave in the cost.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .initial_states import FITTED
+from .noise_model import power
+from .restarts import GOOD, rescue, scan_slack
+from .segments import Windows, facts
+from .sensitivity import Tangent
+from .simulator import Simulator, feasible
+from .variables import variables_of
+
+Signals = list[np.ndarray]
+
+
+class Problem:
+    """Records, windows and free parameters of one fit.
+
+    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the
+    initial states, `slopes` the derivatives of the last step.
+    """
+
+    def __init__(
+        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=(math.inf, 0)
+    ):
+        self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
+        self.colour, self.begins = colour, begins
+        self.hopeless, self.outlook = hopeless
+        self.known = [facts(r) for r in records]
+        self.block = Simulator(model, records[0]).block
+        self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
+        self.steps = np.full(len(names), 1e-3)
+        self.nfev = 0
+        self.converged = False
+        self.simulators: list[Simulator] = []
+        self.windows: list[Windows] = []
+        self.measured: Signals = []
+        self.nuisance: list[np.ndarray] = []
+        self.priors: list[np.ndarray] = []
+        self.widest: list[np.ndarray] = []
+        self.last: Signals = []
+        self.slopes: tuple[list, list] | None = None
+        self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
+
+    def start(self) -> np.ndarray:
+        """Return the scaled parameters of the model as it is."""
+        return np.array([v.clip(v.q(self.block.parameters[v.name].value)) for v in self.variables])
+
+    def values(self, theta):
+        """Return the parameters by name, static levels kept above the kinetic one."""
+        given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
+        return feasible(self.block, given) if given else None
+
+    def stage(self, windows: list[Windows], thin, starts=None):
+        """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
+        self.simulators = [Simulator(self.model, r, thin=thin, begins=self.begins) for r in self.records]
+        self.windows = windows
+        self.measured = [r.y[w.samples] for r, w in zip(self.records, windows, strict=True)]
+        self.priors = [s.priors(w) for s, w in zip(self.simulators, windows, strict=True)]
+        if starts is not None:
+            # those of a fit of more states: the first of them are the same
+            starts = [a[:, : p.shape[1]] for a, p in zip(starts, self.priors, strict=True)]
+        self.fresh = starts is None or any(
+            a.shape != p.shape for a, p in zip(starts, self.priors, strict=True)
+        )
+        if self.fresh:
+            self.nuisance = [np.zeros_like(p) for p in self.priors]
+        else:
+            self.nuisance = [np.array(a) for a in starts]  # type: ignore[union-attr]
+            # Starts that a fit before has found stay within reach.
+            self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
+        self.widest = [3 * p for p in self.priors]  # where a start was lost
+
+    def simulate(self, theta, nuisance) -> Signals:
+        """Return the outputs within the windows."""
+        self.nfev += 1
+        values = self.values(theta)
+        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.windows, nuisance, strict=True)]
+
+    def round(self, theta):
+        """Let an encoder of the model round the solution's outputs (fits leave it out: it has no slope)."""
+        if "sensor_quantization" not in getattr(self.block, "named_effects", ()):
+            return
+        values = self.values(theta)
+        runs = zip(self.simulators, self.windows, self.nuisance, self.measured, strict=True)
+        self.last = [m - s.run(w, values, a, rounded=True) for s, w, a, m in runs]
+
+    def residual(self, theta, nuisance) -> Signals:
+        """Return measured minus simulated."""
+        return [m - y for m, y in zip(self.measured, self.simulate(theta, nuisance), strict=True)]
+
+    def cost(self, residual, nuisance, weights) -> float:
+        """Return half the weighted sum of squares, initial states weighed by what is known of them."""
+        if self.colour is not None:
+            return 0.5 * power([self.weighed(k, r) for k, r in enumerate(residual)])
+        total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
+        known = sum(
+            float(np.sum((a - m) ** 2 / p**2))
+            for a, m, p in zip(nuisance, self.means(), self.priors, strict=True)
+        )
+        # What is known beforehand counts as much as one sample off by the noise.
+        return 0.5 * (total + self.noise**2 * known)
+
+    def weighed(self, k, x) -> np.ndarray:
+        """Return what the cost sees of signals (n,) or (n, m) of one record."""
+        return x if self.colour is None else self.colour.seen(x, self.windows[k].slices)
+
+    def power(self, signals: Signals) -> tuple[float, int]:
+        """Return the sum of squares of what the cost sees of signals, and of how many values."""
+        seen = [self.weighed(k, x) for k, x in enumerate(signals)]
+        return power(seen) / self.unit**2, sum(map(len, seen))
+
+    @property
+    def unit(self) -> float:
+        """Unit of what the cost sees: accelerations make second differences of their step squared."""
+        return 1.0 if self.colour is None else (self.colour.step * self.known[0].dt) ** 2
+
+    def means(self):
+        """Return the expected corrections of the initial states: none, but half the slack of a gap."""
+        means = [np.zeros_like(p) for p in self.priors]
+        for mean, simulator in zip(means, self.simulators, strict=True):
+            if "slack" in simulator.nuisances:
+                mean[:, simulator.nuisances.index("slack")] = 0.5
+        return means
+
+    def tangent(self) -> Tangent:
+        """Return the linear map about the last step of `solve`."""
+        assert self.slopes is not None
+        ridge = [self.noise**2 / p**2 for p in self.priors]
+        return Tangent(*self.slopes, self.windows, ridge, self.colour)
+
+    # --- solving --------------------------------------------------------------------------------------
+
+    def solve(self, theta, iterations, tolerance, robust):
+        """Levenberg-Marquardt from `theta`; the initial states go along."""
+        if self.fresh:
+            scan_slack(self, theta)
+            self.fresh = False
+        theta = self._descend(theta, iterations, tolerance, robust)
+        again = max(iterations // 2, 3)
+        # without parameters a window found lets the next one go on where it ends
+        for _ in range(1 if self.names else 4):
+            if not self._worth_a_rescue() or not rescue(self, theta):
+                break
+            theta = self._descend(theta, again, tolerance, robust)
+        rough = any(e.nonsmooth for e in getattr(self.block, "effects", ()))
+        rough = rough and self.names and self.colour is None
+        if (
+            rough
+            and self._worth_a_rescue()
+            and self.nfev < self.budget
+            and any(t.min() < 0.5 for t in self._trusts())
+        ):
+            theta = self._without_the_lost(theta, again, tolerance, robust)
+        return theta
+
+    def _without_the_lost(self, theta, iterations, tolerance, robust):
+        """Let the windows that fit decide the parameters, then find where the others begin.
+
+        A window whose start lies in a wrong valley pulls the parameters to where it can never leave that
+        valley. What is better is kept.
+        """
+        kept = theta, self.nuisance, self.last, self.slopes, self.converged
+        trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
+        rescue(self, trial)
+        trial = self._descend(trial, iterations, tolerance, robust)
+        if power(self.last) < power(kept[2]):
+            return trial
+        theta, self.nuisance, self.last, self.slopes, self.converged = kept
+        return theta
+
+    def _worth_a_rescue(self) -> bool:
+        """Whether the error could come below what is hopeless if all windows erred like the good ones."""
+        if self.colour is not None or math.isinf(self.hopeless):
+            return True
+        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.windows, self.last, strict=True)]
+        return float(np.quantile(np.concatenate(rms), GOOD)) < self.hopeless
+
+    def _trusts(self) -> Signals:
+        """Return weights of the samples (n,): 1 in windows that err like the rest, less in worse ones."""
+        trusts = []
+        for windows, e in zip(self.windows, self.last, strict=True):
+            power = windows.means(e**2)
+            usual = max(float(np.median(power)), self.noise**2)
+            trusts.append(
+                np.repeat(
+                    np.minimum(1.0, (2 * usual / np.maximum(power, usual)) ** 2),
+                    windows.ends - windows.begins,
+                )
+            )
+        return trusts
+
+    def _descend(self, theta, iterations, tolerance, robust, trusts=None):
+        damping, before, self.converged = 1e-3, 0.0, False
+        nuisance = self.nuisance
+        residual = self.residual(theta, nuisance)
+        if not self.names and not any(a.size for a in nuisance):
+            iterations = 0
+        for iteration in range(iterations):
+            if self.nfev >= self.budget:
+                break
+            weights = self._weights(residual, robust and iteration > 0)
+            if trusts is not None:
+                weights = [w * t for w, t in zip(weights, trusts, strict=True)]
+            cost = self.cost(residual, nuisance, weights)
+            base = [m - e for m, e in zip(self.measured, residual, strict=True)]
+            self.slopes = jp, js = self.jacobian(theta, nuisance, base)
+            gain, accepted = 0.0, False
+            for _attempt in range(6):
+                h, g, back = self.normal(jp, js, residual, weights, nuisance, damping)
+                step = self._step(h, g, theta, damping)
+                trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
+                trial_nuisance = back(trial_theta - theta)
+                trial = self.residual(trial_theta, trial_nuisance)
+                trial_cost = self.cost(trial, trial_nuisance, weights)
+                if trial_cost < cost:
+                    gain, accepted = 1 - trial_cost / cost, True
+                    theta, nuisance, residual = trial_theta, trial_nuisance, trial
+                    damping = max(damping / 10, 1e-7)
+                    break
+                damping *= 10
+                if self.nfev >= self.budget or damping > 1e4:
+                    break
+            if not accepted or gain < tolerance:
+                self.converged = True
+                break
+            left = iterations - iteration - 1 + self.outlook
+            if self._too_far(residual, (1 - max(gain, before)) ** left):
+                break
+            before = gain
+        self.nuisance, self.last = nuisance, residual
+        return theta
+
+    def _too_far(self, residual, left) -> bool:
+        """Whether the error is hopeless still when so much of its square is left."""
+        if math.isinf(self.hopeless):
+            return False
+        total, count = self.power(residual)
+        return total / count * left > self.hopeless**2
+
+    def count(self, runs):
+        """Count simulations that seek initial states: bounded by themselves, outside the descent's budget."""
+        self.nfev += runs
+        self.budget += runs
+
+    def jacobian(self, theta, nuisance, base, central=False):
+        """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""
+        pairs = [self._ends(i, theta, central) for i in range(len(self.variables))]
+        thetas = [end for pair in pairs for end in pair if end is not None]
+        moved: list[Signals] = [[] for _ in thetas]
+        by_start = []
+        for k, simulator in enumerate(self.simulators):
+            asked = [(self.windows[k], self.values(q), nuisance[k]) for q in thetas]
+            starts, widths = self._moved_starts(k, nuisance)
+            values = self.values(theta)
+            asked += [(self.windows[k], values, start) for start in starts if start is not None]
+            signals = simulator.run_all(asked)
+            for found, y in zip(moved, signals, strict=False):
+                found.append(y)
+            by_start.append(self._by_start(k, starts, widths, signals[len(thetas) :], base[k]))
+        self.nfev += len(thetas)
+        columns: list[Signals] = [[] for _ in self.records]
+        ready = iter(moved)
+        for i, pair in enumerate(pairs):
+            above, below = (base if end is None else next(ready) for end in pair)
+            width = float(pair[0][i] - (theta if pair[1] is None else pair[1])[i])
+            for k, column in enumerate(self._column(i, above, below, width)):
+                columns[k].append(column)
+        by_parameter = [
+            np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)
+        ]
+        return by_parameter, by_start
+
+    def _ends(self, i, theta, central):
+        """Return the parameters between which variable `i` is differenced; None for those there are."""
+        h, variable = self.steps[i], self.variables[i]
+        up = theta.copy()
+        up[i] = variable.clip(theta[i] + h)
+        if up[i] == theta[i]:
+            h = -h
+            up[i] = theta[i] + h
+        if not central:
+            return up, None
+        down = theta.copy()
+        down[i] = variable.clip(theta[i] - h)
+        return up, (None if down[i] == theta[i] else down)
+
+    def _column(self, i, moved, other, width) -> Signals:
+        """Return the derivatives by variable `i`, and choose its next step."""
+        variable, h = self.variables[i], self.steps[i]
+        change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
+        # Next time the output shall move by a third of the noise.
+        wanted = abs(h) * 0.3 * self.noise / change if change > 0 else 10 * abs(h)
+        self.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
+        return [(a - b) / width for a, b in zip(moved, other, strict=True)]
+
+    def _moved_starts(self, k, nuisance):
+        """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
+        simulator, windows = self.simulators[k], self.windows[k]
+        starts, widths = [], []
+        for j, name in enumerate(simulator.nuisances):
+            if name == "x" and not simulator.tied:
+                starts.append(None)
+                widths.append(None)
+                continue
+            size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
+                self.priors[k][:, j],
+                {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
+            )
+            moved = nuisance[k].copy()
+            sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
+            moved[:, j] += sign * size
+            starts.append(moved)
+            widths.append(np.repeat(sign * size, windows.ends - windows.begins))
+        return starts, widths
+
+    def _by_start(self, k, starts, widths, signals, base) -> np.ndarray:
+        """Return derivatives (n, ns) of one record's output by its initial states, all windows at once."""
+        rows, moved = [], iter(signals)
+        for start, width in zip(starts, widths, strict=True):
+            rows.append(np.ones(len(base)) if start is None else (next(moved) - base) / width)
+        self.nfev += len(rows) / len(self.simulators)
+        return np.array(rows).T.reshape(len(self.measured[k]), len(rows))
+
+    def normal(self, jp, js, residual, weights, nuisance, damping=0.0):
+        """Eliminate the initial states; return (H, g, back) with ``back(step)`` their own step."""
+        p = len(self.names)
+        h, g, pieces = np.zeros((p, p)), np.zeros(p), []
+        prior, means = self.noise**2, self.means()
+        for k, windows in enumerate(self.windows):
+            if self.colour is not None:
+                a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
+                h += a.T @ a
+                g += a.T @ r
+                continue
+            products = _by_window(js[k], jp[k], residual[k], weights[k], windows)
+            ns = js[k].shape[1]
+            h += products[:, ns:-1, ns:-1].sum(axis=0)
+            g += products[:, ns:-1, -1].sum(axis=0)
+            if ns:
+                precision = prior / self.priors[k] ** 2
+                ss, right = products[:, :ns, :ns], products[:, :ns, ns:].copy()
+                i = np.arange(ns)
+                ss[:, i, i] += precision
+                ss[:, i, i] *= 1 + damping
+                right[:, :, -1] -= precision * (nuisance[k] - means[k])
+                solved = np.linalg.solve(ss, right)
+                h -= np.einsum("wsi,wsj->ij", right[:, :, :p], solved[:, :, :p])
+                g -= np.einsum("wsi,ws->i", right[:, :, :p], solved[:, :, p])
+                pieces.append((k, solved))
+
+        def back(step):
+            moved = [a.copy() for a in nuisance]
+            for k, solved in pieces:
+                limit = 3 * self.priors[k]
+                there = moved[k] + solved[:, :, p] - solved[:, :, :p] @ step
+                # The data say where a window begins: the start is no parameter to hide the model's faults in.
+                moved[k] = np.clip(there, means[k] - limit, means[k] + limit)
+            for k, simulator in enumerate(self.simulators):
+                if "slack" in simulator.nuisances:
+                    j = simulator.nuisances.index("slack")
+                    moved[k][:, j] = np.clip(moved[k][:, j], 0.0, 1.0)
+            return moved
+
+        return h, g, back
+
+    def _weights(self, residual, robust):
+        if not robust:
+            return [np.ones(len(r)) for r in residual]
+        everything = np.concatenate(residual)
+        sigma = max(1.4826 * float(np.median(np.abs(everything))), self.noise)
+        return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), 1e-300)) for r in residual]
+
+    def _step(self, h, g, theta, damping):
+        """Solve the damped equations; parameters held by a bound stay there."""
+        p = len(g)
+        if p == 0:
+            return np.zeros(0)
+        size = np.diag(h).copy()
+        size = np.maximum(size, 1e-12 * max(float(size.max()), 1e-300))
+        held = np.zeros(p, bool)
+        step = np.zeros(p)
+        for _ in range(p):
+            free: Any = ~held
+            step[:] = 0.0
+            if not free.any():
+                break
+            matrix = h[np.ix_(free, free)] + np.diag(damping * size[free])
+            root = np.sqrt(size[free])
+            step[free] = np.linalg.lstsq(matrix / np.outer(root, root), g[free] / root, rcond=1e-12)[0] / root
+            blocked = [
+                i
+                for i in np.flatnonzero(free)
+                if self.variables[i].clip(theta[i] + np.sign(step[i]) * 1e-9) == theta[i] and step[i] != 0
+            ]
+            if not blocked:
+                break
+            held[blocked] = True
+        limits = np.array([v.step(q) for v, q in zip(self.variables, theta, strict=True)])
+        largest = float(np.max(np.abs(step) / limits)) if p else 0.0
+        return step / max(largest, 1.0)
+
+
+def _by_window(states, parameters, residual, weights, windows: Windows) -> np.ndarray:
+    """Return Z' W Z of every window, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
+    z = np.column_stack((states, parameters, residual))
+    weighted = z * weights[:, None]
+    begins = np.concatenate(([0], np.cumsum(windows.ends - windows.begins)[:-1]))
+    products = np.empty((len(windows), z.shape[1], z.shape[1]))
+    for i in range(z.shape[1]):
+        column = np.add.reduceat(weighted[:, i:] * z[:, i : i + 1], begins, axis=0)
+        products[:, i, i:] = products[:, i:, i] = column
+    return products

@@ -1,0 +1,120 @@
+"""A model made ready for a record: what the record's clock can do exactly is taken out of the engine.
+
+A dead time shifts the axis of the input or the instants at which the output is read, static laws of a held
+input act on its samples, offset, drift and rounding act on the output's samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
+from ...simulate.engine import Engine
+from ..data.measurement import Measurement
+from .decimated import lagged, thinned
+
+_THINNED: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
+REFERENCE = ("reference", "r")
+
+
+@dataclass
+class Ready:
+    """An engine, what drives it, and what acts outside of it."""
+
+    engine: Engine
+    core: Any
+    offset: int  # of the block's states in the engine's
+    drive_time: np.ndarray
+    drive_value: np.ndarray
+    delay: float = 0.0  # of the output
+    output: list = field(default_factory=list)  # (primitive, delay still to come)
+    lags: list = field(default_factory=list)  # (state, samples)
+    hold: str = ""  # between the values of the drive; as recorded if not said
+
+
+def of_system(system, record, u) -> Ready:
+    """Return a system of which nothing is known, driven by the input `u` (n,)."""
+    return Ready(Engine(system), None, 0, *_before(record, record.t, u))
+
+
+def of_loop(loop, record, u, mechanism: bool) -> Ready:
+    """Return a loop, driven by the record's reference, or by `u` where it has none."""
+    channels = record.channels or {}
+    reference = next((channels[k] for k in REFERENCE if k in channels), u)
+    block = loop.parts.block
+    offset = (loop.nstates or 0) - (block.nstates or 0)
+    core = block.core if mechanism else None
+    return Ready(Engine(loop), core, offset, *_before(record, record.t, reference))
+
+
+def of_block(block, record, u, thin: int) -> Ready:
+    """Return a mechanism, driven by the input `u` (n,) in steps of `thin` samples."""
+    t, held, static = record.t, u, record.input_hold == "zoh"
+    outside, input_delay = [], 0.0
+    for key, effect in block.named_effects.items():
+        if effect.role != "input":
+            continue
+        channel = effect.channel()
+        if all(isinstance(p, Delay) for p in channel):
+            # a dead time commutes with every law that does not know the time of day
+            input_delay += sum(p.delay for p in channel)
+            outside.append(key)
+        elif static and all(isinstance(p, PiecewiseAffine) and not p.hysteretic for p in channel):
+            for p in channel:
+                held = p.value(held)
+            outside.append(key)
+        else:
+            static = False
+    tail = []
+    for key, effect in reversed(list(block.named_effects.items())):
+        if effect.role == "output":
+            channel = effect.channel()
+            if not all(isinstance(p, Delay | Ramp | Quantizer) for p in channel):
+                break
+            tail = [*channel, *tail]
+            outside.append(key)
+    delays = [p.delay if isinstance(p, Delay) else 0.0 for p in tail]
+    later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
+    output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
+    inner = block
+    if outside:
+        kept = [e for k, e in block.named_effects.items() if k not in outside]
+        inner = block.with_effects(kept)
+    time, value, hold = t, held, record.input_hold
+    if thin > 1:
+        time, value, hold = _thinned(record, held, thin)
+    time, value = _before(record, time, value)
+    lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
+    return Ready(
+        Engine(inner), inner.core, 0, time + input_delay, value, float(sum(delays)), output, lags, hold
+    )
+
+
+def _thinned(record, held, thin):
+    """Return `thinned`, kept for as long as the record lives where no law has changed its input."""
+    if held is not record.u:
+        return thinned(record.t, held, thin)
+    known = _THINNED.setdefault(record, {})
+    if thin not in known:
+        known[thin] = thinned(record.t, held, thin)
+    return known[thin]
+
+
+def _lags(core, record, signal):
+    """Yield (state, samples) of every lag that the input passes, as the whole record drives it."""
+    for primitive, state in core.input_channel:
+        if isinstance(primitive, Lag):
+            if record.input_hold == "zoh":
+                signal = lagged(record.t, signal, primitive.time_constant)
+            yield state, signal
+        elif state < 0:
+            signal = primitive.value(signal)
+
+
+def _before(record, t, u):
+    """Let the first value hold for all time before the record."""
+    return np.concatenate(([t[0] - 1e3 * record.duration - 1.0], t)), np.concatenate(([u[0]], u))

@@ -1,0 +1,179 @@
+"""A record seen by a model: its scales, and the windows in which a simulation is started anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..data import derivatives
+from ..data.measurement import Measurement
+
+CLEAN = 1e-7
+"""Noise over the spread of the output that no sensor is below: such a record was simulated."""
+
+EXACT = 10 * CLEAN
+"""Error over the spread of the output that is no error."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band."""
+
+    dt: float
+    spread: float
+    speed: float
+    force: float
+    noise: float
+    swing: float  # time of one to and fro [s]
+    half: int  # samples either side of a local polynomial
+    velocity: np.ndarray
+
+
+_FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
+
+
+def facts(record: Measurement) -> Facts:
+    """Return the scales of a record (kept for as long as the record lives)."""
+    known = _FACTS.get(record)
+    if known is None:
+        _, grid, values = derivatives.uniform(record.t, record.y)
+        dt = float(grid[1] - grid[0])
+        cutoff = derivatives.automatic_cutoff(values, dt)
+        velocity = derivatives.derivative(record.t, record.y, 1, cutoff)
+        speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
+        swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
+        half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
+        known = Facts(
+            dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
+            max(record.noise_floor(), CLEAN * float(np.std(record.y))), swing, half, velocity,
+        )  # fmt: skip
+        _FACTS[record] = known
+    return known
+
+
+def _turns(y) -> int:
+    """Count the turning points between strokes longer than half the rms, so that noise adds none."""
+    y = y[:: max(len(y) // 2000, 1)]
+    least, top, low, up, count = 0.5 * float(np.std(y)), y[0], y[0], 0, 0
+    for value in y.tolist():
+        top, low = max(top, value), min(low, value)
+        if up >= 0 and value < top - least:
+            up, low, count = -1, value, count + 1
+        elif up <= 0 and value > low + least:
+            up, top, count = 1, value, count + 1
+    return count
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Parts of a record, and the state in which the data say each begins.
+
+    Attributes
+    ----------
+    begins, ends : (nw,) integer arrays
+        First sample of each window and the one after its last; in order, without overlap. What lies between
+        windows is not simulated and does not count.
+    x, v, a : (nw,) arrays
+        Reported position [m], velocity [m/s], acceleration [m/s^2] at the first sample of each.
+    x_error, v_error : (nw,) arrays
+        How far they may be off.
+    """
+
+    begins: np.ndarray
+    ends: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    x_error: np.ndarray
+    v_error: np.ndarray
+
+    def __len__(self) -> int:
+        """Return the number of windows."""
+        return len(self.x)
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Sample numbers where windows begin, and the end of the last, (nw + 1,)."""
+        return np.append(self.begins, self.ends[-1])
+
+    @cached_property
+    def samples(self) -> np.ndarray:
+        """Numbers of the record's samples within the windows, (n,)."""
+        if np.array_equal(self.begins[1:], self.ends[:-1]):
+            return np.arange(self.begins[0], self.ends[-1])
+        return np.concatenate([np.arange(i, j) for i, j in zip(self.begins, self.ends, strict=True)])
+
+    @cached_property
+    def slices(self) -> list[slice]:
+        """Each window as a slice of the samples within the windows."""
+        at = np.concatenate(([0], np.cumsum(self.ends - self.begins)))
+        return [slice(int(i), int(j)) for i, j in zip(at[:-1], at[1:], strict=True)]
+
+    def means(self, x) -> np.ndarray:
+        """Return the mean over each window of a signal (n,) at the samples within the windows."""
+        lengths = self.ends - self.begins
+        return np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1]))) / lengths
+
+    def only(self, which) -> Windows:
+        """Return some of the windows; `which` a boolean array (nw,)."""
+        return Windows(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+
+def usual_window(record: Measurement) -> float:
+    """Return a length of window [s] that shows two to-and-fro motions, 40 samples at least."""
+    known = facts(record)
+    return max(2 * known.swing, 40 * known.dt)
+
+
+def make_windows(record: Measurement, length: float | None = None) -> Windows:
+    """Cut a record into windows of about `length` [s] (None: one window) and estimate where each begins."""
+    return cut(record, 1 if length is None else max(round(record.duration / length), 1))
+
+
+def cut(record: Measurement, count: int) -> Windows:
+    """Cut a record into `count` windows of equal time, of 20 samples at least."""
+    n = len(record)
+    count = max(min(count, n // 20), 1)
+    edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
+    edges[0], edges[-1] = 0, n
+    edges = np.unique(edges)
+    return _between(record, edges[:-1], edges[1:])
+
+
+def split(record: Measurement, windows: Windows, factor: int, least: int) -> Windows:
+    """Split each window into up to `factor` equal parts, none shorter than `least` samples."""
+    begins, ends = [], []
+    for i, j in zip(windows.begins, windows.ends, strict=True):
+        edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
+        begins.append(edges[:-1])
+        ends.append(edges[1:])
+    return _between(record, np.concatenate(begins), np.concatenate(ends))
+
+
+def _between(record, begins, ends) -> Windows:
+    known = facts(record)
+    rows = np.array([_local(record, int(i), known) for i in begins])
+    return Windows(begins, ends, *rows.T)
+
+
+def _local(record, i, known) -> tuple[float, float, float, float, float]:
+    """Return (x, v, a, error of x, error of v) at sample i, by a parabola through its neighbours."""
+    low, high = max(i - known.half, 0), min(i + known.half + 1, len(record))
+    if high - low < 2 * known.half:  # at an end: as many samples, to one side
+        low, high = (
+            (0, min(2 * known.half, len(record)))
+            if i < known.half
+            else (max(len(record) - 2 * known.half, 0), high)
+        )
+    s, y = record.t[low:high] - record.t[i], record.y[low:high]
+    reach = max(float(np.max(np.abs(s))), 1e-300)
+    basis = np.vander(s / reach, 3, increasing=True)
+    solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
+    rest = y - basis @ solution
+    sigma = max(float(np.sqrt(np.sum(rest**2) / max(len(y) - 3, 1))), known.noise)
+    errors = sigma * np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis)))
+    x, v, a = solution[0], solution[1] / reach, 2 * solution[2] / reach**2
+    return float(x), float(v), float(a), float(errors[0]), float(errors[1] / reach)

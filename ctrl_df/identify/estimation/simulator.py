@@ -1,0 +1,420 @@
+"""A model driven by a recorded input: whole, or window by window from initial states of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ...blocks.core import is_kinetic
+from ...blocks.mechanism import Mechanism
+from ...blocks.primitives import Ramp
+from ...simulate.crew import require_compiled
+from ...simulate.engine import State, sampled_drive
+from ...simulate.groups import grouped
+from ...simulate.loop import closed_loop
+from ...simulate.runs import run_many, sampled_drives
+from ..data.measurement import Measurement
+from . import initial_states
+from .prepared import Ready, of_block, of_loop, of_system
+from .segments import Windows, facts
+
+Request = tuple[Windows, Mapping[str, float] | None, np.ndarray | None]
+"""Windows, parameters that differ from the model's, corrections of the initial states."""
+
+_PREPARED = 4  # parameter sets whose models are kept ready
+
+
+class Simulator:
+    """One model on one record, ready to be run with many parameter values.
+
+    Parameters
+    ----------
+    model : block or loop of `ctrl_df.closed_loop`
+        A block is driven by the recorded input (the force). A loop runs on the reference: the channel
+        ``reference`` of the record, or its input where there is none.
+    record : Measurement
+        The run.
+    thin : int
+        The input is given in steps of that many samples (their impulse and its moment kept), which makes the
+        run as many times faster and the result a little coarser; for first iterations.
+    rtol : float
+        Relative tolerance of the engine.
+    force : (n,) array or None
+        Input in place of the recorded one.
+    begins : str
+        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+
+    Raises
+    ------
+    TypeError
+        A model that is neither.
+    """
+
+    def __init__(
+        self,
+        model,
+        record: Measurement,
+        *,
+        thin: int = 1,
+        rtol: float = 1e-8,
+        force: np.ndarray | None = None,
+        begins: str = initial_states.FITTED,
+    ):
+        self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
+        self.input = np.asarray(record.u if force is None else force)
+        self.parts: Any = getattr(model, "parts", None)
+        self.closed = self.parts is not None
+        self.block = self.parts.block if self.closed else model
+        if not isinstance(self.block, ct.NonlinearIOSystem):
+            raise TypeError(
+                f"compare and refit need a block or a loop of closed_loop; got {type(model).__name__}. "
+                "Wrap a linear system with ct.nlsys, or build the block from ctrl_df.Mass and effects."
+            )
+        self.mechanism = isinstance(self.block, Mechanism)
+        self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
+        self.facts = facts(record)
+        self.runs = 0
+        self._prepared: dict[Any, Ready] = {}
+
+    @property
+    def tied(self) -> bool:
+        """Whether the block's laws depend on the place (a spring, a ripple, a stop, or a law not known)."""
+        return self.closed or not self.mechanism or tied(self.block)
+
+    @property
+    def anchored(self) -> bool:
+        """Whether something pulls the model back, so that a free run does not drift."""
+        if self.closed or not self.mechanism:
+            return True
+        pull, s = 0.0, 2 * self.facts.spread
+        for term in self.block.core.forces:
+            law, p = type(term.effect).law, term.effect.values
+            z = np.zeros(max(term.effect.states, 1))
+            centre = float(np.mean(self.record.y))
+            forces = [float(law(0.0, centre + d, 0.0, z, p, z.copy())) for d in (-s, s)]  # type: ignore[misc]
+            if term.effect.id != "position_ripple":
+                pull += forces[0] - forces[1]
+        return pull > 0.1 * self.facts.force
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """Names of the initial states estimated beside the parameters, per window."""
+        return initial_states.fitted_names(self.block.core, self.begins) if self.mechanism else ()
+
+    @property
+    def chained(self) -> bool:
+        """Whether some of the initial states go on from one window into the next."""
+        return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
+
+    def priors(self, windows: Windows) -> np.ndarray:
+        """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
+        if not self.nuisances:
+            return np.zeros((len(windows), 0))
+        return initial_states.reach(self.nuisances, self.block.core, self.facts, windows)
+
+    def with_values(self, values: Mapping[str, float] | None):
+        """Return the model with these values; a static level below the kinetic one is raised to it."""
+        if not values:
+            return self.model
+        block = self.block.with_parameters(feasible(self.block, values))
+        return closed_loop(self.parts.controller, block, self.parts.dt) if self.closed else block
+
+    def run(
+        self,
+        windows: Windows,
+        values: Mapping[str, float] | None = None,
+        start: np.ndarray | None = None,
+        *,
+        rounded: bool = False,
+    ) -> np.ndarray:
+        """Simulate and return the output at the samples within the windows, shape (n,).
+
+        Parameters
+        ----------
+        windows : Windows
+            Where the state is set anew.
+        values : mapping or None
+            Parameters that differ from the model's.
+        start : (nw, number of nuisances) array or None
+            Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
+            slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its stretch
+            [m] and rate [m/s] beyond the steady one, for bristles the share of full deflection beyond the
+            steady one.
+        rounded : bool
+            Whether an encoder of the model rounds the output. Fits leave it out: its steps have no slope.
+
+        Returns
+        -------
+        array
+            Where the model ran away, ten times the spread of the record beside its mean.
+        """
+        return self.run_all([(windows, values, start)], rounded=rounded)[0]
+
+    def run_all(self, asked: Sequence[Request], *, rounded: bool = False) -> list[np.ndarray]:
+        """Do what `run` does for several (windows, values, start) in one call, on all cores.
+
+        Returns
+        -------
+        list of (n,) arrays
+            One for each that is asked for.
+        """
+        self.runs += len(asked)
+        parts = [self._prepare(values) for _, values, _ in asked]
+        if self.chained:
+            outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
+        else:
+            outputs = self._together(parts, asked)
+        return [
+            self._read(part, windows, out, rounded)
+            for part, (windows, _, _), out in zip(parts, asked, outputs, strict=True)
+        ]
+
+    def _one_by_one(self, part, windows: Windows, start) -> np.ndarray:
+        """Run the windows one after the other: hidden states go on from each into the next."""
+        record, inside = self.record, windows.samples
+        out = np.empty(len(inside))
+        drive, hidden = self._drive(part), {}
+        carried = initial_states.carried_names(part.core, self.begins)
+        on = self._followed(windows)
+        for w, where in enumerate(windows.slices):
+            t, follows = record.t[inside[where]], w in on
+            if follows:
+                t = np.append(t, record.t[windows.begins[w + 1]])
+            run = self._window(part, drive, windows, w, start, t, hidden)
+            out[where] = run.outputs[: where.stop - where.start, 0]
+            if not run.status.ok:
+                out[where.start + run.recorded : where.stop] = np.nan
+            came = self._arrival(part, windows, w + 1, run) if follows and run.status.ok else {}
+            hidden = {k: came[k] for k in carried if k in came}
+        return out
+
+    def _together(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
+        """Run all windows of all that is asked for at once, except where systems differ in their states."""
+        outputs: list[np.ndarray] = [np.empty(0)] * len(asked)
+        sizes = [(p.engine.nstates, len(p.drive_time), p.hold) for p in parts]
+        for size in dict.fromkeys(sizes):
+            which = [i for i, s in enumerate(sizes) if s == size]
+            done = self._alike([parts[i] for i in which], [asked[i] for i in which])
+            for i, out in zip(which, done, strict=True):
+                outputs[i] = out
+        return outputs
+
+    def _alike(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
+        counts = [len(windows) for windows, _, _ in asked]
+        edges = np.concatenate(([0], np.cumsum(counts)))
+        ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
+        x0, times, lengths, drive = [], [], [], []
+        drives: dict[int, int] = {}  # parts have one each, shared by all windows
+        for part, (windows, _, start) in zip(parts, asked, strict=True):
+            x0.append(self._starts(part, windows, start))
+            times.append(self.record.t[windows.samples] - part.delay)
+            lengths.append(windows.ends - windows.begins)
+            drive.append(np.full(len(windows), drives.setdefault(id(part), len(drives))))
+        length = np.concatenate(lengths)
+        first = np.concatenate(([0], np.cumsum(length)[:-1]))
+        every = np.concatenate(times)
+        known = {id(p): p for p in parts}
+        shared = [known[i] for i in drives]
+        result = run_many(
+            grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)]),
+            np.concatenate(x0), every[first], every[first + length - 1], every,
+            sampled_drives(
+                np.array([p.drive_time for p in shared]), np.array([p.drive_value for p in shared])[:, None],
+                parts[0].hold or self.record.input_hold,
+            ),
+            drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
+            max_steps=60 * length + 20_000,
+        )  # fmt: skip
+        for error in result.errors.values():
+            raise error
+        column, ends = result.outputs[:, 0], np.concatenate((first, [len(every)]))
+        return [column[ends[i] : ends[j]] for i, j in zip(edges[:-1], edges[1:], strict=True)]
+
+    def _starts(self, part, windows: Windows, start) -> np.ndarray:
+        """Return the states (nw, nx) in which windows begin."""
+        x0 = np.zeros((len(windows), part.engine.nstates))
+        if part.core is None:
+            return x0
+        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start).T, strict=True))
+        states = x0[:, part.offset :]
+        usual = self._usual(part, windows, slice(None))
+        initial_states.fill(states, part.core, given, usual, self.facts.speed)
+        for state, samples in part.lags:
+            states[:, state] = samples[windows.begins]
+        return x0
+
+    def _read(self, part, windows: Windows, out: np.ndarray, rounded: bool) -> np.ndarray:
+        """Return what the sensors make of outputs; what ran away is set aside."""
+        record, inside = self.record, windows.samples
+        for primitive, later in part.output:
+            if isinstance(primitive, Ramp):
+                out += primitive.offset + primitive.rate * (record.t[inside] - later)
+            elif rounded:
+                out = primitive.value(out)
+        limit = 10 * self.facts.spread
+        centre = float(np.mean(record.y))
+        with np.errstate(invalid="ignore"):
+            out = np.where(
+                np.isfinite(out), np.clip(out, centre - 100 * limit, centre + 100 * limit), centre + limit
+            )
+        return out
+
+    def _followed(self, windows: Windows) -> set[int]:
+        """Return the windows that another one follows, after a pause no longer than two of them."""
+        pause = windows.begins[1:] - windows.ends[:-1]
+        return set(np.flatnonzero(pause <= 2 * (windows.ends - windows.begins)[:-1]).tolist())
+
+    def _arrival(self, part, windows, w, run) -> dict[str, float]:
+        """Return the states, as corrections by name, in which a run came to the begin of a window."""
+        usual = self._usual(part, windows, w)
+        return initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
+
+    def at_rest(self, windows: Windows, values) -> np.ndarray:
+        """Return the initial states (nw, number of nuisances) with which every window begins at rest."""
+        part, rows = self._prepare(values), []
+        for w in range(len(windows)):
+            given = initial_states.at_rest(part.core, self._usual(part, windows, w), self.facts.speed)
+            rows.append([given[name] for name in self.nuisances])
+        return np.array(rows)
+
+    def carried_on(self, windows: Windows, values, start: np.ndarray) -> np.ndarray:
+        """Return the initial states that let every window go on where the one before it ends.
+
+        Returns
+        -------
+        (nw, number of nuisances) array
+            NaN for windows that follow no other.
+        """
+        part, found = self._prepare(values), np.full_like(start, np.nan)
+        follows = np.flatnonzero(windows.ends[:-1] == windows.begins[1:])
+        if part.core is None or not follows.size:
+            return found
+        some = windows.only(follows)
+        times = self.record.t[np.column_stack((some.begins, windows.begins[follows + 1]))] - part.delay
+        engine, runs = part.engine, np.arange(len(follows))
+        result = run_many(
+            grouped([(engine, runs)]), self._starts(part, some, start[follows]), times[:, 0], times[:, 1],
+            times.ravel(),
+            sampled_drives(
+                part.drive_time, part.drive_value[None, None], part.hold or self.record.input_hold
+            ),
+            first=2 * runs, count=2, order=5, rtol=self.rtol,
+            max_steps=60 * (some.ends - some.begins) + 20_000,
+        )  # fmt: skip
+        for error in result.errors.values():
+            raise error
+        for i, w in enumerate(follows):
+            if result.status[i].ok:
+                usual = self._usual(part, windows, w + 1)
+                came = initial_states.corrections(
+                    result.x[i, part.offset :], part.core, usual, self.facts.speed
+                )
+                found[w + 1] = [came[name] for name in self.nuisances]
+        return found
+
+    def _drive(self, part):
+        return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
+
+    def _window(self, part, drive, windows, w, start, t, hidden=None):
+        """Run one window, recording at the record's times `t`."""
+        times = t - part.delay
+        state = self._start(part, windows, w, None if start is None else start[w], times[0], hidden or {})
+        state.segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
+        steps = 60 * int(windows.ends[w] - windows.begins[w]) + 20_000
+        return part.engine.run(
+            state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
+        )
+
+    # --- preparing ------------------------------------------------------------------------------------
+
+    def _prepare(self, values) -> Ready:
+        key = None if values is None else tuple(values.items())
+        if key in self._prepared:
+            return self._prepared[key]
+        model = self.with_values(values)
+        if self.closed:
+            part = of_loop(model, self.record, self.input, self.mechanism)
+        elif self.mechanism:
+            part = of_block(model, self.record, self.input, self.thin)
+        else:
+            part = of_system(model, self.record, self.input)
+        require_compiled(part.engine)
+        if len(self._prepared) >= _PREPARED:
+            del self._prepared[next(iter(self._prepared))]
+        self._prepared[key] = part
+        return part
+
+    def _start(self, part, windows, w, start, time, hidden) -> State:
+        engine, core = part.engine, part.core
+        x0 = np.zeros((1, engine.nstates))
+        if core is None:
+            return engine.start(x0[0], time)
+        given = hidden | (dict(zip(self.nuisances, start, strict=True)) if start is not None else {})
+        i = int(windows.begins[w])
+        usual = self._usual(part, windows, w)
+        states = x0[:, part.offset :]
+        initial_states.fill(states, core, given, usual, self.facts.speed)
+        for state, samples in part.lags:
+            states[:, state] = samples[i]
+        return engine.start(x0[0], time)
+
+    def _usual(self, part, windows, w) -> tuple[Any, Any, Any]:
+        """Return position, speed and acceleration with which windows begin, without what sensors add.
+
+        Noise can make of the acceleration what no force of the record does: it is held within what one does.
+        """
+        ramps = [
+            (p, self.record.t[windows.begins[w]] - later) for p, later in part.output if isinstance(p, Ramp)
+        ]
+        shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
+        usual = self.facts.force / sum(part.core.masses)
+        return windows.x[w] - shift, windows.v[w] - drift, usual * np.tanh(windows.a[w] / usual)
+
+
+def free_run(
+    model, record: Measurement, *, position=0.0, velocity=0.0, slack=0.5, thin: int = 1
+) -> np.ndarray:
+    """Return the output of a model over a whole record, shape (n,), from a state that is known.
+
+    Parameters
+    ----------
+    model : block
+        Driven by the record's input.
+    position, velocity : float
+        Reported by the model at the first sample [m], [m/s].
+    slack : float
+        Share of a gap taken up there, 0 to 1.
+    thin : int
+        Samples a step of the input; 1 is exact.
+    """
+    simulator = Simulator(model, record, thin=thin)
+    known = {"x": position, "v": velocity, "slack": slack}
+    one = np.zeros(1)
+    whole = Windows(np.array([0]), np.array([len(record)]), one, one, one, one, one)
+    start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
+    return simulator.run(whole, None, start, rounded=True)
+
+
+def tied(block: Mechanism) -> bool:
+    """Whether a law of the block depends on the place, or may do so."""
+    return block.core.stop is not None or any(e.role == "force" and not e.place_free for e in block.effects)
+
+
+def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values with static levels raised to the kinetic one where they fell below it."""
+    values = dict(values)
+    current = block.parameters
+    statics = [name for name, p in current.items() if p.threshold]
+    if statics:
+        kinetic = sum(
+            values.get(f"{k}.level", current[f"{k}.level"].value)
+            for k, e in block.named_effects.items()
+            if is_kinetic(e) and f"{k}.level" in current
+        )
+        for name in statics:
+            if values.get(name, current[name].value) < kinetic:
+                values[name] = kinetic
+    return values

@@ -1,0 +1,354 @@
+"""The data of a diagnosis, made ready for many fits: windows to learn from, windows to be judged by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...units import size
+from ..data import derivatives
+from ..data.measurement import Measurement
+from .candidate import Candidate, fit_windows
+from .initial_states import CHAINED, FITTED, MEASURED
+from .noise_model import NoiseModel, force_errors
+from .ripple_phase import rephased
+from .segments import CLEAN, Windows, cut, facts, split
+from .simulator import Simulator
+
+SAMPLES = 2500
+"""Steps of the input a record is thinned to while candidates are screened."""
+
+SHORTEST = 16
+"""How many times as many the shortest windows are as the longest."""
+
+LEVELS = (SHORTEST, 4, 1)
+"""How many times as many they are, of the three lengths that are looked at."""
+
+BRIEF = 4 * SHORTEST
+"""The same of windows for the parameters of a machine whose own forces wander."""
+
+FORCED = 50.0
+"""Error over the sensor's noise, in the shortest windows, that only forces make which no model has."""
+
+FAR = 12.0
+"""Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
+
+BLOCKS = 40
+"""Values of the force that the shortest windows show where forces wander."""
+
+LEAST = 50
+"""Samples of the shortest window."""
+
+PARTS = 9
+"""Parts of a record of which every third is held out where no record is."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Typical sizes of force [N], position [m], speed [m/s] and mass [kg] in the records."""
+
+    force: float
+    position: float
+    speed: float
+    mass: float
+
+    def of(self, unit: str) -> float:
+        """Return the typical size of a parameter of that unit (of a machine on a line)."""
+        time = self.position / self.speed
+        return size(unit, {"N": self.force, "m": self.position, "s": time, "kg": self.mass})
+
+
+@dataclass(frozen=True)
+class View:
+    """Records and the windows of each that count."""
+
+    records: tuple[Measurement, ...]
+    windows: tuple[Windows, ...]
+
+    def shorter(self, factor: int) -> View:
+        """Return up to `factor` times as many windows over the same samples, each of `LEAST` or more."""
+        pairs = zip(self.records, self.windows, strict=True)
+        return View(self.records, tuple(split(r, w, factor, LEAST) for r, w in pairs))
+
+    def every(self, step: int) -> View:
+        """Return every `step`-th window."""
+        return View(self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.windows))
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Measured outputs within the windows."""
+        return [r.y[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A model fitted to the windows to learn from, and (once judged) run over those to be judged by."""
+
+    key: str
+    train: Candidate
+    held: Candidate | None = None
+    extra: int = 0  # parameters beyond the baseline's
+    evidence: float = 0.0
+    evidence_held: float = 0.0  # of the windows to be judged by alone
+    confirmed: bool = False
+
+    @property
+    def block(self):
+        """The fitted model."""
+        return self.train.model
+
+    @property
+    def held_rmse(self) -> float:
+        """Error over the windows to be judged by; NaN before it was run over them."""
+        return self.held.rmse if self.held is not None else math.nan
+
+    @property
+    def residuals(self) -> list[np.ndarray]:
+        """Of all windows, as evidence takes them."""
+        held = self.held.residual_pieces if self.held is not None else ()
+        return [*self.train.residual_pieces, *held]
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Simulated, of all windows, as evidence takes them."""
+        held = self.held.simulated_pieces if self.held is not None else ()
+        return [*self.train.simulated_pieces, *held]
+
+    @property
+    def size(self) -> float:
+        """Sum of squared residuals."""
+        return float(sum(np.sum(r * r) for r in self.residuals))
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Everything the fits of one diagnosis share: windows of one length, and those of others."""
+
+    train: View
+    held: View
+    thin: int
+    scales: Scales
+    limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
+    whole: tuple[View, View] | None = None
+    step: int = 0  # samples a step of the input before this was made fine
+    colour: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
+    begins: str = FITTED  # how windows begin
+
+    def level(self, factor: int) -> Data:
+        """Return the same data in windows `factor` times as many as the longest."""
+        train, held = self.whole or (self.train, self.held)
+        return replace(self, train=train.shorter(factor), held=held.shorter(factor), whole=(train, held))
+
+    @property
+    def noise(self) -> float:
+        """Noise floor of the records to learn from."""
+        return math.sqrt(float(np.mean([facts(r).noise ** 2 for r in self.train.records])))
+
+    @property
+    def levels(self) -> list[Data]:
+        """The same in windows of three lengths, the shortest first."""
+        return [self.level(f) for f in LEVELS]
+
+    @property
+    def clean(self) -> bool:
+        """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
+        return all(derivatives.grain(r.y) < CLEAN * facts(r).spread for r in self.train.records)
+
+    @property
+    def forced(self) -> bool:
+        """Whether forces that no model has (friction that wanders) outweigh the noise."""
+        return self.colour is not None
+
+    @property
+    def wandering(self) -> Data:
+        """The same for a machine whose own forces wander.
+
+        The slow error that such forces leave would drown all else: what counts are the forces, averaged.
+        """
+        length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.windows])))
+        thin = max(self.thin // 2, 1)
+        return replace(
+            self, colour=force_errors(max(thin, round(length / BLOCKS), 2)), thin=thin, begins=MEASURED
+        )
+
+    @property
+    def brief(self) -> Data:
+        """The same by position over windows so short that slow forces move nothing far: for parameters alone.
+
+        Wandering forces blur parameters least there. What hides in a joint or in bristles is not told: their
+        states, fitted anew in every window, pass for it. No limits: models of any rung of a ladder
+        begin near.
+        """
+        return replace(self.level(BRIEF), colour=None, begins=FITTED, limits={})
+
+    @property
+    def chained(self) -> Data:
+        """The same with hidden states that go on from window to window."""
+        return replace(self, begins=CHAINED)
+
+    @property
+    def sampled(self) -> Data:
+        """The same with every second window to learn from, for a first look."""
+        return replace(self, train=self.train.every(2))
+
+    @property
+    def fine(self) -> Data:
+        """The same at the records' full rate, or 12,000 steps of a longer one."""
+        longest = max(len(r) for view in (self.train, self.held) for r in view.records)
+        return replace(self, thin=min(max(1, round(longest / 12_000)), self.thin), step=self.thin)
+
+    def simulator(self, block, record, **keywords) -> Simulator:
+        """Return a model on one of the records, as these fits run it."""
+        return Simulator(block, record, thin=self.thin, begins=self.begins, **keywords)
+
+    def carries(self, block) -> bool:
+        """Whether the block has hidden states that go on from window to window."""
+        return any(self.simulator(block, r).chained for r in self.train.records)
+
+    def fit(
+        self,
+        block,
+        names,
+        *,
+        view=None,
+        starts=None,
+        iterations=12,
+        tolerance=1e-3,
+        hopeless=math.inf,
+        outlook=0,
+    ) -> Candidate:
+        """Fit the named parameters over the windows to learn from (or those of `view`)."""
+        view = view or self.train
+        return fit_windows(
+            block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
+            tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
+            begins=self.begins, hopeless=hopeless, outlook=outlook,
+        )  # fmt: skip
+
+    def moved(self, found: Candidate, iterations=6, tolerance=5e-3, hopeless=math.inf) -> Candidate:
+        """Fit a model found over other windows to these; those that begin at one sample share states."""
+        starts = same_begins(found, self.train.windows)
+        if sum(map(len, self.train.windows)) > sum(map(len, found.windows)):
+            # The initial states of new windows first: parameters would bend to make up for them.
+            states = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2, hopeless=hopeless)
+            starts = states.starts
+        return self.fit(
+            found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance,
+            hopeless=hopeless,
+        )  # fmt: skip
+
+    def judged(self, tried: Trial) -> Trial:
+        """Run a fitted model over the windows to be judged by, from initial states of their own."""
+        return replace(tried, held=self._ran(tried.block, "held"))
+
+    def errors(self, model) -> tuple[float, float]:
+        """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
+        return self._ran(model, "train").nrmse, self._ran(model, "held").nrmse
+
+    def _ran(self, model, name) -> Candidate:
+        """Fit the initial states alone: short windows first, found without fail; the others begin there."""
+        rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
+        short = getattr(self.level(SHORTEST), name)
+        near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
+        if name == "held" and view.records is not self.train.records:
+            near = rephased(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
+            model = near.model
+        near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
+        return self.fit(model, (), view=view, starts=near.starts, iterations=1)
+
+
+def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] = ()) -> Data:
+    """Cut records into windows; without records held out, every third ninth of each is."""
+    records = tuple(records)
+    if held:
+        learn = View(records, tuple(cut(r, _count(r)) for r in records))
+        judge = View(tuple(held), tuple(cut(r, _count(r)) for r in held))
+    else:
+        whole = [cut(r, PARTS * max(round(_count(r) / PARTS), 1)) for r in records]
+        third = [(np.arange(len(w)) * PARTS // len(w)) % 3 == 2 for w in whole]
+        if any(not np.any(t) or np.all(t) for t in third):
+            raise ValueError(
+                "diagnose needs records of at least 180 samples where none is held out; "
+                f"got {min(map(len, records))}. Give holdout=, or a longer record."
+            )
+        learn = View(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
+        judge = View(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+    thin = max(1, round(float(np.mean([len(r) for r in records])) / SAMPLES))
+    thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
+        thin //= 2
+    known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
+    limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
+    # What settles much faster than a sample is not seen, and a stiff equation.
+    scales, dt = _scales(block, records), min(r.dt for r in records)
+    limits["input_lag.time_constant"] = (0.05 * dt, max(r.duration for r in records))
+    limits["bristle.stiffness"] = (0.0, 2 * scales.force / (scales.speed * dt))
+    limits["bristle.damping"] = (0.0, 2 * scales.mass / dt)
+    limits["compliance.damping"] = (0.0, 0.1 * scales.mass / dt)
+    # A joint with next to nothing behind it is no joint, but a dashpot that stands in for other friction.
+    for name in ("compliance", "backlash"):
+        limits.setdefault(f"{name}.load_fraction", (0.05, 0.95))
+    return Data(learn, judge, thin, scales, limits)
+
+
+def _rough(record, thin: int) -> bool:
+    """Whether the input jumps about within the steps of a thinned one: its peaks decide what breaks away."""
+    u, t = record.u, record.t
+    off = np.abs(u - np.interp(t, t[::thin], u[::thin]))
+    # single jumps (steps of the force) are no harm: what counts is what most samples do
+    return float(np.quantile(off, 0.75)) > 0.05 * float(np.std(u))
+
+
+def _count(record) -> int:
+    """Return the number of windows: two to-and-fro motions and a half each, 60 samples at least."""
+    known, n = facts(record), len(record)
+    return int(min(max(round(record.duration / max(2.5 * known.swing, 60 * record.duration / n)), 4), 40))
+
+
+def _scales(block, records) -> Scales:
+    force = math.sqrt(np.mean([np.mean(r.u**2) for r in records]))
+    position = math.sqrt(np.mean([np.var(r.y) for r in records]))
+    speed = math.sqrt(np.mean([np.mean(facts(r).velocity ** 2) for r in records]))
+    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
+    return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
+
+
+def brief_window(model, records: Sequence[Measurement]) -> float | None:
+    """Return the length [s] of `Data.brief` where forces wander beyond a fitted model; or None.
+
+    Not for models of which something is hidden, nor for records too short to tell.
+    """
+    if min(map(len, records)) < PARTS * LEAST:
+        return None
+    data = prepare(model, records, records)
+    near, forced = data.levels[0].fit(model, (), iterations=4, tolerance=2e-2), data.wandering
+    if near.rmse <= FORCED * data.noise or data.clean or forced.carries(model):
+        return None
+    windows = forced.brief.train.windows
+    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, windows, strict=True)]
+    return float(np.median(np.concatenate(spans)))
+
+
+def same_begins(found: Candidate, windows) -> list[np.ndarray]:
+    """Return initial states from a fit over other windows: theirs where both begin at one sample, else 0."""
+    starts = []
+    for old, new, states in zip(found.windows, windows, found.starts, strict=True):
+        at = np.searchsorted(old.begins, new.begins)
+        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
+        rows = np.zeros((len(new), states.shape[1]))
+        rows[same] = states[at[same]]
+        starts.append(rows)
+    return starts
+
+
+def carried(simulator: Simulator, windows: Windows, before: Simulator, starts: np.ndarray) -> np.ndarray:
+    """Return one model's initial states as those of another: what the first lacks begins as usual."""
+    given = dict(zip(before.nuisances, starts.T, strict=True))
+    columns = []
+    for name in simulator.nuisances:
+        usual = np.where(windows.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(windows))
+        columns.append(given.get(name, usual))
+    return np.array(columns).T.reshape(len(windows), len(columns))

@@ -1,0 +1,87 @@
+"""Parameters as a solver sees them: scaled, logarithmic where they are positive, kept within their bounds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...units import dimension, size
+from .segments import Facts
+
+
+def default_free(block) -> tuple[str, ...]:
+    """Return the parameters that a refit moves unless told otherwise."""
+    return tuple(k for k, p in block.parameters.items() if p.free and k != "sensor_quantization.step")
+
+
+class Variable:
+    """One parameter: physical value p, scaled value q; strictly positive ones on a logarithmic scale."""
+
+    def __init__(self, name, parameter, natural, limits=None):
+        self.name = name
+        self.lower, self.upper = parameter.lower, parameter.upper
+        # Bounded on both sides (a share, a restitution): linear. Strictly positive: logarithmic.
+        self.log = parameter.strict and parameter.lower == 0 and math.isinf(parameter.upper)
+        self.scale = abs(parameter.value) if parameter.value != 0 else natural
+        self.natural = natural
+        if parameter.strict and not self.log:
+            self.lower = parameter.lower + 1e-3
+        if limits is not None:
+            self.lower, self.upper = max(self.lower, limits[0]), min(self.upper, limits[1])
+
+    def q(self, p: float) -> float:
+        """Return the scaled value of a physical one."""
+        return math.log(p / self.scale) if self.log else p / self.scale
+
+    def p(self, q: float) -> float:
+        """Return the physical value of a scaled one."""
+        if self.log:
+            return self.scale * math.exp(min(max(q, -40.0), 40.0))
+        return min(max(q * self.scale, self.lower), self.upper)
+
+    def clip(self, q: float) -> float:
+        """Return the scaled value within the bounds nearest to `q`."""
+        if self.log:
+            low = self.q(self.lower) if self.lower > 0 else q
+            return min(max(q, low), self.q(self.upper) if self.upper < math.inf else q)
+        return min(max(q, self.lower / self.scale), self.upper / self.scale)
+
+    def slope(self, q: float) -> float:
+        """Return dp/dq."""
+        return self.p(q) if self.log else self.scale
+
+    def step(self, q: float) -> float:
+        """Return the largest move of one iteration."""
+        return 1.0 if self.log else 1.0 * max(abs(q), 1.0)
+
+
+def variables_of(block, names, records, known: Facts, limits=None) -> list[Variable]:
+    """Return the named parameters of a block as variables, with scales natural on these records.
+
+    `limits`, a mapping of names to (least, largest), narrows their ranges.
+    """
+    if not names:
+        return []
+    table = block.parameters
+    limits = limits or {}
+    found = [Variable(k, table[k], natural_scale(table[k].line_unit, known), limits.get(k)) for k in names]
+    for variable in found:
+        if variable.name == "hard_stop.limit" and not {"sensor_offset", "drift"} & set(block.named_effects):
+            # No body has been where a stop would not let it.
+            reach = max(float(np.max(np.abs(r.y))) for r in records) - 4 * known.noise
+            variable.lower = max(variable.lower, reach)
+    return found
+
+
+def natural_scale(unit: str, known: Facts) -> float:
+    """Return the size a parameter of this unit has when it matters on a record with these facts."""
+    powers = dimension(unit)
+    if powers == {"s": 1}:
+        return 5 * known.dt  # times are seen from a few samples on
+    if powers.keys() <= {"rad"}:
+        return 1.0
+    time = known.spread / known.speed
+    mass = known.force * time**2 / known.spread
+    whole = size(unit, {"N": known.force, "m": known.spread, "s": time, "kg": mass})
+    return whole if powers == {"kg": 1} else 0.1 * whole

@@ -1,0 +1,1 @@
+"""What a fitted model leaves unexplained: tests, regions, missing forces."""

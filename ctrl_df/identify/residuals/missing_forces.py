@@ -1,0 +1,241 @@
+"""What a fitted model still misses, told by free forces.
+
+Each kind adds forces of no particular law: over time, place, speed or load, after reversals, at one
+frequency (bumps along the record, along the stroke, ...). Their effect on the output is simulated, what the
+model's own parameters and initial states could do is projected out, and the residual is regressed on the
+rest, whitened. A kind that explains more than chance tells that something is missing, and where.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...simulate.crew import side_by_side
+from ..estimation.noise_model import NoiseModel, noise_model
+from ..estimation.trial import Data, Trial
+
+# Amplitude of a test force over the rms of the force: linear still, and far above rounding.
+_SMALL = 3e-3
+
+FINER = 3
+"""How many times finer the second grid of every kind is."""
+
+# Travel after a reversal [typical positions] over which a force may build up.
+_REACHES = (0.03, 0.1, 0.3, 1.0)
+
+
+@dataclass(frozen=True)
+class Lack:
+    """Forces of one kind, fitted to a residual.
+
+    Attributes
+    ----------
+    kind : str
+        As in `ctrl_df.identify.residuals.regions`: time, position, low_speed, load, after_reversal,
+        frequency.
+    evidence : float
+        Log likelihood ratio [nats] less the price of the free forces (Schwarz).
+    rms : float
+        Of the error these forces explain, and the model does not, in the unit of the fit's `rmse`.
+    left : float
+        Of the error that these forces do not explain either, in the same unit.
+    span : (float, float)
+        Where the force found is largest, in the unit of the kind.
+    sentence : str
+    """
+
+    kind: str
+    evidence: float
+    rms: float
+    left: float
+    span: tuple[float, float]
+    sentence: str
+
+
+def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
+    """Return every kind of free force with what it explains, the most telling first."""
+    tangent = tried.train.tangent
+    if tangent is None:
+        return []
+    scene = _Scene(tried, data)
+    residual = tangent.project(tried.train.residual)
+    kinds, tables = list(scene.kinds()), []
+    shapes = [shape for _, families in kinds for family in families for shape, _ in family]
+    changes = iter(side_by_side(lambda shape: tangent.project(scene.response(shape)), shapes))
+    for kind, families in kinds:
+        answers = [[(next(changes), span) for _, span in family] for family in families]
+        if len(answers) > 1:
+            answers.append([a for family in answers for a in family])
+        for family in answers:
+            alive = [
+                (c, span) for c, span in family if np.linalg.norm(c) > 1e-9 * scene.scale * math.sqrt(len(c))
+            ]
+            if alive:
+                tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
+    windows = tangent.pieces
+    if data.forced:
+        # the residual is of forces here, as the fits see it
+        noise = noise_model([residual[w] for w in windows], max_order=12)
+    found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
+    if found:
+        # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
+        _, explained = max(found, key=lambda f: f[0].evidence)
+        left = residual - explained
+        noise = noise_model([left[w] for w in windows], max_order=12)
+        found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
+    unit, best = tried.train.unit, {}
+    for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
+        best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
+    return list(best.values())
+
+
+def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.ndarray]:
+    """Fit forces of one kind; return what they tell and the output they explain."""
+    white, filtered = noise.seen(residual, windows), noise.seen(matrix, windows)
+    weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
+    left = white - filtered @ weights
+    # a frequency is found by looking at many
+    extra = matrix.shape[1] + (2 if kind == "frequency" else 0)
+    count = len(white)
+    gain = 0.5 * count * math.log(float(white @ white) / float(left @ left)) - 0.5 * extra * math.log(count)
+    explained = matrix @ weights
+    span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
+    rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
+    return Lack(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span)), explained
+
+
+_SENTENCES = {
+    "time": "a force that changes along the record, most between {0:.3g} and {1:.3g} s",
+    "position": "a force bound to the place, most between {0:.3g} and {1:.3g} m",
+    "low_speed": "a force over speed of a shape not in the library, most between {0:.3g} and {1:.3g} m/s",
+    "load": "a force that goes with the load, most between {0:.3g} and {1:.3g} N",
+    "after_reversal": "a force that builds up after each reversal, over {1:.3g} m",
+    "frequency": "a force at one frequency, {0:.4g} Hz",
+}
+
+
+class _Scene:
+    """The motion the model makes, and its answer to small forces."""
+
+    def __init__(self, tried, data):
+        self.view, self.data = data.train, data
+        self.fit = tried.train
+        self.scale = data.scales.position
+        self.size = _SMALL * data.scales.force
+        self.motion = [
+            _motion(r, w, y)
+            for r, w, y in zip(self.view.records, self.view.windows, tried.train.simulated, strict=True)
+        ]
+
+    def response(self, shape) -> list[np.ndarray]:
+        """Return the change of output by a force: `shape(motion)` (n,) of one record, of order one."""
+        changes = []
+        for record, windows, start, y, motion in zip(
+            self.view.records,
+            self.view.windows,
+            self.fit.starts,
+            self.fit.simulated,
+            self.motion,
+            strict=True,
+        ):
+            force = record.u + self.size * shape(motion)
+            simulator = self.data.simulator(self.fit.model, record, force=force)
+            changes.append((simulator.run(windows, None, start) - y) / self.size)
+        return changes
+
+    def kinds(self):
+        """Yield (kind, families): each a list of (shape, span), coarse and fine along what the kind is of."""
+        every = {k: np.concatenate([m[k] for m in self.motion]) for k in ("t", "x", "v", "u")}
+        for kind, name, tail, count, factors in (
+            ("time", "t", 0.0, 8, (_one, _direction, _acceleration)),
+            ("position", "x", 0.005, 12, (_one, _direction)),
+            ("low_speed", "v", 0.01, 12, (_one,)),
+            ("load", "u", 0.01, 8, (_one, _direction)),
+        ):
+            families = []
+            for n in (count, FINER * count):
+                middles, width = _grid(every[name], tail, n)
+                families += [
+                    [
+                        (_times(_bump(name, m, width), f), (float(m - width), float(m + width)))
+                        for m in middles
+                    ]
+                    for f in factors
+                ]
+            yield kind, families
+        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in _REACHES]]
+        line = self._line()
+        yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
+
+    def _line(self) -> float:
+        """Return the frequency [Hz] at which the residual's acceleration stands out most."""
+        from scipy.ndimage import median_filter
+
+        i = int(np.argmax([len(e) for e in self.fit.residual]))
+        e, t = self.fit.residual[i], self.motion[i]["t"]
+        dt = float(np.median(np.diff(t)))
+        # fine enough that a line between two bins is not lost
+        power = np.abs(np.fft.rfft(np.diff(e, 2) * np.hanning(len(e) - 2), 4 * len(e))) ** 2
+        ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
+        ratio[:12] = 0.0
+        return float(np.argmax(ratio)) / (4 * len(e) * dt)
+
+
+def _motion(record, windows, y):
+    inside = windows.samples
+    x = np.array(record.y, dtype=float)
+    x[inside] = y
+    v = np.gradient(_smooth(x), record.t)
+    a = np.gradient(_smooth(v), record.t)
+    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": np.asarray(record.u)}
+
+
+def _smooth(x, reach=2):
+    kernel = np.ones(2 * reach + 1) / (2 * reach + 1)
+    return np.convolve(np.pad(x, reach, mode="edge"), kernel, mode="valid")
+
+
+def _grid(values, tail, count):
+    low, high = np.quantile(values, (tail, 1 - tail))
+    middles = np.linspace(low, high, count)
+    return middles, float(middles[1] - middles[0])
+
+
+def _bump(name, middle, width):
+    return lambda m: np.clip(1 - np.abs(m[name] - middle) / width, 0, None)
+
+
+def _times(first, second):
+    return lambda m: first(m) * second(m)
+
+
+def _one(m):
+    return 1.0
+
+
+def _direction(m):
+    slow = 0.05 * float(np.sqrt(np.mean(m["v"] ** 2))) + 1e-300
+    return np.tanh(m["v"] / slow)
+
+
+def _acceleration(m):
+    return m["a"] / (float(np.sqrt(np.mean(m["a"] ** 2))) + 1e-300)
+
+
+def _since(length):
+    def shape(m):
+        direction, x = np.sign(m["v"]), m["x"]
+        turn = np.flatnonzero(np.diff(direction) != 0) + 1
+        last = np.zeros(len(x), int)
+        last[turn] = turn
+        last = np.maximum.accumulate(last)
+        return direction * np.exp(-np.abs(x - x[last]) / length)
+
+    return shape
+
+
+def _wave(frequency, function):
+    return lambda m: function(2 * math.pi * frequency * m["t"])

@@ -1,0 +1,1 @@
+"""What a diagnosis and a ladder return, and its explanation in words."""

@@ -1,0 +1,160 @@
+"""What a diagnosis answers: the verdict, the candidates in order, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...blocks.effect import Effect
+from ...drawing import draw
+from ..data.measurement import Measurement
+
+EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
+
+
+# Evidence [nats] behind the first up to which a candidate is not ruled out.
+_NEAR = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateEffect:
+    """One effect of the library, fitted to the data.
+
+    Attributes
+    ----------
+    effect : Effect
+        With fitted parameters.
+    id : str
+        Canonical id.
+    nrmse, nrmse_holdout : float
+        Error of the block with this effect on training and on held-out data, over the rms of the centred
+        output.
+    evidence : float
+        Log likelihood ratio [nats] over the refitted baseline, less the price of its parameters (Schwarz).
+    probability : float
+        Among all candidates and "nothing missing", equal before the data.
+    parameters : dict
+        Fitted parameters of the effect.
+    equivalents : tuple of str
+        Ids that make the same of these data, within noise.
+    model : block
+        The refitted block with the effect.
+    evidence_holdout : float
+        Log likelihood ratio [nats] on the held-out data alone.
+    confirmed : bool
+        Whether it was refitted at the full rate and tried on held-out data (the best few are).
+    errors : dict
+        Standard errors of `parameters`, for residuals of any colour; only of confirmed candidates.
+    """
+
+    effect: Effect
+    id: str
+    nrmse: float
+    nrmse_holdout: float
+    evidence: float
+    probability: float
+    parameters: Mapping[str, float]
+    equivalents: tuple[str, ...] = ()
+    model: Any = None
+    confirmed: bool = False
+    outputs: tuple = field(default=(), repr=False)
+    errors: Mapping[str, float] = field(default_factory=dict)
+    evidence_holdout: float = 0.0
+
+    @property
+    def evidence_fitted(self) -> float:
+        """Evidence of the records fitted alone [nats]."""
+        return self.evidence - self.evidence_holdout
+
+
+def rivals(ranking) -> list[CandidateEffect]:
+    """Return the confirmed candidates that the data hardly tell from the first."""
+    first = ranking[0]
+    return [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < _NEAR]
+
+
+def certainty(ranking) -> float:
+    """Return the probability of the first candidate and its equivalents together."""
+    first = ranking[0]
+    return first.probability + sum(c.probability for c in ranking if c.id in first.equivalents)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What is missing in a model, or that nothing is.
+
+    Attributes
+    ----------
+    verdict : {'effect', 'ambiguous', 'none', 'unknown'}
+        One effect (or one class of equivalent effects); several that remain; nothing; something outside the
+        library.
+    ranking : tuple of CandidateEffect
+        Best first.
+    baseline : CandidateEffect-like
+        The refitted baseline's errors: `nrmse`, `nrmse_holdout`.
+    noise, structure : float
+        Of the best candidate's residual: rms of noise and of what the model still misses [unit of `measure`].
+    measure : {'output', 'acceleration', 'N'}
+        What all errors are of: the output, or (where forces that no model has, such as friction that wanders,
+        outweigh the noise of the sensor) its acceleration, averaged over some samples.
+    remains : str
+        Of 'unknown' over time: how much the library does not explain, and where, in sentences.
+    """
+
+    verdict: str
+    ranking: tuple[CandidateEffect, ...]
+    model: Any
+    baseline: Any
+    nrmse: float
+    nrmse_holdout: float
+    noise: float
+    structure: float
+    explanation: str
+    regions: tuple[str, ...]
+    where: Any
+    train: tuple[Measurement, ...]
+    holdout: tuple[Measurement, ...]
+    seconds: float = 0.0
+    limits: Mapping[str, float] = field(default_factory=dict)
+    measure: str = "output"
+    remains: str = ""
+
+    @property
+    def best(self) -> CandidateEffect | None:
+        """The first of the ranking; None where nothing is missing."""
+        return None if self.verdict == NONE or not self.ranking else self.ranking[0]
+
+    @property
+    def remaining(self) -> tuple[CandidateEffect, ...]:
+        """Candidates the data leave open."""
+        if self.verdict == NONE:
+            return ()
+        return tuple(c for c in self.ranking if c.confirmed and c.probability > 0.01)[:4] or self.ranking[:2]
+
+    @property
+    def next_experiment(self):
+        """The input that would separate the candidates that remain; see `ctrl_df.identify.experiment`."""
+        from ..experiment import next_experiment
+
+        return next_experiment(self)
+
+    def table(self, rows: int = 8) -> str:
+        """Return the ranking as text."""
+        lines = [f"{'effect':<22} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>6}  parameters"]
+        lines.append(f"{'(none: refitted)':<22} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
+        for c in self.ranking[:rows]:
+            values = ", ".join(f"{k} {v:.4g}" for k, v in c.parameters.items())
+            name = c.id + (" = " + ", ".join(c.equivalents) if c.equivalents else "")
+            lines.append(
+                f"{name:<22} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
+                f"{c.probability:>6.1%}  {values}"
+            )
+        return "\n".join(lines)
+
+    def plot(self, **keywords):
+        """Draw the ranking and the residual before and after; returns a ``ct.ControlPlot``."""
+        return draw("diagnosis", self, **keywords)
+
+    def __str__(self) -> str:
+        return f"{self.verdict}: {self.explanation}\n{self.table()}"

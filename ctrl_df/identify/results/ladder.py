@@ -1,0 +1,215 @@
+"""The ladder, over time and over the (A, omega) plane alike: its steps, the study they make, the climb."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from ...drawing import draw
+from ..diagnose import free_names
+from .diagnosis import NONE, UNKNOWN, Diagnosis
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One model of the ladder.
+
+    Attributes
+    ----------
+    effect : str
+        Id of the effect added; empty for the refitted start.
+    dropped : tuple of str
+        Ids that this effect made idle, or for which others do better beside it.
+    instead : tuple of str
+        Ids of these others.
+    model : block
+    nrmse, nrmse_holdout : float
+        Over windows with fitted starts.
+    evidence : float
+        Log likelihood ratio over the step before [nats].
+    parameters : dict
+        All parameters of the model.
+    equivalents : tuple of str
+        Ids that would have done the same.
+    diagnosis : Diagnosis
+        What was asked of the model of this step.
+    """
+
+    effect: str
+    dropped: tuple[str, ...]
+    model: Any
+    nrmse: float
+    nrmse_holdout: float
+    evidence: float
+    parameters: Mapping[str, float]
+    equivalents: tuple[str, ...] = ()
+    diagnosis: Diagnosis | None = None
+    instead: tuple[str, ...] = ()
+
+    @property
+    def changes(self) -> list[tuple[str, str]]:
+        """What became of effects added earlier: sign and id."""
+        return [*(("-", d) for d in self.dropped), *(("+", d) for d in self.instead)]
+
+    @property
+    def name(self) -> str:
+        """What the step did, in signs."""
+        first = f"+ {self.effect}" if self.effect else "refitted"
+        return " ".join([first, *(f"{sign} {key}" for sign, key in self.changes)])
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Outcome of `improve`.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        The refitted start first.
+    model : block
+        The improved one.
+    verdict : {'none', 'effect', 'unknown'}
+        Nothing was missing; what was missing is found; something remains that the library does not explain.
+    noise : float
+        Noise over the rms of the centred output: the floor no model gets below.
+    """
+
+    steps: tuple[Step, ...]
+    model: Any
+    verdict: str
+    noise: float
+    start: Any
+    train: tuple
+    holdout: tuple
+    seconds: float = 0.0
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Ids of the effects that were added and kept."""
+        before = list(self.start.named_effects)
+        return tuple(k for k in self.model.named_effects if k not in before)
+
+    @property
+    def measure(self) -> str:
+        """What the errors of the steps are of."""
+        return last_diagnosis(self.steps).measure
+
+    def table(self) -> str:
+        """Return one line a step."""
+        w = max(30, *(len(step.name) for step in self.steps))
+        lines = [f"{'step':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>10}"]
+        for step in self.steps:
+            lines.append(
+                f"{step.name:<{w}} {step.nrmse:>9.3g} {step.nrmse_holdout:>9.3g} {step.evidence:>10.1f}"
+            )
+        lines.append(f"{'noise floor':<{w}} {self.noise:>9.3g}")
+        return "\n".join(lines)
+
+    def summary(self) -> str:
+        """Return the outcome in plain words."""
+        first, last = self.steps[0], self.steps[-1]
+        if self.verdict == NONE:
+            head = (
+                f"Nothing is missing: with refitted parameters the model errs by {first.nrmse:.2%}, "
+                "the noise of these data."
+            )
+        else:
+            added = ", ".join(e.replace("_", " ") for e in self.effects) or "nothing"
+            head = (
+                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}, on held-out "
+                "data from "
+                f"{first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%} (noise {self.noise:.2%})."
+            )
+        if self.verdict == UNKNOWN and last.diagnosis is not None:
+            d = last.diagnosis
+            left = f"Something outside the library is missing. {d.remains}" if d.remains else d.explanation
+            head += " " + left
+        lines = [head, "", self.table(), ""]
+        for name, p in self.model.parameters.items():
+            lines.append(f"  {name:<30} {p.value:>12.6g} {p.unit}")
+        return "\n".join(lines)
+
+    def plot(self, **keywords):
+        """Draw the error of every step beside the noise; returns a ``ct.ControlPlot``."""
+        return draw("ladder", self, **keywords)
+
+    def report(self, path) -> str:
+        """Write one self-contained HTML file and return its path."""
+        from ..report import write_report
+
+        return write_report(self, path)
+
+    def __str__(self) -> str:
+        return self.summary()
+
+
+class Found(NamedTuple):
+    """What one step was told.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    worth : bool
+        Whether the first of its ranking is worth a step.
+    revise : callable
+        ``revise(block, ids) -> (block, ids dropped, ids in their place)``: looks again at the effects `ids`,
+        added earlier, now that the last one of the block is there too.
+    """
+
+    diagnosis: Diagnosis
+    worth: bool
+    revise: Callable[[Any, Sequence[str]], tuple[Any, tuple[str, ...], tuple[str, ...]]]
+
+
+def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
+    """Add one effect after another while it is worth it.
+
+    Parameters
+    ----------
+    start : Mechanism
+    free : sequence of str or None
+        Parameters of it that may be refitted; None: all that are free.
+    max_effects : int
+        Longest ladder, >= 0.
+    ask : callable
+        ``ask(block, names, search) -> Found``: the block refitted in its parameters `names`, and what it
+        misses; no effect is tried where `search` is false.
+
+    Raises
+    ------
+    ValueError
+        `max_effects` that is no integer >= 0.
+    """
+    if int(max_effects) != max_effects or max_effects < 0:
+        raise ValueError(f"improve needs max_effects as an integer >= 0; got {max_effects!r}.")
+    kept, own = set(start.parameters) - set(free_names(start, free)), set(start.named_effects)
+    block, steps, effect, evidence, dropped, same, instead = start, [], "", 0.0, (), (), ()
+    while True:
+        names = tuple(k for k in free_names(block) if k not in kept)
+        found = ask(block, names, len(steps) < max_effects)
+        d = found.diagnosis
+        values = {k: p.value for k, p in d.model.parameters.items()}
+        steps.append(
+            Step(effect, dropped, d.model, d.nrmse, d.nrmse_holdout, evidence, values, same, d, instead)
+        )
+        if not found.worth:
+            return tuple(steps)
+        best = d.ranking[0]
+        effect, evidence, same = best.id, best.evidence, best.equivalents
+        added = [k for k in list(best.model.named_effects)[:-1] if k not in own]
+        block, dropped, instead = found.revise(best.model, added) if added else (best.model, (), ())
+
+
+def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:
+    """Return what was asked of the last model of a ladder."""
+    found = steps[-1].diagnosis
+    assert found is not None
+    return found
+
+
+def outcome(steps: Sequence[Step]) -> str:
+    """Return the verdict of a ladder."""
+    if last_diagnosis(steps).verdict == UNKNOWN:
+        return UNKNOWN
+    return NONE if len(steps) == 1 else "effect"

@@ -1,0 +1,241 @@
+"""Every effect tried: fits from many starts begun, those with a chance brought to their end.
+
+The fits of all effects run side by side in rounds: a few steps of every start, the two that are then ahead to
+their end, and the rest against them. Which fits these are follows from the data alone, so that
+results are the same however many run at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...blocks.effect import effect_class
+from ...simulate.crew import side_by_side
+from ..estimation.candidate import Candidate
+from ..estimation.multistart import HOPELESS
+from ..estimation.simulator import feasible
+from ..estimation.trial import Data, Trial
+from ..starting.attach import applicable, attach
+from ..starting.proposals import proposals
+from ..starting.regression import Start
+from ..starting.resonance_grid import SHARES, resonant
+from ..starting.screen import Screen, starts_for
+from .evidence import ROUNDED
+
+# Steps of every start before the first look at them, and those of an effect that go on after it.
+_BEGUN, _KEPT = 2, 2
+
+# Joints that resonate with which fits begin.
+_JOINTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """One fit of one effect, on its way.
+
+    Attributes
+    ----------
+    key : str
+        Id of the effect.
+    block : Mechanism
+        Where the fit begins, or has come to.
+    names : tuple of str
+        Parameters that it moves.
+    data : Data
+        The windows it is in.
+    steps, tolerance : int, float
+        Iterations left in these, and when to end them.
+    extra : int
+        Parameters beyond the baseline's.
+    starts : list of arrays or None
+        Initial states with which it begins.
+    fit : Candidate or None
+        What it has come to.
+    nominal : bool
+        Whether it begins at the user's values.
+    """
+
+    key: str
+    block: object
+    names: tuple[str, ...]
+    data: Data
+    steps: int
+    tolerance: float
+    extra: int
+    starts: list[np.ndarray] | None = None
+    fit: Candidate | None = None
+    nominal: bool = False
+
+    @property
+    def error(self) -> float:
+        """Error it has come to."""
+        assert self.fit is not None
+        return self.fit.rmse
+
+    @property
+    def trial(self) -> Trial:
+        """What it has come to."""
+        assert self.fit is not None
+        return Trial(self.key, self.fit, extra=self.extra)
+
+
+def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None) -> list[Trial]:
+    """Return every effect that can be added, fitted over the windows of the screen.
+
+    Parameters
+    ----------
+    classes : sequence of effect classes
+    screen : Screen
+    shortest : Data
+        In short windows, where fits of effects with many valleys begin.
+    free : tuple of str
+        Parameters of the baseline that are refitted.
+    nominal : mapping
+        Their values as the user has them.
+    executor : concurrent.futures.Executor or None
+        Runs the fits side by side; None: threads do.
+    """
+    span = float(np.ptp(screen.motion.x))
+
+    def run(function: Callable, jobs: list) -> list:
+        return side_by_side(function, jobs) if executor is None else list(executor.map(function, jobs))
+
+    kinds = [c for c in classes if applicable(c, screen.block)]
+    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1]
+    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in SHARES]
+    jobs += [(c, None, screen, shortest, free, nominal) for c in kinds]
+    begun = run(_begin, jobs)
+    attempts = _best([a for found in begun for a in found if a.fit is not None], _JOINTS)
+    attempts += [a for found in begun for a in found if a.fit is None]
+    # those of few steps first: what they come to tells of the others which need no long look
+    short = [a for a in attempts if not effect_class(a.key).multimodal]
+    begun = run(_first, [(a, np.inf) for a in short])
+    least = min((a.error for a in begun), default=np.inf)
+    least = min(least, screen.base.rmse)
+    begun += run(_first, [(a, HOPELESS * least) for a in attempts if effect_class(a.key).multimodal])
+    begun = [a for a in begun if itself(a.trial, span)]
+    kept = _best(begun, _KEPT)
+    # few steps from where the user begins tell little: the baseline may have ended in another valley
+    own = _best([a for a in begun if a.nominal], 1)
+    begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
+    ahead = _best(begun, 1)[:2]
+    found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
+    least = min([least, *(t.train.rmse for t in found)])
+    rest = [a for a in begun if not any(a is o for o in ahead)]
+    found += run(_finish, [(a, screen.data, HOPELESS * least) for a in rest])
+    best = {}
+    for t in found:
+        if itself(t, span) and (t.key not in best or t.train.rmse < best[t.key].train.rmse):
+            best[t.key] = t
+    return [best[c.id] for c in kinds if c.id in best]
+
+
+def itself(tried: Trial, span) -> bool:
+    """Whether the newest effect is what its name says, and no stand-in for another.
+
+    A ripple of which the stroke `span` [m] shows less than a period is a spring, a joint with nothing behind
+    it (or before it) is a dashpot.
+    """
+    bounds = dict(zip(tried.train.names, tried.train.at_bound, strict=True))
+    if bounds.get(f"{tried.block.newest}.load_fraction", False):
+        return False
+    return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+
+
+def _best(attempts, count) -> list[Attempt]:
+    """Return the best of each effect, so many, the best first."""
+    ordered, kept = sorted(attempts, key=lambda a: a.error), []
+    for a in ordered:
+        if sum(a.key == o.key for o in kept) < count:
+            kept.append(a)
+    return kept
+
+
+# --- jobs -----------------------------------------------------------------------------------------
+
+
+def _begin(job) -> list[Attempt]:
+    """Return where fits of one effect class begin; with a `share` of load given, those of joints."""
+    cls, share, screen, shortest, free, nominal = job
+    if share is not None:
+        found = []
+        for near in resonant(screen, share, _JOINTS):
+            added = own_names(near.model)
+            found.append(
+                Attempt(
+                    cls.id, near.model, (*free, *added), screen.data, 14, 3e-3, len(added), near.starts, near
+                )
+            )
+        return found
+    found, starts = [], starts_for(cls, screen)
+    for i, start in enumerate(starts):
+        if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
+            break
+        found.append(_from(start, screen, shortest, free))
+    if cls.multimodal or screen.block.core.bodies == 2:
+        # The baseline may have bent far from the truth to make up for what is missing: begin where the user
+        # does.
+        for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
+            attempt = _from(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
+            found.append(attempt and replace(attempt, nominal=True))
+    return [a for a in found if a is not None]
+
+
+def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
+    """Return the attempt that begins at a start; None where the effect contradicts the block."""
+    base = screen.block.with_parameters(feasible(screen.block, dict(start.values)))
+    block, key = attach(base, start.effect), start.effect.id
+    if block is None:
+        return None
+    added = own_names(block)
+    names = (*free, *(() if key == ROUNDED else added))
+    if start.effect.multimodal:
+        # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
+        bent = start.effect.role in ("contact", "coupling") or key == "load_friction"
+        steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
+        return Attempt(key, block, names, shortest, steps, tolerance, len(added))
+    begin = None if start.values else screen.starts(block)
+    return Attempt(key, block, names, screen.data, 6, 1e-2, len(added), begin)
+
+
+def _first(job) -> Attempt:
+    """Take the first steps, fewer where all would not lead to an error below `hopeless` at their pace."""
+    attempt, hopeless = job
+    return _on(attempt, min(_BEGUN, attempt.steps), hopeless)
+
+
+def _on(attempt: Attempt, steps, hopeless) -> Attempt:
+    fit = attempt.data.fit(
+        attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
+        hopeless=hopeless, outlook=attempt.steps if steps < attempt.steps else 0,
+    )  # fmt: skip
+    left = 0 if fit.converged else attempt.steps
+    return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)
+
+
+def _finish(job) -> Trial:
+    """Take the steps that are left, then those over the windows of the screen.
+
+    Where they would not lead to an error below `hopeless` at the pace of the last ones they are left out.
+    """
+    attempt, data, hopeless = job
+    if attempt.steps:
+        attempt = _on(attempt, attempt.steps, hopeless)
+    trial = attempt.trial
+    if attempt.data is data:
+        return trial
+    return replace(trial, train=data.moved(trial.train, 4, 1e-2, hopeless))
+
+
+def _spread(effects, count):
+    """Return some of the effects, evenly from the first to the last."""
+    return [effects[round((i + 0.5) * len(effects) / count - 0.5)] for i in range(min(count, len(effects)))]
+
+
+def own_names(block) -> tuple[str, ...]:
+    """Return the parameters of a block's newest effect that a fit may move."""
+    key = block.newest + "."
+    return tuple(k for k, p in block.parameters.items() if k.startswith(key) and p.free)

@@ -1,0 +1,22 @@
+"""Effects that are the same map on these data: found by comparing what they make of the output."""
+
+from __future__ import annotations
+
+from ..estimation.noise_model import NoiseModel, whitened_power
+
+
+def indistinguishable(first, second, noise: NoiseModel, *, nats: float = 6.0) -> bool:
+    """Whether two candidates' outputs differ by no more than the noise lets one see.
+
+    Parameters
+    ----------
+    first, second : sequence of arrays
+        Simulated outputs, as evidence takes them (`Trial.outputs`).
+    noise : NoiseModel
+        Of the better one's residual.
+    nats : float
+        Log likelihood ratio that would tell them apart.
+    """
+    difference = [a - b for a, b in zip(first, second, strict=True)]
+    power, _ = whitened_power(difference, noise)
+    return 0.5 * power / max(noise.sigma, 1e-300) ** 2 < nats

@@ -1,0 +1,66 @@
+"""Evidence of candidates over the baseline.
+
+Log likelihood ratios of whitened residuals, less a price of parameters; a sensor that rounds is judged by how
+probable the recorded values are.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from ..estimation.noise_model import NoiseModel, whitened_power, whitener
+from ..estimation.trial import Trial
+from .rounding import rounding_evidence
+
+ROUNDED = "sensor_quantization"
+
+REFUTED = 20.0
+"""Evidence [nats] of held-out data against a candidate that puts it last."""
+
+
+def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
+    """Return the trials with their evidence over the baseline, best first, and the noise that judged it.
+
+    What held-out data speak against comes after all that they do not. The noise model is of the residuals of
+    the best one, a sensor that rounds left aside.
+    """
+    best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
+    noise = whitener(best.residuals, base.train.colour)
+    before = _powers(base, noise)
+    judged = []
+    for t in trials:
+        gain, gain_held = _rounded_gains(base, t) if t.key == ROUNDED else _gains(before, _powers(t, noise))
+        # hardly more than starts was fitted to the windows to be judged by: their gain also stands alone
+        price = 0.5 * t.extra * math.log(sum(n for _, n in before))
+        judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
+    return sorted(judged, key=lambda t: (t.evidence_held < -REFUTED, -t.evidence)), noise
+
+
+def _powers(tried: Trial, noise: NoiseModel):
+    """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
+    held = tried.held.residual_pieces if tried.held is not None else []
+    return whitened_power(tried.train.residual_pieces, noise), whitened_power(held, noise)
+
+
+def _gains(before, after) -> tuple[float, float]:
+    """Return the log likelihood ratio of all windows, and of those to be judged by."""
+    (fitted, n), (held, n_held) = before
+    (fitted_t, _), (held_t, _) = after
+    gain_held = 0.5 * n_held * math.log(held / held_t) if n_held else 0.0
+    return 0.5 * (n + n_held) * math.log((fitted + held) / (fitted_t + held_t)), gain_held
+
+
+def _rounded_gains(base: Trial, tried: Trial) -> tuple[float, float]:
+    """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
+    step = tried.block.effects[-1].step
+    noise = whitener(base.residuals)
+    gains = []
+    for fit, power in zip((base.train, base.held), _powers(base, noise), strict=True):
+        if fit is None:
+            gains.append(0.0)
+            continue
+        plain = -0.5 * power[1] * math.log(2 * math.pi * math.e * power[0] / power[1])
+        measured = [a + b for a, b in zip(fit.simulated, fit.residual, strict=True)]
+        gains.append(rounding_evidence(measured, fit.simulated, step) - plain)
+    return sum(gains), gains[1]

@@ -1,0 +1,284 @@
+"""One diagnosis at work: the baseline, every candidate fitted, the best confirmed at the full rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...simulate.crew import side_by_side
+from ..estimation.candidate import Candidate
+from ..estimation.multistart import HOPELESS, NEAR, all_hopped, begun_at, beyond, hopped, own, settled
+from ..estimation.simulator import feasible
+from ..estimation.trial import FORCED, Data, Trial, prepare
+from ..starting.regression import force_regression, motion_of
+from ..starting.screen import Screen
+from .attempts import itself, tried
+from .equivalence import indistinguishable
+from .evidence import ROUNDED, ranked
+
+CONFIRMED = 6
+"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
+
+CONFIRMED_FORCED = 10
+"""The same where the machine's own forces wander."""
+
+# Best error over windows four times as long that still counts as the same.
+_GROWTH = 1.35
+# Evidence [nats] by which candidates may differ because their fits stopped early.
+_CLOSE = 60.0
+# Width of a Stribeck bump over the typical speed below which it is stiction.
+_NARROW = 1e-3
+# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain.
+_FLOOR = 1.03
+
+
+class Study:
+    """The fits of one diagnosis.
+
+    Parameters
+    ----------
+    block : Mechanism
+        The model as it stands.
+    records, held : sequences of Measurement
+        To learn from; to be judged by (may be empty).
+    free : tuple of str
+        Parameters of the model that may be refitted.
+    """
+
+    def __init__(self, block, records, held, free):
+        self.free = free
+        data = prepare(block, records, held)
+        self.nominal = {k: p.value for k, p in block.parameters.items()}
+        self._look_at(data, 1)
+        self.base = self._baseline(block)
+        self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
+        # friction that wanders drowns all else over longer windows
+        near = self.levels[0].moved(self.base.train)
+        if near.rmse > FORCED * data.noise and not data.clean:
+            self._look_at(self.levels[0].wandering, 0)
+            self.base = Trial("", self.data.fit(near.model, self.free))
+
+    def _look_at(self, data: Data, which: int):
+        self.levels = data.levels
+        self.data = self.levels[which]
+
+    def _baseline(self, block) -> Trial:
+        """Fit the baseline from its own values and from a regression of the force; keep the better."""
+        shortest, data = self.levels[:2]
+        begins, table = [block], block.parameters
+        names = {"mass", "coulomb.level", "viscous.coefficient"}
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, names)
+        guess = dict(zip(("mass", "coulomb.level", "viscous.coefficient"), w, strict=False))
+        guess = {k: float(v) for k, v in guess.items() if k in table and k in self.free and v > 0}
+        if guess:
+            begins.append(block.with_parameters(feasible(block, guess)))
+        found = []
+        for begin in begins:
+            found.append(data.moved(shortest.fit(begin, self.free, iterations=8), 12))
+        return Trial("", min(found, key=lambda f: f.rmse))
+
+    # --- every effect, coarsely -----------------------------------------------------------------------
+
+    def candidates(self, classes, executor=None) -> list[Trial]:
+        """Return every effect that can be added, fitted, the one with most evidence first."""
+        longest = self.levels[-1]
+        base, found = self._look(classes, executor, self.data.sampled)
+        there = base.rmse if self.data.forced else longest.moved(base).rmse
+        if there > _GROWTH * base.rmse:
+            # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
+            moved = self._over_long_windows(base.rmse, there, found)
+            if moved is not None:
+                base, again = self._look(classes, executor, longest)
+                found = _best_of(base, [*moved, *again])
+        if found:
+            self._rebase(found)
+        return found
+
+    def _over_long_windows(self, here, there, found) -> list[Trial] | None:
+        """Return the best by error moved to the longest windows; None where they explain enough there.
+
+        `here`, `there`: error of the baseline where the trials were fitted, and over the longest windows.
+        """
+        if found and found[0].train.rmse <= 0.8 * here:
+            return None
+        longest = self.levels[-1]
+        best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
+        moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, 4, 1e-2)), best)
+        shows = found and found[0].train.rmse <= 0.97 * here
+        return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
+
+    def _look(self, classes, executor, data: Data):
+        """Fit every effect over one set of windows; return the baseline there and the effects, best first."""
+        base = data.moved(self.base.train, 3)
+        screen = Screen(base, data)
+        nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
+        found = tried(classes, screen, self.levels[0].sampled, self.free, nominal, executor)
+        return base, ranked(Trial("", base), found)[0]
+
+    def _rebase(self, found):
+        """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
+        for best in found[:2]:
+            values = {k: best.block.parameters[k].value for k in self.free}
+            block = self.base.block
+            again = self.data.fit(block.with_parameters(feasible(block, values)), self.free, iterations=8)
+            if again.rmse < self.base.train.rmse:
+                self.base = Trial("", again)
+
+    # --- the best, carefully --------------------------------------------------------------------------
+
+    def confirm(self, found) -> list[Trial]:
+        """Refit baseline and best candidates at the full rate; return these candidates, best first.
+
+        The windows are of the length that suits these data (`_longest_coherent`).
+        """
+        # Wandering forces let the first look tell little.
+        found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.forced else _promising(found)
+        stages, floor = self._stages([self.base.train, *(t.train for t in found)])
+        self.floor = floor
+        levels, at = list(self.levels), _longest_coherent(stages)
+        if at == 0 and not self.data.forced:
+            # Longer windows show what no candidate explains: hidden states, fitted anew in many short ones,
+            # would pass for it.
+            levels[0] = levels[0].chained
+            short = levels[0]
+            stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
+            at = _longest_coherent(stages)
+        if found and found[0].key == ROUNDED and not self.data.forced:
+            # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
+            at = len(stages) - 1
+        self.data = levels[at]
+        fine = self.data.fine
+        pairs = [(t, f) for t, f in zip((self.base, *found), stages[at], strict=True) if f is not None]
+        best = side_by_side(
+            lambda pair: fine.judged(replace(pair[0], train=fine.moved(pair[1], 3, 1e-3), confirmed=True)),
+            pairs,
+        )
+        self.base = best[0]
+        chosen, self.noise = ranked(self.base, best[1:])
+        if not chosen:
+            return []
+        chosen = self._again(chosen, chosen[:1])
+        # Near equals are told apart by fits that have come to an end, and in the right valley.
+        near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
+        least = min(t.train.rmse for t in chosen)
+        close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
+        close = [t for t in close if t.train.rmse < HOPELESS * least]
+        ended = side_by_side(lambda t: self._ended(t, t in near and len(near) > 1, floor, least), close)
+        if any(a is not b for a, b in zip(ended, close, strict=True)):
+            chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
+        span = max(float(np.ptp(r.y)) for r in self.data.train.records)
+        chosen, self.noise = ranked(self.base, [t for t in chosen if itself(t, span)])
+        return chosen
+
+    def _stages(self, fits):
+        """Return the fits in windows of every length that may judge, the shortest first, and their floor.
+
+        The floor is the error that a fit can come down to at best: over short windows nearly every model
+        follows. Where forces wander, the shortest windows alone may judge. None stands for fits without a
+        chance.
+        """
+        shortest, middle, longest = self.levels
+        short = side_by_side(shortest.moved, fits)
+        floor = _FLOOR * min(f.rmse for f in short)
+        if self.data.forced:
+            return [short], floor
+        near = self._stage(middle, fits, short, floor)
+        return [short, near, self._stage(longest, near, near, floor)], floor
+
+    def _stage(self, data: Data, fits, before, floor) -> list[Candidate | None]:
+        """Move the baseline and the best candidate to other windows, then those with a chance against them.
+
+        `before`: the fits in windows that these are made of: no fit over longer ones can err less than that
+        over the parts of them.
+        """
+        errors = [math.inf if f is None else f.rmse for f in before]
+        ahead = [0, *([1 + int(np.argmin(errors[1:]))] if len(errors) > 1 else [])]
+        found: list[Any] = [None] * len(fits)
+        for i, f in zip(ahead, side_by_side(data.moved, [fits[i] for i in ahead]), strict=True):
+            found[i] = f
+        hopeless = HOPELESS * min(found[i].rmse for i in ahead)
+        others = [i for i, e in enumerate(errors) if i not in ahead and e < hopeless]
+        moved = side_by_side(lambda i: data.moved(fits[i], hopeless=hopeless), others)
+        for i, f in zip(others, moved, strict=True):
+            found[i] = f
+        there = [i for i, f in enumerate(found) if f is not None]
+        for i, f in zip(there, all_hopped([found[i] for i in there], data, floor), strict=True):
+            found[i] = f
+        return found
+
+    def _ended(self, tried: Trial, exactly: bool, floor: float, least: float) -> Trial:
+        """Return a candidate in its best valley, unless nothing better is possible.
+
+        `exactly`: iterated to the end first. `least`: error of the best of all [m].
+        """
+        fine, fit = self.data.fine, tried.train
+        if exactly:
+            fit = fine.moved(fit, 8, 1e-6)
+        if own(fit) and fit.rmse > floor and least > floor and not fine.forced:
+            fit = hopped(fit, fine.fit, own(fit), beyond(fit, least))
+        return settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
+
+    def _again(self, chosen, those) -> list[Trial]:
+        """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
+        fine = self.data.fine
+        pairs = [(t, best) for best in those for t in chosen if t is not best]
+        begun = side_by_side(lambda pair: begun_at(pair[0], pair[1], fine), pairs)
+        judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
+        return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
+
+    def alike(self, a: Trial, b: Trial) -> bool:
+        """Whether two candidates make the same of these data, within noise or as the limit of each other."""
+        if {a.key, b.key} == {"stiction", "stribeck"}:
+            # a bump this narrow is passed within a sample: only breaking away is seen of it
+            narrow = next(t for t in (a, b) if t.key == "stribeck").block.effects[-1].velocity
+            if narrow < _NARROW * self.data.scales.speed:
+                return True
+        return indistinguishable(a.outputs, b.outputs, self.noise)
+
+
+def _best_of(base, trials) -> list[Trial]:
+    """Return every effect's best fit, best first."""
+    best: dict[str, Trial] = {}
+    for t in trials:
+        if t.key not in best or t.train.rmse < best[t.key].train.rmse:
+            best[t.key] = t
+    return ranked(Trial("", base), best.values())[0]
+
+
+def _promising(found, most=CONFIRMED, share=0.2) -> list[Trial]:
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
+
+    `most`: of them by evidence, `share` of the best one's that is near.
+    """
+    close = sorted(found, key=lambda t: t.train.rmse)[:3]
+    close = [t for t in close if t.train.rmse < NEAR * close[0].train.rmse]
+    likely = found[:2] + [t for t in found[2:most] if t.evidence > share * found[0].evidence]
+    return likely + [t for t in close if not any(t is o for o in likely)]
+
+
+def _longest_coherent(stages) -> int:
+    """Return the level to judge at: the longest windows over which the best model's error does not grow.
+
+    `stages`: fits per level, short windows first, the baseline's and then the candidates'. Where the
+    best grows with the length (motion that is sensitive to its start, force noise in a real machine, an
+    effect outside the library) short windows are clearer, provided that they show what is missing as well
+    as long ones do.
+    """
+    errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]
+    base, best = [e[0] for e in errors], [min(e) for e in errors]
+    at = 0
+    while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:
+        at += 1
+    if at + 1 < len(errors) and best[at] > 0.8 * base[at] and _left(base, best, at) > _left(base, best, -1):
+        return len(errors) - 1
+    return at
+
+
+def _left(base, best, at) -> float:
+    """Return the share of the baseline's error beyond noise that the best leaves; 1 where hardly any is."""
+    noise = best[0] ** 2
+    there = base[at] ** 2 - noise
+    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > 0.1 * noise else 1.0

@@ -1,0 +1,245 @@
+"""The wavelength of a force ripple, sought in the motion as it was measured.
+
+A simulation that does not know the ripple yet is soon a wavelength away from the place where the mass
+really is: short ripples are lost in it. Here the measured place stands in the ripple's argument, and the
+equation of motion is integrated twice,
+
+    y = x0 + v0 t + 1/m (u - friction + a sin kx + b cos kx), integrated twice,
+
+which is linear in all but k. Second differences take x0 and v0 out. What is left over has noise of two
+kinds, of the sensor and of forces; each frequency weighs by what is left at and around it (Whittle's
+likelihood), so that either may prevail. Then k is scanned, from the stroke down to what the smoothed
+position resolves.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..estimation.segments import facts
+
+TURNS = 400.0
+"""Wavelengths to the stroke, at most."""
+
+STEP = 0.3
+"""Of the scan, in wavelengths to the stroke."""
+
+COARSEST = 6.0
+"""Shortest wavelength over the error of the smoothed position."""
+
+_PLAIN = ("dry", "viscous", "constant")
+
+SAMPLES = 25_000
+"""Longer records are looked at in means over more samples."""
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A ripple that explains the motion, and the parameters of the mass that go with it.
+
+    `gain`: log likelihood ratio [nats] over the motion without it.
+    """
+
+    gain: float
+    amplitude: float
+    wavelength: float
+    phase: float
+    mass: float
+    coulomb: float
+    viscous: float
+
+
+class WaveSearch:
+    """Records as one linear regression.
+
+    Parameters
+    ----------
+    records, windows : sequences
+        Records, evenly sampled, and the parts of each that count (one of 20 samples at least).
+    known : sequence of float
+        Wave numbers [rad/m] of ripples that the model has already.
+    """
+
+    def __init__(self, records: Sequence, windows: Sequence, known: Sequence[float] = ()):
+        self.records = records
+        self.places = [_smoothed(r) for r in records]
+        self.span = max(float(np.ptp(x)) for x in self.places)
+        # the band of the motion and some of the noise above it
+        band = min(facts(r).half for r in records) // 4
+        longest = max(j - i for w in windows for i, j in _runs(w, 1))
+        self._size = max(band, math.ceil(max(map(len, records)) / SAMPLES), 1)
+        self._size = max(min(self._size, longest // 32), 1)
+        self._runs = [_runs(w, self._size) for w in windows]
+        forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
+        base = [self._response(column) for column in zip(*forces, strict=True)]
+        for k in known:
+            pair = self._response([np.exp(1j * k * x) for x in self.places])
+            base += [[np.real(p) for p in pair], [np.imag(p) for p in pair]]
+        given = [_integral(_held(r), r.t) for r in records]
+        self._base = [self._parts(given), *base]
+        self._y = self._parts([np.asarray(r.y) for r in records])
+        self._weights = [np.ones(_length(y) // 2 + 1) for y in self._y]
+        for _ in range(3):
+            w = self._regressed(self._base)
+            left = [
+                y - sum(c * b[i] for c, b in zip(w, self._base, strict=True)) for i, y in enumerate(self._y)
+            ]
+            self._weights = [_weights(e) for e in left]
+        self._basis, _ = np.linalg.qr(np.array([self._white(b) for b in self._base]).T)
+        self._left = self._without(self._white(self._y))
+        self._power = float(self._left @ self._left)
+
+    def best(self, count: int) -> list[Wave]:
+        """Return the ripples that explain most, the best first."""
+        if not self.span > 0 or not self._power > 0:
+            return []
+        finest = self.span / (COARSEST * max(_blur(r) for r in self.records))
+        turns = np.arange(0.6, max(min(finest, TURNS), 2.0), STEP)
+        gains = self._scan(turns)
+        found: list[Wave] = []
+        while len(found) < count and np.max(gains) > 0:
+            i = int(np.argmax(gains))
+            near = turns[i] + np.linspace(-STEP, STEP, 13)
+            wave = self.wave(2 * math.pi * near[int(np.argmax(self._scan(near)))] / self.span)
+            if wave is not None:
+                found.append(wave)
+            gains[np.abs(turns - turns[i]) < 1.0] = 0.0
+        return found
+
+    def wave(self, k: float) -> Wave | None:
+        """Return the ripple of wave number `k` [rad/m], fitted; None where the mass would be negative."""
+        waves = [np.exp(1j * k * x) for x in self.places]
+        pair = self._response(waves)
+        # what a drive may have besides blurs the parameters of what it does have
+        plain = self._base[: len(_PLAIN) + 1]
+        w = self._regressed([*plain, [np.imag(p) for p in pair], [np.real(p) for p in pair]])
+        if w[0] <= 0:
+            return None
+        mass, size, phase = 1 / w[0], math.hypot(w[-2], w[-1]), math.atan2(w[-1], w[-2])
+        return Wave(
+            self._gain(waves),
+            mass * size,
+            2 * math.pi / k,
+            phase,
+            mass,
+            float(mass * w[1]),
+            float(mass * w[2]),
+        )
+
+    def _scan(self, turns) -> np.ndarray:
+        """Return the gains at evenly spaced numbers of wavelengths to the stroke."""
+        k = 2 * math.pi * turns / self.span
+        waves = [np.exp(1j * k[0] * x) for x in self.places]
+        steps = [np.exp(1j * (k[1] - k[0]) * x) for x in self.places]
+        gains = []
+        for _ in turns:
+            gains.append(self._gain(waves))
+            waves = [w * s for w, s in zip(waves, steps, strict=True)]
+        return np.array(gains)
+
+    def _gain(self, waves) -> float:
+        """Return what forces in phase and in quadrature with the waves explain together [nats]."""
+        pair = self._response(waves)
+        columns = [self._white([np.real(p) for p in pair]), self._white([np.imag(p) for p in pair])]
+        a = self._without(np.array(columns).T).T
+        g, h = a @ self._left, a @ a.T
+        h[np.diag_indices(2)] += 1e-9 * np.trace(h) + 1e-300
+        share = float(g @ np.linalg.solve(h, g)) / self._power
+        return -0.5 * len(self._left) * math.log(max(1 - share, 1e-12))
+
+    def _regressed(self, columns) -> np.ndarray:
+        matrix = np.array([self._white(c) for c in columns]).T
+        size = np.linalg.norm(matrix, axis=0) + 1e-300
+        return np.linalg.lstsq(matrix / size, self._white(self._y), rcond=1e-12)[0] / size
+
+    def _without(self, x) -> np.ndarray:
+        return x - self._basis @ (self._basis.T @ x)
+
+    def _response(self, forces) -> list[np.ndarray]:
+        """Return what forces, one array a record, do to a free mass of 1 kg, as `_parts` does."""
+        return self._parts(
+            [_integral(_integral(f, r.t), r.t) for f, r in zip(forces, self.records, strict=True)]
+        )
+
+    def _parts(self, signals) -> list[np.ndarray]:
+        """Return second differences of means over samples, one array for each part without holes."""
+        parts = []
+        for s, runs in zip(signals, self._runs, strict=True):
+            for i, j in runs:
+                d = np.diff(s[i:j].reshape(-1, self._size).mean(axis=1), 2)
+                # faded at the ends: sensor noise is a million times stronger at high than at low frequencies
+                parts.append(d * _fade(len(d)))
+        return parts
+
+    def _white(self, parts) -> np.ndarray:
+        """Return the weighted spectra of parts, real and imaginary."""
+        spectra = [np.fft.rfft(s, _length(s)) * w for s, w in zip(parts, self._weights, strict=True)]
+        return np.concatenate([c for s in spectra for c in (s.real, s.imag)])
+
+
+@functools.lru_cache(maxsize=64)
+def _fade(length: int) -> np.ndarray:
+    return np.hanning(length) ** 0.25
+
+
+def _forces(record, place) -> list[np.ndarray]:
+    """Return forces that a drive may have: those of `_PLAIN`, then unequal to both sides, elastic, drag."""
+    v = facts(record).velocity
+    return [-np.sign(v), -v, np.ones(len(v)), -np.abs(v), place, v * np.abs(v)]
+
+
+def _held(record) -> np.ndarray:
+    """Return the impulse of the force given, up to each sample."""
+    u = np.asarray(record.u)
+    if record.input_hold == "zoh":
+        return np.concatenate(([0.0], np.cumsum(u[:-1] * np.diff(record.t))))
+    return _integral(u, record.t)
+
+
+def _integral(f, t) -> np.ndarray:
+    return np.concatenate(([0.0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(t))))
+
+
+def _smoothed(record) -> np.ndarray:
+    """Return the position without the noise above the band of the motion."""
+    x = _integral(facts(record).velocity, record.t)
+    return x - np.mean(x) + np.mean(record.y)
+
+
+def _blur(record) -> float:
+    """Return the error of the smoothed position [m]."""
+    known = facts(record)
+    return max(known.noise / math.sqrt(2 * known.half), 1e-9 * known.spread)
+
+
+def _runs(windows, size) -> list[tuple[int, int]]:
+    """Return first and last sample of parts without holes, whole numbers of `size` samples long."""
+    runs: list[list[int]] = []
+    for i, j in zip(windows.begins, windows.ends, strict=True):
+        if runs and runs[-1][1] == i:
+            runs[-1][1] = int(j)
+        else:
+            runs.append([int(i), int(j)])
+    return [(i, i + (j - i) // size * size) for i, j in runs if (j - i) // size > 12]
+
+
+def _length(signal) -> int:
+    """Return a length for the Fourier transform that is quick."""
+    from scipy.fft import next_fast_len
+
+    return next_fast_len(len(signal), real=True) or len(signal)
+
+
+def _weights(left) -> np.ndarray:
+    """Return one over the rms that is left around each frequency: medians, which single lines leave alone."""
+    power = np.abs(np.fft.rfft(left, _length(left))) ** 2
+    n = len(power)
+    middles = np.unique(np.geomspace(2, n - 1, 40).astype(int))
+    level = [np.median(power[max(int(m / 1.4) - 2, 1) : int(m * 1.4) + 3]) / math.log(2) for m in middles]
+    logs = np.interp(np.log(np.arange(1, n)), np.log(middles), np.log(np.array(level) + 1e-300))
+    return np.append(0.0, np.exp(-0.5 * logs))

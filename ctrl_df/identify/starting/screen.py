@@ -1,0 +1,126 @@
+"""Start values and first evidence for every effect, from the residual of the refitted baseline.
+
+What a candidate would change in the output is simulated; what the baseline's own parameters and starts could
+explain is projected out of that and of the residual first. The share of the residual that remains explained
+is the screening evidence, and the values that explain most are where the refit begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..estimation.candidate import Candidate
+from ..estimation.trial import Data, Scales, carried
+from .attach import attach
+from .proposals import proposals
+from .regression import Start, motion_of, regressed
+
+
+class Screen:
+    """The refitted baseline as a linear map: its residual, what refitting could change projected out.
+
+    Parameters
+    ----------
+    base : Candidate
+        The baseline fitted to windows that are short: there even a strong effect changes the output nearly
+        linearly.
+    data : Data
+        In those windows.
+    """
+
+    def __init__(self, base: Candidate, data: Data):
+        self.base, self.data = base, data
+        self.view = data.train
+        self.motion = motion_of(data.train, data.thin)
+        self.tangent = base.tangent
+        self.residual = self.project(base.residual)
+        self.simulators = [data.simulator(base.model, r) for r in self.view.records]
+
+    @property
+    def scales(self) -> Scales:
+        """Typical sizes in the records."""
+        return self.data.scales
+
+    @property
+    def block(self):
+        """The refitted baseline."""
+        return self.base.model
+
+    def project(self, signals) -> np.ndarray:
+        """Remove what the baseline's parameters and initial states can explain."""
+        return self.tangent.project(signals) if self.tangent is not None else np.concatenate(signals)
+
+    def starts(self, block) -> list[np.ndarray]:
+        """Return the baseline's initial states as those of a block with an effect more."""
+        return [
+            carried(self.data.simulator(block, r), w, old, start)
+            for r, w, old, start in zip(
+                self.view.records, self.view.windows, self.simulators, self.base.starts, strict=True
+            )
+        ]
+
+    def change(self, block) -> list[np.ndarray] | None:
+        """Return the change of output from the baseline to `block`; None if it cannot be simulated."""
+        change = []
+        for record, windows, start, y in zip(
+            self.view.records, self.view.windows, self.starts(block), self.base.simulated, strict=True
+        ):
+            simulator = self.data.simulator(block, record)
+            change.append(simulator.run(windows, None, start, rounded=True) - y)
+        return change if all(np.all(np.isfinite(c)) for c in change) else None
+
+
+def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
+    """Return the best start values for one effect class, best first."""
+    found: list[Start] = []
+    total = float(screen.residual @ screen.residual)
+    for effect in proposals(cls, screen):
+        found += _judged(effect, screen, total)
+    found.sort(key=lambda s: s.left)
+    chosen: list[Start] = list(regressed(cls, screen))
+    keep += len(chosen)
+    for start in found:
+        if all(_apart(start.effect, other.effect) for other in chosen):
+            chosen.append(start)
+        if len(chosen) == keep:
+            break
+    return chosen
+
+
+def _judged(effect, screen, total) -> Iterator[Start]:
+    block = attach(screen.block, effect)
+    change = None if block is None else screen.change(block)
+    if block is None or change is None or total == 0:
+        return
+    change = screen.project(change)
+    power = float(change @ change)
+    if power == 0:
+        return
+    left = screen.residual - change
+    yield Start(block.effects[-1], float(left @ left) / total)
+    if effect.proportional:
+        # For a small effect the change is proportional to it: scale it to the residual.
+        factor = float(change @ screen.residual) / power
+        scaled = _scaled(effect, factor)
+        if scaled is not None and not 0.8 < factor < 1.25:
+            again = attach(screen.block, scaled)
+            moved = None if again is None else screen.change(again)
+            if again is not None and moved is not None:
+                left = screen.residual - screen.project(moved)
+                yield Start(again.effects[-1], float(left @ left) / total)
+
+
+def _scaled(effect, factor):
+    name, p = next(iter(effect.parameters.items()))
+    value = p.value * min(max(factor, -300.0), 300.0)
+    if value < p.lower or value > p.upper or (p.strict and value <= p.lower) or value == 0:
+        return None
+    return effect.replace(**{name: value})
+
+
+def _apart(a, b):
+    return any(
+        abs(x - y) > 0.25 * max(abs(x), abs(y), 1e-300) for x, y in zip(a.values, b.values, strict=True)
+    )

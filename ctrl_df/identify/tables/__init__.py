@@ -1,0 +1,1 @@
+"""The same course over tables N(A, omega)."""

@@ -1,0 +1,66 @@
+"""One effect tried on a table N(A, omega): from its best starts, with and without points that are far off."""
+
+from __future__ import annotations
+
+from ..estimation.trial import Scales
+from .fit import (
+    QUICK,
+    ROUGH,
+    FittedTable,
+    fit_table,
+    log_density,
+    outlying,
+    relative_error,
+    simulate_table,
+)
+from .starts import best_starts
+
+SLOW = frozenset({"position_ripple", "sensor_quantization"})
+# Starts that are followed, where not three: each costs, and the plane of backlash has many valleys.
+FOLLOWED = {"position_ripple": 1, "sensor_quantization": 1, "bristle": 2, "compliance": 2, "backlash": 4}
+
+
+def try_effect(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
+    """Fit one effect class from its best starts (a job of its own, for executors)."""
+    cls, block, points, free, scales, slopes = job
+    scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
+    slow = cls.id in SLOW
+    work = ROUGH if slow else QUICK
+    keep = FOLLOWED.get(cls.id, 3)
+    grown, hopeful = best_starts(cls, block, points, slopes, keep, work)
+    if not grown:
+        return None
+    own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
+
+    def fitted(begin, iterations):
+        return fit_either(
+            begin, points, (*free, *own), scales,
+            again=False, iterations=iterations, tolerance=1e-2, work=work,
+        )  # fmt: skip
+
+    if not hopeful:
+        return cls.id, fitted(grown[0], 0), own
+    begun = [fitted(g, 2) for g in grown]
+    best = max(begun, key=_likelihood_of)
+    return cls.id, best if slow or best.converged else fitted(best.block, 8), own
+
+
+def fit_either(block, points, names, scales, *, again=True, **options) -> FittedTable:
+    """Fit to all points and, where a few are far off, to the others; return the likeliest.
+
+    `again` says whether to begin with those that are far off at the start, too.
+    """
+    fits = [fit_table(block, points, names, scales, **options)]
+    begins = [(fits[0].block, fits[0].error)]
+    if again:
+        table = simulate_table(block, points, options.get("work"))
+        begins.append((block, relative_error(table, points)))
+    for begin, error in begins:
+        far = outlying(error)
+        if far.any():
+            fits.append(fit_table(begin, points.without(far), names, scales, **options))
+    return max(fits, key=_likelihood_of)
+
+
+def _likelihood_of(fitted: FittedTable) -> float:
+    return float(log_density(fitted.error, 1e-12)[0].sum())

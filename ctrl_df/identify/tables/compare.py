@@ -1,0 +1,228 @@
+"""A model beside measured tables N(A, omega): how far off, whether beyond scatter, and where on the plane."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...drawing import draw
+from ..data.frequency_measurement import FrequencyMeasurement
+from ..data.records import as_tables
+from ..residuals.compared import Compared
+from ..residuals.regions import Region, Regions
+from .fit import Points, counted, points_of, relative_error, rms, simulate_table
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Whether neighbours on the plane err independently of each other: true if so.
+
+    Attributes
+    ----------
+    correlation : float
+        Of the relative errors of neighbouring points; 0 for mere scatter, near 1 for an effect's print.
+    p_value : float
+        Probability of a correlation this far from none by chance.
+    """
+
+    correlation: float
+    p_value: float
+
+    def __bool__(self) -> bool:
+        """Return whether the errors are mere scatter (at the level of 1 %)."""
+        return self.p_value >= 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class TableComparison:
+    """A model beside one table.
+
+    Attributes
+    ----------
+    record : FrequencyMeasurement
+    simulated, residual : (na, nw) complex array
+        Model's N; measured minus model's. NaN where nothing was measured or the model has no answer.
+    relative : (na, nw) complex array
+        Residual over ``|N|``; a point where the model has no answer counts as one.
+    """
+
+    record: FrequencyMeasurement
+    simulated: np.ndarray
+    residual: np.ndarray
+    relative: np.ndarray
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the relative errors."""
+        return rms(self.relative[np.isfinite(self.relative)])
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyComparison(Compared):
+    """Outcome of `compare` for tables: all points together in the figures, each table in `records`.
+
+    Errors are relative to ``|N|``. `simulated` and `residual` are arrays for one table, tuples for several.
+    """
+
+    records: tuple[TableComparison, ...]
+
+    @property
+    def relative(self):
+        """Residual over ``|N|``."""
+        return self._each("relative")
+
+    @property
+    def rmse(self) -> float:
+        """Rms of the residual [output unit over input unit]."""
+        return rms(np.concatenate([r.residual[np.isfinite(r.residual)] for r in self.records]))
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the relative errors of all points."""
+        return rms(np.concatenate([r.relative[np.isfinite(r.relative)] for r in self.records]))
+
+    @cached_property
+    def white(self) -> Scatter:
+        """Whether what remains is scatter: true if neighbours on the plane err independently."""
+        return scatter([r.relative for r in self.records])
+
+    @cached_property
+    def where(self) -> Regions:
+        """Amplitudes and frequencies ranked by their share of the error."""
+        points = points_of([r.record for r in self.records])
+        error = np.concatenate([r.relative[counted(r.record)] for r in self.records])
+        return plane_regions(points, error)
+
+    def report(self) -> str:
+        """Return the comparison as text."""
+        lines = [str(self)]
+        if len(self.records) > 1:
+            lines += [f"  {r.record.name:<24} nrmse {r.nrmse:.4g}" for r in self.records]
+        return "\n".join([*lines, "", *self.where.sentences[:6], "", self.where.table(8)])
+
+    def __str__(self) -> str:
+        """Return it as text."""
+        count = sum(int(np.isfinite(r.relative).sum()) for r in self.records)
+        lost = sum(int((np.isfinite(r.record.N) & ~np.isfinite(r.simulated)).sum()) for r in self.records)
+        text = (
+            f"{count} points of N(A, omega): error {self.nrmse:.4g} of |N|, fit {self.fit_percent:.2f} %, "
+            f"{'scatter only' if self.white else 'neighbours err alike'} (correlation "
+            f"{self.white.correlation:.2f}, p = {self.white.p_value:.2g})"
+        )
+        if lost:
+            text += f"; at {lost} of them the model stands still or has no periodic answer (counted as N = 0)"
+        return text + "."
+
+    def plot(self, record=None, **keywords):
+        """Draw measured and model's N, and the error on the plane; returns a ``ct.ControlPlot``."""
+        return draw("table comparison", self, record=record, **keywords)
+
+
+def compare_frequency(model, data, **keywords) -> FrequencyComparison:
+    """Compare a model's describing function with measured tables.
+
+    Parameters
+    ----------
+    model : block, or loop of `ctrl_df.closed_loop`
+        Anything `ctrl_df.describing_function` takes; of a loop its block.
+    data : FrequencyMeasurement or sequence of them
+
+    Returns
+    -------
+    FrequencyComparison
+    """
+    if keywords:
+        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
+    return comparison_of_tables(inner_block(model), as_tables(data))
+
+
+def comparison_of_tables(model, records) -> FrequencyComparison:
+    """Return the comparison; `records` are known to be tables."""
+    rows = []
+    for record in records:
+        points = points_of([record])
+        found = simulate_table(model, points)
+        where = counted(record)
+        simulated = np.full(record.N.shape, np.nan + 0j)
+        relative = simulated.copy()
+        simulated[where], relative[where] = found, relative_error(found, points)
+        rows.append(TableComparison(record, simulated, record.N - simulated, relative))
+    return FrequencyComparison(model, tuple(rows))
+
+
+def inner_block(model):
+    """Return the block of a closed loop, or the model itself."""
+    return getattr(getattr(model, "parts", None), "block", model)
+
+
+# --- the plane ------------------------------------------------------------------------------------
+
+
+def scatter(tables) -> Scatter:
+    """Correlate the errors of neighbouring grid points."""
+    product, power, pairs, count = 0.0, 0.0, 0, 0
+    for e in tables:
+        good = np.isfinite(e)
+        power += float(np.sum(np.abs(e[good]) ** 2))
+        count += int(good.sum())
+        for a, b in ((e[1:], e[:-1]), (e[:, 1:], e[:, :-1])):
+            both = np.isfinite(a) & np.isfinite(b)
+            product += float(np.sum((a[both] * b[both].conj()).real))
+            pairs += int(both.sum())
+    if pairs < 3 or power == 0:
+        return Scatter(0.0, 1.0)
+    correlation = product / pairs / (power / count)
+    # each complex pair is two products of unit variance under independence
+    z = abs(correlation) * math.sqrt(2 * pairs)
+    return Scatter(correlation, math.erfc(z / math.sqrt(2)))
+
+
+def plane_regions(points: Points, error) -> Regions:
+    """Rank bands of amplitude and of frequency by their share of the squared relative error.
+
+    Points are taken to err independently: a band's squares beside all others' are then an F ratio.
+    """
+    from scipy.stats import f as f_distribution
+
+    size = np.abs(error) ** 2
+    total = float(size.sum())
+    if total == 0 or len(points) < 4:
+        return Regions()
+    found = []
+    for kind, axis, unit, scale in (
+        ("amplitude", points.A, "N", 1.0),
+        ("frequency", points.omega, "rad/s", 1 / (2 * math.pi)),
+    ):
+        for inside, low, high in _bands(axis):
+            n = int(inside.sum())
+            share, expected = float(size[inside].sum()) / total, n / len(points)
+            if n == len(points):
+                continue
+            ratio = share / max(1 - share, 1e-300) * (1 - expected) / expected
+            p = float(f_distribution.sf(ratio, 2 * n, 2 * (len(points) - n)))
+            label = f"{low:.3g} to {high:.3g} {unit}" if high > low else f"{low:.3g} {unit}"
+            bias = float(np.mean(error[inside].real)) / math.sqrt(total / len(points))
+            found.append((p, kind, label, share, expected, bias, (low * scale, high * scale)))
+    found.sort(key=lambda r: r[0])
+    regions = []
+    for i, (p, kind, label, share, expected, bias, span) in enumerate(found):
+        p = min(p * (len(found) - i), 1.0)
+        what = "amplitudes" if kind == "amplitude" else "frequencies"
+        sentence = (
+            f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the "
+            "points"
+            f" (p {'< 1e-6' if p < 1e-6 else f'= {p:.2g}'})."
+        )
+        regions.append(Region(kind, label, share, expected, p, bias, 1.0, span, sentence))
+    regions.sort(key=lambda r: (r.p_value >= 0.01, -r.excess))
+    return Regions(regions)
+
+
+def _bands(axis, count=4):
+    """Yield up to `count` bands of about as many distinct values each."""
+    values = np.unique(axis)
+    for part in np.array_split(values, min(count, len(values))):
+        yield (axis >= part[0]) & (axis <= part[-1]), float(part[0]), float(part[-1])
