@@ -55,7 +55,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
     "filename_pattern": r"/(?!_)",
-    "ignore_pattern": r"(/_|emps\.py)",  # that one asks for data that are no part of the repository
+    "ignore_pattern": r"(/_|emps\.py|cluster\.py)",  # that one asks for data that are no part of the repository
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "remove_config_comments": True,
