@@ -13,7 +13,7 @@ computation.
 """
 
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -27,7 +27,7 @@ folder = tempfile.TemporaryDirectory()
 path = Path(folder.name) / "family.npz"
 
 # %%
-# Start it, and press Ctrl-C. Here somebody else does, who hands over nine pieces of work and then loses patience:
+# Start it, and press Ctrl-C. Here a pool does that stands for you: it loses patience after nine pieces of work.
 
 
 class Impatient(ThreadPoolExecutor):
@@ -37,7 +37,9 @@ class Impatient(ThreadPoolExecutor):
         self.left -= 1
         if self.left < 0:
             raise KeyboardInterrupt
-        return super().submit(*work)
+        piece = super().submit(*work)
+        wait([piece])
+        return piece
 
 
 try:

@@ -47,7 +47,7 @@ class LimitCycle:
     amplitude : float
         Peak value of the fundamental at the block's input.
     output_amplitude : float
-        The same at the block's output, |N| a.
+        The same at the block's output, ``|N| a``.
     omega : float
         [rad/s].
     stable : bool or None
@@ -55,7 +55,7 @@ class LimitCycle:
         proof; None where the curves are nearly tangent. False also where the block leaves the motion of
         `branch` under the force alone. The exact verdict is the Floquet multipliers of the orbit.
     residual : float
-        |1 + N H| that remains.
+        ``|1 + N H|`` that remains.
     sensitivity : Sensitivity
         ``(amplitude, omega)``: d ln a and d ln omega per relative error in N.
     distortion : float
