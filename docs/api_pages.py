@@ -55,4 +55,5 @@ def section(title, entries) -> str:
     if not entries:
         return ""
     lines = "\n".join(f"   {e}" for e in entries)
-    return f"\n## {title}\n\n```{{eval-rst}}\n.. autosummary::\n   :toctree: generated\n\n{lines}\n```\n"
+    table = f".. autosummary::\n   :toctree: generated\n   :nosignatures:\n\n{lines}"
+    return f"\n## {title}\n\n```{{eval-rst}}\n{table}\n```\n"

@@ -27,8 +27,7 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5", "gallery/sg_execution_times.rst",
-                    "sg_execution_times.rst"]  # fmt: skip
+exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5", "**/sg_execution_times.rst"]
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 
@@ -42,7 +41,7 @@ html_title = "ctrl_df"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
-html_sidebars = {"index": [], "tutorial_*": [], "search": []}
+html_sidebars = {"index": [], "search": []}
 html_theme_options = {
     "navbar_align": "left",
     "header_links_before_dropdown": 6,
@@ -55,7 +54,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
     "filename_pattern": r"/(?!_)",
-    "ignore_pattern": r"(/_|emps\.py|cluster\.py)",  # that one asks for data that are no part of the repository
+    "ignore_pattern": r"(/_|emps\.py|cluster\.py)",  # one asks for data, one for a package and processes
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "remove_config_comments": True,

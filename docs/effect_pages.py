@@ -1,7 +1,7 @@
 """One page an effect, made by code: characteristic, law, print on N(a, omega), print on residuals, source.
 
-All that a page says is what the class of the effect says; the pictures come from the effect added to one and the
-same machine. An effect that joins the library gets its page with no change here.
+All that a page says is what the class of the effect says; the pictures come from the effect added to one and
+the same machine. An effect that joins the library gets its page with no change here.
 """
 
 import dataclasses
@@ -49,7 +49,9 @@ ROLES = {
 def machine(turning=False):
     """Return the machine that every effect is added to: friction, and a spring that keeps it in place."""
     body = cdf.Inertia(2.0) if turning else cdf.Mass(2.0)
-    return body.with_effect(cdf.Viscous(4.0)).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.LinearSpring(60.0))
+    return (
+        body.with_effect(cdf.Viscous(4.0)).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.LinearSpring(60.0))
+    )
 
 
 def typical(cls):
@@ -81,7 +83,7 @@ def with_effect(effect):
 
 
 def law_curves(effect):
-    """Return the curves of a plain law as (label, abscissa, force), over speed and over place; [] if it has none."""
+    """Return the curves of a plain law as (label, abscissa, force), over speed and place; [] if it has none."""
     law, p = effect.law, np.array(effect.values)
     v, x = np.linspace(-1, 1, 801), np.linspace(-0.2, 0.2, 801)
     if law is None or effect.states:
@@ -102,7 +104,9 @@ def law_curves(effect):
 def characteristic(effect, bare, full, path):
     """Draw the law; where the engine itself knows it, what the machine does under a slowly swelling force."""
     curves = law_curves(effect)
-    figure, axes = plt.subplots(1, max(len(curves), 1), figsize=(6.6, 2.6), layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(
+        1, max(len(curves), 1), figsize=(6.6, 2.6), layout="constrained", squeeze=False
+    )
     for ax, (label, at, force) in zip(axes[0], curves, strict=False):
         ax.axhline(0, color=GREY, lw=0.5)
         ax.plot(at, force, color=ACCENT, lw=1.6)
@@ -128,9 +132,13 @@ def on_plane(bare, full, path):
     ratio = np.where(np.abs(N1) > 1e-3 * np.abs(N0), N1 / N0, np.nan)  # at less the body does not move
     figure, axes = plt.subplots(1, 2, figsize=(6.6, 2.6), layout="constrained")
     for k, (a, style) in enumerate(zip(A, (":", "--", "-"), strict=True)):
-        axes[0].semilogx(omega, 20 * np.log10(np.abs(ratio[k])), color=ACCENT, ls=style, lw=1.3, label=f"{a:g} N")
+        axes[0].semilogx(
+            omega, 20 * np.log10(np.abs(ratio[k])), color=ACCENT, ls=style, lw=1.3, label=f"{a:g} N"
+        )
         axes[1].semilogx(omega, np.degrees(np.angle(ratio[k])), color=ACCENT, ls=style, lw=1.3)
-    for ax, title, unit in zip(axes, ("gain, with over without", "phase, with less without"), ("dB", "deg"), strict=True):
+    for ax, title, unit in zip(
+        axes, ("gain, with over without", "phase, with less without"), ("dB", "deg"), strict=True
+    ):
         ax.axhline(0, color=GREY, lw=0.5)
         ax.set_title(title)
         ax.set_xlabel("frequency [rad/s]")
@@ -147,7 +155,11 @@ def on_plane(bare, full, path):
 def on_residual(bare, full, path):
     """Draw what a record of the machine leaves when the model without the effect is fitted to it."""
     t = np.arange(0, 6, 0.01)
-    force = 8 * np.sin(2 * np.pi * 0.35 * t) + 6 * np.sin(2 * np.pi * 0.9 * t + 1) + 4 * np.sin(2 * np.pi * 2.3 * t)
+    force = (
+        8 * np.sin(2 * np.pi * 0.35 * t)
+        + 6 * np.sin(2 * np.pi * 0.9 * t + 1)
+        + 4 * np.sin(2 * np.pi * 2.3 * t)
+    )
     x = np.asarray(cdf.event_response(full, t, force, input_hold="zoh").outputs)[0]
     noisy = x + 2e-5 * np.random.default_rng(1).standard_normal(t.size)
     turning = isinstance(full, cdf.Inertia | cdf.TwoInertias)
@@ -155,7 +167,9 @@ def on_residual(bare, full, path):
     fit = cdf.refit(bare, cdf.Measurement(t, force, noisy, **units))
     row = fit.comparison.records[0] if hasattr(fit.comparison, "records") else fit.comparison[0]
     residual, v = 1e3 * row.residual, np.gradient(x, t)
-    figure, axes = plt.subplots(1, 3, figsize=(6.6, 2.3), layout="constrained", width_ratios=(1.6, 1, 1), sharey=True)
+    figure, axes = plt.subplots(
+        1, 3, figsize=(6.6, 2.3), layout="constrained", width_ratios=(1.6, 1, 1), sharey=True
+    )
     axes[0].plot(t, residual, color=ACCENT, lw=0.9)
     axes[0].set_xlabel("time [s]")
     axes[0].set_ylabel("residual [mrad]" if turning else "residual [mm]")
@@ -175,11 +189,12 @@ PICTURES = (
     ("residual", "Its print on residuals", on_residual),
 )
 SAYS = {
-    "characteristic": "The force of the law itself; or, where it is no function of speed or place, what the machine does under "
-    "a slowly swelling force. Levels of friction add to 1 N.",
+    "characteristic": "The force of the law itself; or, where it is no function of speed or place, what the "
+    "machine does under a slowly swelling force. Levels of friction add to 1 N.",
     "plane": "How the answer to a sine changes: the describing function with the effect over the one without. "
     "Lines break where no periodic answer exists.",
-    "residual": "What is left of a record when everything but this effect is in the model and its parameters are fitted.",
+    "residual": "What is left of a record when everything but this effect is in the model, and its parameters "
+    "are fitted.",
 }
 
 
@@ -211,7 +226,9 @@ def parameters(cls) -> str:
         spec = field.metadata.get("parameter")
         if spec:
             default = "" if field.default is dataclasses.MISSING else f"{field.default:g}"
-            rows.append(f"| `{field.name}` | {spec['unit'] or '–'} | {bounds(spec)} | {default} | {spec['meaning']} |")
+            rows.append(
+                f"| `{field.name}` | {spec['unit'] or '–'} | {bounds(spec)} | {default} | {spec['meaning']} |"
+            )
     return "| parameter | unit | range | default | meaning |\n|---|---|---|---|---|\n" + "\n".join(rows)
 
 
@@ -272,14 +289,16 @@ def write(folder, workers=2):
                 if failed:
                     print(f"effects/{key}: {failed}")
     rows = "\n".join(
-        f"| [{c.__name__}]({k}.md) | {c.role} | {rst_to_md(law_text(c)[0])} |" for k, c in sorted(classes.items())
+        f"| [{c.__name__}]({k}.md) | {c.role} | {rst_to_md(law_text(c)[0])} |"
+        for k, c in sorted(classes.items())
     )
     toctree = "\n".join(sorted(classes))
     text = f"""# Effects
 
-A machine is an inertia plus effects: `cdf.Mass(9).with_effect(cdf.Coulomb(5))`. These are all there are; one of your own is
-[one class](../gallery/own_effect.rst). Each page shows the law, how the effect changes the answer to a sine, and what it
-leaves in the residual of a model that lacks it. [Which friction law when](../friction_laws.md) compares those of friction.
+A machine is an inertia plus effects: `cdf.Mass(9).with_effect(cdf.Coulomb(5))`. These are all there are; one
+of your own is [one class](../gallery/own_effect.rst). Each page shows the law, how the effect changes the answer
+to a sine, and what it leaves in the residual of a model that lacks it.
+[Which friction law when](../friction_laws.md) compares those of friction.
 
 | effect | role | in a sentence |
 |---|---|---|

@@ -82,16 +82,25 @@ def missing(said):
     diagnosis, record = said["diagnosis"], said["record"]
     before = cdf.compare(diagnosis.baseline, record, mode="free")
     after = cdf.compare(diagnosis.best.model, record, mode="free")
-    figure, (error, bars) = plt.subplots(1, 2, figsize=(7.4, 2.8), layout="constrained", width_ratios=(1.5, 1))
-    for comparison, color, label in ((before, GREY, "fitted model"), (after, ACCENT, "with Stribeck friction")):
-        residual = comparison.residual if isinstance(comparison.residual, np.ndarray) else comparison.residual[0]
+    figure, (error, bars) = plt.subplots(
+        1, 2, figsize=(7.4, 2.8), layout="constrained", width_ratios=(1.5, 1)
+    )
+    for comparison, color, label in (
+        (before, GREY, "fitted model"),
+        (after, ACCENT, "with Stribeck friction"),
+    ):
+        residual = (
+            comparison.residual if isinstance(comparison.residual, np.ndarray) else comparison.residual[0]
+        )
         error.plot(record.t, 1e3 * residual, color=color, lw=0.8, label=label)
     error.set_xlabel("time [s]")
     error.set_ylabel("measured − simulated [mm]")
     error.set_title("what the model gets wrong")
     error.legend(loc="upper left", ncols=2)
     error.margins(y=0.15)
-    tried = sorted((c for c in diagnosis.ranking if np.isfinite(c.nrmse)), key=lambda c: -c.evidence)[:6][::-1]
+    tried = sorted((c for c in diagnosis.ranking if np.isfinite(c.nrmse)), key=lambda c: -c.evidence)[:6][
+        ::-1
+    ]
     gains = [max(c.evidence, 0.0) for c in tried]
     best = diagnosis.best.id
     colors = [ACCENT if c.id == best else GREY for c in tried]

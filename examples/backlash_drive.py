@@ -2,8 +2,9 @@ r"""
 Will a gear with play rattle, how fast, how far?
 ================================================
 
-**Problem.** A motor of 1 kg moves a load of 8 kg through a gap of 18 mm; impacts keep 0.2 of the relative speed. The
-load's position is controlled by a PID controller. This is the drive of Azenha & Machado (1997), Fig. 9.
+**Problem.** A motor of 1 kg moves a load of 8 kg through a gap of 18 mm; impacts keep 0.2 of the relative
+speed. The load's position is controlled by a PID controller. This is the drive of Azenha & Machado (1997),
+Fig. 9.
 
 .. code-block:: text
 
@@ -17,8 +18,8 @@ load's position is controlled by a PID controller. This is the drive of Azenha &
 
 at an impact momentum is kept and the relative speed becomes :math:`-\varepsilon` times what it was.
 
-**Method.** Predict with the describing function N(a, ω) of the drive (the gain and phase of its answer to a sine of
-amplitude a and frequency ω), then compute the exact periodic motion.
+**Method.** Predict with the describing function N(a, ω) of the drive (the gain and phase of its answer to a
+sine of amplitude a and frequency ω), then compute the exact periodic motion.
 """
 
 import matplotlib.pyplot as plt
@@ -46,11 +47,12 @@ print(check.table())
 orbit.plot()
 
 # %%
-# **Result.** The frequency is right to 0.8 %, the amplitude 13 % short: the two curves cross almost along each other, so
-# that a small error in N slides the crossing far along the amplitude. The cycle says so itself. Corrected by the
-# harmonics it dropped, the prediction is right to 0.6 % in amplitude.
+# **Result.** The frequency is right to 0.8 %, the amplitude 13 % short: the two curves cross almost along
+# each other, so that a small error in N slides the crossing far along the amplitude. The cycle says so
+# itself. Corrected by the harmonics it dropped, the prediction is right to 0.6 % in amplitude.
 #
-# **Check.** The frequency against one computed by other code, and the loop simulated for a minute from a push:
+# **Check.** The frequency against one computed by other code, and the loop simulated for a minute from a
+# push:
 
 loop = cdf.closed_loop(pid, drive)
 start = [5e-3 if name.endswith(("_x", "_x_motor")) else 0.0 for name in loop.state_labels]

@@ -2,17 +2,18 @@ r"""
 A family on a cluster
 =====================
 
-**Problem.** A family N(a, ω) with many points, and more than one computer. How is the work spread, and are the numbers the
-same?
+**Problem.** A family N(a, ω) with many points, and more than one computer. How is the work spread, and are
+the numbers the same?
 
 .. code-block:: text
 
     this process ---[ dask scheduler ]---+---> worker 1: amplitudes 1, 2, ...
                                          +---> worker 2: amplitudes 7, 8, ...
 
-**Method.** ``executor=`` takes anything with ``submit(f, *args).result()``: a thread pool, a process pool, or the client of
-`dask.distributed <https://distributed.dask.org>`_. Here two worker processes on this machine stand for the cluster;
-elsewhere give ``Client("tcp://scheduler:8786")`` its address. Compile ahead on each node: ``ctrl-df warm-up``.
+**Method.** ``executor=`` takes anything with ``submit(f, *args).result()``: a thread pool, a process pool,
+or the client of `dask.distributed <https://distributed.dask.org>`_. Here two worker processes on this
+machine stand for the cluster; elsewhere give ``Client("tcp://scheduler:8786")`` its address. Compile ahead
+on each node: ``ctrl-df warm-up``.
 
 Needs ``pip install distributed``.
 """
@@ -50,8 +51,8 @@ def main():
 
 
 # %%
-# **Result.** Worker processes import the script, so that the work stands below ``if __name__ == "__main__"``, as in any
-# script that starts processes.
+# **Result.** Worker processes import the script, so that the work stands below ``if __name__ ==
+# "__main__"``, as in any script that starts processes.
 
 if __name__ == "__main__":
     family = main()

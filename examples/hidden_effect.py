@@ -2,9 +2,9 @@ r"""
 What does my model miss? A test where the answer is known
 =========================================================
 
-**Problem.** A drive's model knows Coulomb and viscous friction. Its record says that something else is there. Can the
-record tell what, and how large? Here the record is made by simulation, so that the answer is known: a drive with a
-stop of rubber, a spring that hardens with the cube of the stroke.
+**Problem.** A drive's model knows Coulomb and viscous friction. Its record says that something else is
+there. Can the record tell what, and how large? Here the record is made by simulation, so that the answer is
+known: a drive with a stop of rubber, a spring that hardens with the cube of the stroke.
 
 .. code-block:: text
 
@@ -18,7 +18,8 @@ stop of rubber, a spring that hardens with the cube of the stroke.
 
 the last term unknown to the model.
 
-**Method.** ``diagnose``: the model refitted, every effect of the library tried in it, judged on data held back.
+**Method.** ``diagnose``: the model refitted, every effect of the library tried in it, judged on data held
+back.
 """
 
 import matplotlib.pyplot as plt
@@ -50,12 +51,18 @@ diagnosis.plot()
 # The parameters with their errors, against the truth:
 
 best = diagnosis.best
-for name, true in (("mass", 2.2), ("coulomb.level", 3.0), ("viscous.coefficient", 6.0), ("cubic_spring.stiffness", 60.0)):
+for name, true in (
+    ("mass", 2.2),
+    ("coulomb.level", 3.0),
+    ("viscous.coefficient", 6.0),
+    ("cubic_spring.stiffness", 60.0),
+):
     parameter = best.model.parameters[name]
     print(f"{name:24s} {parameter.value:8.4f} {parameter.unit:8s} true {true:g}")
 
 # %%
-# **Check.** The verdict and the numbers; and the reverse: with the effect in the model nothing is missing any more.
+# **Check.** The verdict and the numbers; and the reverse: with the effect in the model nothing is missing
+# any more.
 
 again = cdf.diagnose(best.model, record)
 print("with it in the model:", again.verdict)

@@ -2,9 +2,9 @@ r"""
 Why does my axis hunt, when theory says it should not?
 ======================================================
 
-**Problem.** A mass of 9 kg with Coulomb friction of 5 N under a PID controller with much integral action. At standstill
-the integral winds up until the force exceeds the *static* level; the mass jumps, overshoots, sticks again. How little
-static friction is enough?
+**Problem.** A mass of 9 kg with Coulomb friction of 5 N under a PID controller with much integral action.
+At standstill the integral winds up until the force exceeds the *static* level; the mass jumps, overshoots,
+sticks again. How little static friction is enough?
 
 .. code-block:: text
 
@@ -19,8 +19,8 @@ static friction is enough?
     M \dot v = F - B v - K \operatorname{sign} v \quad (v \ne 0), \qquad
     \dot v = 0 \quad \text{while } v = 0 \text{ and } |F| \le K_s .
 
-**Method.** The exact periodic motion, found without a guess: pushes of many sizes are simulated, and what they settle
-to is closed by Newton's method.
+**Method.** The exact periodic motion, found without a guess: pushes of many sizes are simulated, and what
+they settle to is closed by Newton's method.
 """
 
 import matplotlib.pyplot as plt
@@ -39,9 +39,9 @@ for static in (5.25, 5.5, 5.75):
 exact[5.5].plot()
 
 # %%
-# **Result.** Five per cent between static and kinetic friction are enough. The describing function answers 13.06 to
-# 13.13 rad/s for all three, and the same 13.05 rad/s without any stiction, where there is no such motion at all: it
-# weighs a whole period and hardly sees the short instant of breakaway.
+# **Result.** Five per cent between static and kinetic friction are enough. The describing function answers
+# 13.06 to 13.13 rad/s for all three, and the same 13.05 rad/s without any stiction, where there is no such
+# motion at all: it weighs a whole period and hardly sees the short instant of breakaway.
 
 for static in (5.0, 5.25, 5.5, 5.75):
     plant = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=static)
@@ -49,7 +49,8 @@ for static in (5.0, 5.25, 5.5, 5.75):
     print(f"static {static:4.2f} N: predicted {min(c.omega for c in resp.limit_cycles):.2f} rad/s")
 
 # %%
-# **Check.** The frequencies against those of other code (maps from one breakaway to the next, integrated apart):
+# **Check.** The frequencies against those of other code (maps from one breakaway to the next, integrated
+# apart):
 
 assert abs(exact[5.25].omega - 8.600097) < 1e-5
 assert abs(exact[5.5].omega - 11.628680) < 1e-5

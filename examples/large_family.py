@@ -2,14 +2,15 @@ r"""
 A family that takes long: how do I stop it and go on tomorrow?
 ==============================================================
 
-**Problem.** A carriage with dry friction on a hardening spring, at 24 amplitudes and 24 frequencies: motions jump and
-double their period, and a point costs milliseconds. On finer grids that is hours, and hours get interrupted.
+**Problem.** A carriage with dry friction on a hardening spring, at 24 amplitudes and 24 frequencies:
+motions jump and double their period, and a point costs milliseconds. On finer grids that is hours, and
+hours get interrupted.
 
 .. math:: M \ddot x = a \cos \omega t - B \dot x - K \operatorname{sign} \dot x - k_3 x^3
 
-**Method.** ``save=`` keeps every finished line of the grid in a file at once, whatever ends the process; the same call
-computes the others. The file carries a fingerprint of all that decides the numbers, and is taken up by no other
-computation.
+**Method.** ``save=`` keeps every finished line of the grid in a file at once, whatever ends the process;
+the same call computes the others. The file carries a fingerprint of all that decides the numbers, and is
+taken up by no other computation.
 """
 
 import tempfile
@@ -21,13 +22,19 @@ import numpy as np
 
 import ctrl_df as cdf
 
-block = cdf.Mass(2.0).with_effect(cdf.CubicSpring(2e4)).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.Viscous(2.0))
+block = (
+    cdf.Mass(2.0)
+    .with_effect(cdf.CubicSpring(2e4))
+    .with_effect(cdf.Coulomb(1.0))
+    .with_effect(cdf.Viscous(2.0))
+)
 A, omega = np.geomspace(1.5, 40, 24), np.geomspace(4, 40, 24)
 folder = tempfile.TemporaryDirectory()
 path = Path(folder.name) / "family.npz"
 
 # %%
-# Start it, and press Ctrl-C. Here a pool does that stands for you: it loses patience after nine pieces of work.
+# Start it, and press Ctrl-C. Here a pool does that stands for you: it loses patience after nine pieces of
+# work.
 
 
 class Impatient(ThreadPoolExecutor):
@@ -63,8 +70,8 @@ ax.set_ylabel("|N| [m/N]")
 ax.legend(title="amplitude", fontsize=8)
 
 # %%
-# **Check.** What was kept and what was computed after it are bitwise what one call computes without a stop; another
-# computation is refused.
+# **Check.** What was kept and what was computed after it are bitwise what one call computes without a stop;
+# another computation is refused.
 
 whole = cdf.describing_function_family(block, A, omega)
 assert np.array_equal(again.N, family.N, equal_nan=True)

@@ -2,15 +2,15 @@ r"""
 How do I add physics that the library does not have?
 ====================================================
 
-**Problem.** A carriage of 2 kg on a spring is slowed by a magnetic brake. Its drag grows with speed, has its greatest
-value at a critical speed and falls again. No effect of the library does that.
+**Problem.** A carriage of 2 kg on a spring is slowed by a magnetic brake. Its drag grows with speed, has
+its greatest value at a critical speed and falls again. No effect of the library does that.
 
 **Equations.**
 
 .. math:: F_\text{brake} = -2 P \, \frac{v/v_c}{1 + (v/v_c)^2}
 
-**Method.** One class says it all: parameters with units, the role, the law. From then on it is an effect as any other:
-simulated, described, fitted, diagnosed.
+**Method.** One class says it all: parameters with units, the role, the law. From then on it is an effect as
+any other: simulated, described, fitted, diagnosed.
 """
 
 from dataclasses import dataclass
@@ -52,8 +52,8 @@ print(f"N(4 N, 8 rad/s) = {N:.6e} m/N")
 family.plot()
 
 # %%
-# **Check.** A way that shares nothing with the engine: let SciPy integrate 200 periods, so that the start is forgotten,
-# and take the fundamental.
+# **Check.** A way that shares nothing with the engine: let SciPy integrate 200 periods, so that the start
+# is forgotten, and take the fundamental.
 
 omega, a = 8.0, 4.0
 period = 2 * np.pi / omega

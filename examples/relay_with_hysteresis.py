@@ -2,7 +2,8 @@ r"""
 How much does the describing function miss for a thermostat?
 ============================================================
 
-**Problem.** A relay with hysteresis drives an integrator with a lag. How far off is the predicted oscillation?
+**Problem.** A relay with hysteresis drives an integrator with a lag. How far off is the predicted
+oscillation?
 
 .. code-block:: text
 
@@ -10,8 +11,8 @@ How much does the describing function miss for a thermostat?
            - ^                                                           |
              +-----------------------------------------------------------+
 
-**Equations.** The relay's output is a square wave whatever the loop does, so that the exact frequency follows from one
-equation (Tsypkin): at the instant of switching up the input stands at the hysteresis h,
+**Equations.** The relay's output is a square wave whatever the loop does, so that the exact frequency
+follows from one equation (Tsypkin): at the instant of switching up the input stands at the hysteresis h,
 
 .. math:: -\frac{4 L}{\pi} \sum_{k = 1, 3, \dots} \frac{\operatorname{Im} H(j k \omega)}{k} = h .
 
@@ -50,8 +51,8 @@ print(f"exact orbit:         {orbit.omega:.6f} rad/s, {'stable' if orbit.stable 
 orbit.plot()
 
 # %%
-# **Result.** The square wave's harmonics come back through a plant that attenuates them by 9 or more: the prediction is
-# off by less than the band it states.
+# **Result.** The square wave's harmonics come back through a plant that attenuates them by 9 or more: the
+# prediction is off by less than the band it states.
 #
 # **Check.** The orbit against Tsypkin's equation:
 

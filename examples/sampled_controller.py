@@ -2,8 +2,8 @@ r"""
 How fast must a digital controller be?
 ======================================
 
-**Problem.** The hunting axis of :doc:`hunting`, under a controller that computes every few milliseconds and holds its output
-in between. What does the sample time change?
+**Problem.** The hunting axis of :doc:`hunting`, under a controller that computes every few milliseconds and
+holds its output in between. What does the sample time change?
 
 .. code-block:: text
 
@@ -11,11 +11,12 @@ in between. What does the sample time change?
                - ^                                                                                |
                  +--------------------------------------------------------------------------------+
 
-**Equations.** Between ticks F is constant; at a tick :math:`t_k = k\,\Delta t` the controller reads x and v. A hold delays by
-half a sample on average: :math:`\Delta t / 2`.
+**Equations.** Between ticks F is constant; at a tick :math:`t_k = k\,\Delta t` the controller reads x and
+v. A hold delays by half a sample on average: :math:`\Delta t / 2`.
 
-**Method.** ``closed_loop(pid, axis, dt=...)``. The ticks and the period of the oscillation have no common measure, so the
-motion never repeats exactly: ``find_limit_cycle`` gives averages over many swings, and ``stable`` is None.
+**Method.** ``closed_loop(pid, axis, dt=...)``. The ticks and the period of the oscillation have no common
+measure, so the motion never repeats exactly: ``find_limit_cycle`` gives averages over many swings, and
+``stable`` is None.
 """
 
 import matplotlib.pyplot as plt
@@ -31,11 +32,15 @@ print(f"continuous: {continuous.omega:.4f} rad/s, {1e3 * continuous.output_ampli
 sampled = {}
 for dt in (0.001, 0.004):
     sampled[dt] = orbit = cdf.find_limit_cycle(cdf.closed_loop(pid, axis, dt=dt))
-    print(f"{1e3 * dt:8.0f} ms: {orbit.omega:.4f} rad/s, {1e3 * orbit.output_amplitude:.3f} mm, stable: {orbit.stable}")
+    print(
+        f"{1e3 * dt:8.0f} ms: {orbit.omega:.4f} rad/s, {1e3 * orbit.output_amplitude:.3f} mm, "
+        f"stable: {orbit.stable}"
+    )
 
 # %%
-# **Result.** Sampling slows the hunting and makes it smaller: a delay of half a sample turns the controller's phase, as
-# :doc:`delay_in_the_loop` does. A millisecond shifts the frequency by some per cent; this loop is that sensitive.
+# **Result.** Sampling slows the hunting and makes it smaller: a delay of half a sample turns the
+# controller's phase, as :doc:`delay_in_the_loop` does. A millisecond shifts the frequency by some per cent;
+# this loop is that sensitive.
 
 figure, ax = plt.subplots(layout="constrained")
 ax.plot([0, *(1e3 * dt for dt in sampled)], [continuous.omega, *(o.omega for o in sampled.values())], "ko-")

@@ -2,8 +2,8 @@ r"""
 At what gain does a saturating servo start to swing, and how far?
 =================================================================
 
-**Problem.** The gain of a third-order loop is 8, its critical gain 3: the linear loop is unstable. The amplifier
-saturates at 1. How large does the oscillation grow?
+**Problem.** The gain of a third-order loop is 8, its critical gain 3: the linear loop is unstable. The
+amplifier saturates at 1. How large does the oscillation grow?
 
 .. code-block:: text
 
@@ -15,8 +15,8 @@ saturates at 1. How large does the oscillation grow?
 
 .. math:: N(a)\, H(j\omega) = -1 .
 
-The phase of H is -180 degrees at :math:`\sqrt 2` rad/s whatever the amplitude, where H is -8/3: N has to come down to
-3/8.
+The phase of H is -180 degrees at :math:`\sqrt 2` rad/s whatever the amplitude, where H is -8/3: N has to
+come down to 3/8.
 """
 
 import control as ct

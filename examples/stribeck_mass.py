@@ -2,15 +2,15 @@ r"""
 Friction that falls with speed: what does it change?
 ====================================================
 
-**Problem.** The friction of a mass of 9 kg is 8 N at rest and falls to 5 N within about 2 cm/s. At which amplitudes and
-frequencies does that matter?
+**Problem.** The friction of a mass of 9 kg is 8 N at rest and falls to 5 N within about 2 cm/s. At which
+amplitudes and frequencies does that matter?
 
 **Equations.** With the Coulomb level K, the static level :math:`K_s` and the Stribeck velocity :math:`v_s`,
 
 .. math:: \text{friction}(v) = K + (K_s - K)\, e^{-(v / v_s)^2} .
 
-**Method.** The describing function with the fall over the one without. There is no closed form for this friction; the
-forced periodic motion is found by Newton's method.
+**Method.** The describing function with the fall over the one without. There is no closed form for this
+friction; the forced periodic motion is found by Newton's method.
 """
 
 import matplotlib.pyplot as plt
@@ -39,8 +39,8 @@ ax.set_ylabel("change of N, relative")
 ax.set_title("What the Stribeck curve changes, by amplitude of the force", fontsize=10)
 
 # %%
-# **Result.** Where the force is large against friction, or the motion fast against the Stribeck velocity, nothing
-# changes. The curve is about small, slow motion, and so is the trouble in practice.
+# **Result.** Where the force is large against friction, or the motion fast against the Stribeck velocity,
+# nothing changes. The curve is about small, slow motion, and so is the trouble in practice.
 #
 # **Check.** One point by SciPy, with the friction smoothed over 1 mm/s:
 

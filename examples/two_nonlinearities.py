@@ -2,20 +2,20 @@ r"""
 An amplifier that saturates and an axis with friction: two nonlinearities in one loop
 =====================================================================================
 
-**Problem.** Textbooks give describing functions of one nonlinearity. Here a saturating amplifier, a slow motor and an axis
-with friction follow each other. Does the loop oscillate?
+**Problem.** Textbooks give describing functions of one nonlinearity. Here a saturating amplifier, a slow
+motor and an axis with friction follow each other. Does the loop oscillate?
 
 .. code-block:: text
 
-    r = 0 --->( + )---[ PD ]---u--->[ 60 N at most ]---[ motor, 1/(0.04 s + 1)^2 ]---F--->[ 9 kg, friction ]---+---> x
-               - ^                                                                                             |
-                 +---------------------------------------------------------------------------------------------+
+    0 --->( + )---[ PD ]---u--->[ 60 N at most ]---[ motor, 40 ms ]---F--->[ 9 kg, friction ]---+---> x
+           - ^                                                                                  |
+             +----------------------------------------------------------------------------------+
 
 **Equations.** :math:`\tau^2 \ddot F + 2 \tau \dot F + F = \operatorname{sat}_{60} u`,
 :math:`M \dot v = F - B v - K \operatorname{sign} v`.
 
-**Method.** Connect the parts by ``ct.interconnect``; the whole is one block with one describing function, computed from
-its periodic answers.
+**Method.** Connect the parts by ``ct.interconnect``; the whole is one block with one describing function,
+computed from its periodic answers.
 """
 
 import control as ct
@@ -30,8 +30,12 @@ axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, name="axis")
 drive = ct.interconnect(
     [amplifier, motor, axis],
     connections=[["motor.u", "amplifier.y"], ["axis.F", "motor.F"]],
-    inplist=["amplifier.u"], inputs=["command"], outlist=["axis.x", "axis.v"], outputs=["x", "v"], name="drive",
-)  # fmt: skip
+    inplist=["amplifier.u"],
+    inputs=["command"],
+    outlist=["axis.x", "axis.v"],
+    outputs=["x", "v"],
+    name="drive",
+)
 
 pd = cdf.pid(2000, 0, 130)
 resp = cdf.describing_function_response(pd, drive, np.geomspace(5.6, 1000, 16), np.geomspace(4, 40, 16))
@@ -40,12 +44,15 @@ for cycle in resp.limit_cycles:
 resp.plot()
 
 # %%
-# **Result.** Two: one that repels (friction damps what is smaller) and one that attracts (the amplifier bounds it). Both call
-# themselves unreliable, and the exact orbit of the large one is a third larger:
+# **Result.** Two: one that repels (friction damps what is smaller) and one that attracts (the amplifier
+# bounds it). Both call themselves unreliable, and the exact orbit of the large one is a third larger:
 
 check = cdf.verify(resp)
 large = next(row for row in check if row.exact is not None and row.exact.stable)
-print(f"exact: {large.exact.amplitude:.1f} N at {large.exact.omega:.4f} rad/s, multiplier {large.exact.multiplier:.3f}")
+print(
+    f"exact: {large.exact.amplitude:.1f} N at {large.exact.omega:.4f} rad/s, "
+    f"multiplier {large.exact.multiplier:.3f}"
+)
 large.exact.plot()
 
 # %%

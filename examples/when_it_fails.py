@@ -2,8 +2,8 @@ r"""
 When is the prediction wrong, and how does one see it beforehand?
 =================================================================
 
-**Problem.** The drive with play of :doc:`backlash_drive`, with hard steel instead of soft: impacts keep 0.8 of the
-relative speed. Everything else stays. Is the prediction as good?
+**Problem.** The drive with play of :doc:`backlash_drive`, with hard steel instead of soft: impacts keep 0.8
+of the relative speed. Everything else stays. Is the prediction as good?
 
 .. code-block:: text
 
@@ -36,16 +36,16 @@ print(f"harmonics fed back: {100 * cycle.distortion:.0f} % of the fundamental")
 print(f"band of omega: {cycle.omega_band[0]:.0f} to {cycle.omega_band[1]:.0f} rad/s")
 
 # %%
-# **Result.** The exact orbit is a rattle of the motor within the gap, two impacts a period, a quarter faster than
-# predicted.
+# **Result.** The exact orbit is a rattle of the motor within the gap, two impacts a period, a quarter
+# faster than predicted.
 
 orbit = cdf.find_limit_cycle(cdf.closed_loop(pid, drive), guess=cycle)
 print(f"exact: {orbit.omega:.6f} rad/s, force {orbit.amplitude:.4f} N, multiplier {orbit.multiplier:.5f}")
 orbit.plot()
 
 # %%
-# A multiplier this near to one also says that the rattle is reached slowly: minutes of irregular motion come first.
-# Fig. 10 of the paper shows those.
+# A multiplier this near to one also says that the rattle is reached slowly: minutes of irregular motion
+# come first. Fig. 10 of the paper shows those.
 #
 # **Check.** The frequency against one computed by other code; the truth within the stated band.
 

@@ -29,8 +29,8 @@ print(f"ctrl_df: {a:.5f} at {omega:.5f} rad/s")
 mine.plot()
 
 # %%
-# python-control 0.10.2 evaluates the refined crossing of a discrete H on the imaginary axis instead of the unit circle.
-# At the true crossing the phase of H is -180 degrees:
+# python-control 0.10.2 evaluates the refined crossing of a discrete H on the imaginary axis instead of the
+# unit circle. At the true crossing the phase of H is -180 degrees:
 
 phase = np.degrees(np.angle(H(np.exp(1j * omega * 0.01))))
 print(f"phase of H there: {phase:.6f} degrees")
@@ -51,8 +51,8 @@ ours = cdf.event_response(loop, t, np.full_like(t, 0.01))
 print("events:", [(round(float(e.time), 4), e.kind) for e in ours.events][:4])
 
 # %%
-# **Result.** A step of 10 mm. With events located the mass stops where friction holds it, and stays. Stepped over, the
-# friction changes its sign at every step instead:
+# **Result.** A step of 10 mm. With events located the mass stops where friction holds it, and stays.
+# Stepped over, the friction changes its sign at every step instead:
 
 speeds = [float(np.abs(np.asarray(r.outputs)[1, t > 0.5]).max()) for r in (theirs, ours)]
 print(f"greatest speed after it has stopped: python-control {speeds[0]:.1e} m/s, here {speeds[1]:.1e} m/s")

@@ -1,9 +1,9 @@
 """Every code block of README and docs runs, and prints what is printed below it.
 
-Blocks of one page share their names and a temporary directory, in the order of the page. A ``text`` block that follows
-a block of code is what it prints: words alike, numbers within a hundredth, ``...`` stands for anything. A block
-of TOML is a model file and is written under the name in its first line. In ``console`` blocks the lines ``$ ctrl-df``
-run; others (installing) are what .ci/run does.
+Blocks of one page share their names and a temporary directory, in the order of the page. A ``text`` block
+that follows a block of code is what it prints: words alike, numbers within a hundredth, ``...`` stands for
+anything. A block of TOML is a model file and is written under the name in its first line. In ``console``
+blocks the lines ``$ ctrl-df`` run; others (installing) are what .ci/run does.
 """
 
 import io

@@ -120,7 +120,7 @@ class Family:
         return draw("family", self, **kwargs)
 
     def plot_harmonics(self, **kwargs) -> ct.ControlPlot:
-        """Draw ``|Y_k| / A`` over frequency or over amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
+        """Draw ``|Y_k| / A`` over frequency or amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
         return draw("harmonics", self, **kwargs)
 
     def save(self, path) -> Path:

@@ -10,7 +10,9 @@ from ..parameter import parameter
 @register_effect
 @dataclass(frozen=True)
 class Coulomb(Effect):
-    """Dry friction of constant level; at rest it holds any force up to that level::
+    """Dry friction of constant level; at rest it holds any force up to that level.
+
+    ::
 
               F│
              K ┤──────── v > 0
