@@ -83,7 +83,7 @@ def with_effect(effect):
 
 
 def law_curves(effect):
-    """Return the curves of a plain law as (label, abscissa, force), over speed and place; [] if it has none."""
+    """Return the curves of a plain law as (label, abscissa, force), over speed and place; or []."""
     law, p = effect.law, np.array(effect.values)
     v, x = np.linspace(-1, 1, 801), np.linspace(-0.2, 0.2, 801)
     if law is None or effect.states:
@@ -191,10 +191,10 @@ PICTURES = (
 SAYS = {
     "characteristic": "The force of the law itself; or, where it is no function of speed or place, what the "
     "machine does under a slowly swelling force. Levels of friction add to 1 N.",
-    "plane": "How the answer to a sine changes: the describing function with the effect over the one without. "
+    "plane": "How the answer to a sine changes: the describing function with the effect over that without. "
     "Lines break where no periodic answer exists.",
-    "residual": "What is left of a record when everything but this effect is in the model, and its parameters "
-    "are fitted.",
+    "residual": "What is left of a record when all but this effect is in the model, and its parameters are "
+    "fitted.",
 }
 
 
@@ -296,8 +296,8 @@ def write(folder, workers=2):
     text = f"""# Effects
 
 A machine is an inertia plus effects: `cdf.Mass(9).with_effect(cdf.Coulomb(5))`. These are all there are; one
-of your own is [one class](../gallery/own_effect.rst). Each page shows the law, how the effect changes the answer
-to a sine, and what it leaves in the residual of a model that lacks it.
+of your own is [one class](../gallery/own_effect.rst). Each page shows the law, how the effect changes the
+answer to a sine, and what it leaves in the residual of a model that lacks it.
 [Which friction law when](../friction_laws.md) compares those of friction.
 
 | effect | role | in a sentence |
