@@ -82,6 +82,16 @@ class LimitCycle:
         Of a motion known as a branch: its largest multiplier over a period of the force, alone; NaN else.
     motion : ForcedMotion or None
         That motion, where `branch` names one and it is known.
+
+    Examples
+    --------
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> resp = cdf.describing_function_response(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> cycle = resp.limit_cycles[0]
+    >>> cycle.grade, cycle.stable
+    ('trusted', True)
+    >>> print(f"{cycle.amplitude:.4f} at {cycle.omega:.4f} rad/s, harmonics {cycle.distortion:.3f}")
+    3.3440 at 1.4142 rad/s, harmonics 0.013
     """
 
     amplitude: float
