@@ -53,8 +53,8 @@ html_theme_options = {
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "filename_pattern": r"/(?!_)",
-    "ignore_pattern": r"(/_|emps\.py|cluster\.py)",  # one asks for data, one for a package and processes
+    "filename_pattern": r"/(?!_|emps|cluster)[^/]*$",  # one asks for data, one for a package and processes: not run
+    "ignore_pattern": r"/_",
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "remove_config_comments": True,

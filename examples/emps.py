@@ -1,13 +1,26 @@
-# %% [markdown]
-# # What does a real linear drive hide?
-#
-#     python examples/emps.py FOLDER [REPORT.html]
-#
-# FOLDER holds DATA_EMPS.mat and DATA_EMPS_PULSES.mat of the benchmark of Janot, Gautier & Brunot (2019): a
-# carriage on a ball screw, 24.8 s at 1 kHz, under its own position controller. The data are no part of this
-# repository.
+r"""
+What does a real linear drive hide?
+===================================
 
-# %%
+**Problem.** A carriage on a ball screw, 24.8 s at 1 kHz, under its own position controller: the EMPS
+benchmark of Janot, Gautier & Brunot (2019). Its published model has mass, Coulomb and viscous friction and
+an offset. What does it miss? Run with ``python examples/emps.py FOLDER [REPORT.html]``: FOLDER holds
+DATA_EMPS.mat and DATA_EMPS_PULSES.mat. The data are no part of this repository, and this page is not run
+when the site is built.
+
+.. code-block:: text
+
+    reference --->( + )---[ kp ]--->( + )---[ kv ]---V--->[ gtau ]---F--->[ motor, screw, carriage ]---+---> x
+                   - ^               - ^                                                               |
+                     |                 +------------------------- d/dt --------------------------------+
+                     +---------------------------------------------------------------------------------+
+
+**Equations.** Published: :math:`M \ddot x = F - F_v \dot x - F_c \operatorname{sign} \dot x - F_0`.
+
+**Method.** ``improve``: one effect after another, judged on the record with pulses. Then an effect of our
+own.
+"""
+
 import math
 import sys
 from dataclasses import dataclass
@@ -22,7 +35,7 @@ import ctrl_df as cdf
 
 TRAIN, TEST = "DATA_EMPS", "DATA_EMPS_PULSES"
 
-# %% [markdown]
+# %%
 # Two traps. `vir` is in volts, and the drive makes gtau newtons of each; the pulses of the test record are
 # inside `vir` already and must not be added again.
 
@@ -42,7 +55,7 @@ def controller(folder) -> tuple[float, float, float]:
     return gtau, kp, kv
 
 
-# %% [markdown]
+# %%
 # Two figures judge a model. **Force error**: the force that the measured motion demands of the model, against
 # the force recorded; once as published, and once counting that a force held over a sample acts half a sample
 # late (at the pulses of the test record that matters). **Free run**: the model alone on the recorded force,
@@ -97,7 +110,7 @@ def line(name, model, train, test) -> str:
     return f"  {name:<24}{force}   {held}   {free}"
 
 
-# %% [markdown]
+# %%
 # The ladder knows rolling friction only as Coulomb's: full at once. On this screw it rises with speed, over
 # some centimetres a second: the ladder bends it with a wide Stribeck bump on steep viscous friction. No
 # effect of the library is that map; it takes twenty lines to give it one.

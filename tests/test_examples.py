@@ -13,7 +13,7 @@ EXAMPLES = sorted(p for p in (Path(__file__).parent.parent / "examples").glob("*
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
 def test_example(path, tmp_path):
     environment = {**os.environ, "MPLBACKEND": "Agg", "PYTHONWARNINGS": "error::RuntimeWarning"}
-    if "FOLDER" in "".join(path.read_text().splitlines()[:8]):
+    if "FOLDER" in "".join(path.read_text().splitlines()[:12]):
         pytest.skip("this example takes data as an argument")
     run = subprocess.run(
         [sys.executable, str(path)],
