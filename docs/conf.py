@@ -1,6 +1,8 @@
 """The site: Markdown pages, the API from docstrings, the examples as a gallery, effects drawn by code."""
 
+import importlib.util
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -30,6 +32,9 @@ source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build", "gallery/*.ipynb", "gallery/*.py", "gallery/*.md5", "**/sg_execution_times.rst"]
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
+
+MATHJAX = Path(importlib.util.find_spec("sphinx-mathjax-offline").origin).parent / "static" / "mathjax"
+mathjax_path = "mathjax/tex-chtml.js"  # served by the site itself: it is read without a network, too
 
 autosummary_generate = True
 autodoc_typehints = "none"  # docstrings state types
@@ -65,7 +70,17 @@ sphinx_gallery_conf = {
 }
 
 
+def copy_mathjax(app, error):
+    """Put what formulas need beside the pages: the program and its fonts."""
+    if error is None and app.builder.name == "html":
+        target = Path(app.outdir) / "_static" / "mathjax"
+        fonts = Path("output", "chtml", "fonts", "woff-v2")
+        shutil.copytree(MATHJAX / fonts, target / fonts, dirs_exist_ok=True)
+        shutil.copy(MATHJAX / "tex-chtml.js", target)
+
+
 def setup(app):
     """Write the pages that are made by code, before anything is read."""
     api_pages.write(HERE / "api")
     effect_pages.write(HERE / "effects")
+    app.connect("build-finished", copy_mathjax)
