@@ -43,9 +43,7 @@ def test_a_diagnosis_repeats_itself_to_the_last_bit(monkeypatch):
     record, found = rig.train[0].measurement(), []
     for threads in (2, 2, 1):
         monkeypatch.setattr(crew, "processors", lambda threads=threads: threads)
-        diagnosis = cdf.diagnose(
-            rig.baseline, rig.train[0].measurement(), candidates=("stiction", "stribeck")
-        )
+        diagnosis = cdf.diagnose(rig.baseline, record, candidates=("stiction", "stribeck"))
         found.append([(c.id, c.evidence, dict(c.parameters)) for c in diagnosis.ranking])
     assert found[0] == found[1] == found[2]
 
