@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from .residuals.residual_tests import (
     rmse,
     whiteness,
 )
+from .smoothing.missing_force import MissingForce, missing_force
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +53,16 @@ class RecordComparison:
     residual: np.ndarray
     edges: np.ndarray
     fitted: int = 0
+    model: Any = None
+
+    @cached_property
+    def missing_force(self) -> MissingForce:
+        """The force that would have to be added, at every instant, for the model to follow the record.
+
+        By fixed-interval smoothing over the model; seconds. See
+        `ctrl_df.identify.smoothing.missing_force.missing_force` for what it refuses.
+        """
+        return missing_force(self.model, self.record)
 
     @property
     def rmse(self) -> float:
@@ -165,6 +177,11 @@ class Comparison(Compared):
         return self.worst.where
 
     @property
+    def missing_force(self) -> MissingForce:
+        """The force that would have to be added for the model to follow the worst record."""
+        return self.worst.missing_force
+
+    @property
     def windows(self) -> int:
         """Number of windows of all records together."""
         return sum(r.windows for r in self.records)
@@ -268,5 +285,5 @@ def comparison_of(model, records, windows: list[Windows], starts, fitted: int = 
     rows = []
     for record, w, start in zip(records, windows, starts, strict=True):
         simulated = Simulator(model, record).run(w, None, start, rounded=True)
-        rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
+        rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted, model))
     return Comparison(model, tuple(rows))
