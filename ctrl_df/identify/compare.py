@@ -141,6 +141,17 @@ class Comparison(Compared):
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and
     `where` are those of the record with the largest error.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0)
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> comparison = cdf.compare(machine, record)
+    >>> round(comparison.fit_percent), bool(comparison.white)
+    (100, True)
     """
 
     records: tuple[RecordComparison, ...]
@@ -263,6 +274,17 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     Returns
     -------
     Comparison
+
+    Examples
+    --------
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0)
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> comparison = cdf.compare(cdf.friction_mass(2.0, 2.5, 5.0), record)
+    >>> comparison.fit_percent < 90, bool(comparison.white)
+    (True, False)
     """
     unknown_keywords(keywords)
     if has_tables(data):
