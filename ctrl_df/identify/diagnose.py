@@ -19,7 +19,7 @@ from .estimation.trial import Trial
 from .residuals.missing_forces import lacks
 from .results.diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from .results.explain import explain, find_regions, remains
-from .selection.evidence import ROUNDED
+from .selection.evidence import rounds
 from .selection.structure_search import Study
 
 SIGNIFICANT = 20.0
@@ -115,8 +115,8 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     best = chosen[0] if chosen else base
     # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not
     # rounded.
-    rounds = best.key == ROUNDED
-    missed = lacks(base if rounds else best, study.data, study.noise)
+    rounded = rounds(best)
+    missed = lacks(base if rounded else best, study.data, study.noise)
     base_errors = _errors(base)
     keys = {c.key for c in chosen}
     weights = np.exp(
@@ -133,7 +133,7 @@ def verdict_of(study: Study, found: list[Trial], began: float, limits=None) -> D
     # chance: those fitted have to speak for themselves.
     significant = first is not None and first.evidence_fitted > SIGNIFICANT and first.evidence_holdout > HELD
     noise, structure, share = _left(best, base, missed, study)
-    if rounds:
+    if rounded:
         share = 1.0 if missed and missed[0].evidence > SIGNIFICANT else 0.0
     if base_errors[0] < EXACT and not study.data.forced:
         verdict = NONE
@@ -172,7 +172,7 @@ def _left(best: Trial, base: Trial, missed, study: Study) -> tuple[float, float,
     beyond the noise: that of the fitted windows, times what the records' own noise floors say of the two.
     """
     structure = missed[0].rms if missed and missed[0].evidence > SIGNIFICANT else 0.0
-    if best.key != ROUNDED and not study.data.forced:
+    if not rounds(best) and not study.data.forced:
         # what the right model misses over long windows it misses over short ones
         structure = max(structure, math.sqrt(max(best.train.rmse**2 - (_GROWN * study.floor) ** 2, 0.0)))
     noise = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))

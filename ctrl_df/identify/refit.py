@@ -20,7 +20,7 @@ from .estimation.multistart import hopped, rough
 from .estimation.prepared import REFERENCE
 from .estimation.simulator import Simulator
 from .estimation.trial import brief_window
-from .estimation.variables import default_free
+from .estimation.variables import default_free, step_of_sensor
 
 __all__ = ["Candidate", "Fit", "FittedParameter", "default_free", "fit_candidate", "refit"]
 
@@ -252,8 +252,8 @@ def _with_steps(found: Candidate, records, block, free) -> Candidate:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
     from .data.derivatives import step_of
 
-    key = "sensor_quantization.step"
-    if key not in block.parameters or (free is not None and key not in free_parameters(block, free)):
+    key = step_of_sensor(block)
+    if key is None or (free is not None and key not in free_parameters(block, free)):
         return found
     steps = [step_of(r.y) for r in records]
     if min(steps) > 0:

@@ -18,7 +18,7 @@ from ...blocks.core import ELASTIC, IMPACT, level
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
 
-SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "bristle"})
+SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "deflection"})
 """Names of those hidden that come to be what the motion makes them, wherever they began."""
 
 FITTED, CHAINED, MEASURED = "fitted", "chained", "measured"
@@ -35,7 +35,7 @@ def names(core) -> tuple[str, ...]:
     elif core.joint == ELASTIC:
         found += ["stretch", "stretch_rate"]
     if core.bristle is not None:
-        found.append("bristle")
+        found.append("deflection")
     return tuple(found)
 
 
@@ -63,7 +63,7 @@ def reach(which, core, known, windows) -> np.ndarray:
         "v": 2 * windows.v_error + 0.01 * known.speed,
         "slack": one,
         "slack_rate": 0.7 * known.speed * one,
-        "bristle": 0.5 * one,
+        "deflection": 0.5 * one,
     }
     if core.joint == ELASTIC:
         bend = known.force / max(core.stiffness, 1e-300)
@@ -102,7 +102,7 @@ def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
         states[:, 0] += beyond
     if core.bristle is not None:
         slip, full = np.array([_bristles(row, core) for row in states]).T
-        share = np.tanh(3 * slip / speed) + given.get("bristle", 0.0)
+        share = np.tanh(3 * slip / speed) + given.get("deflection", 0.0)
         states[:, core.bristle_state] = np.clip(share, -1.0, 1.0) * full
 
 
@@ -118,7 +118,7 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     if core.bristle is not None:
         slip, full = _bristles(states, core)
         share = states[core.bristle_state] / full if full > 0 else 0.0
-        found["bristle"] = share - math.tanh(3 * slip / speed)
+        found["deflection"] = share - math.tanh(3 * slip / speed)
     return found
 
 

@@ -16,11 +16,9 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from .candidate import Candidate
+from .common_friction import dry_level
 from .simulator import feasible
 from .trial import Data, Trial
-
-# friction of which the sum with the motor's shows best
-_SHARED = "load_friction.level"
 
 _HOPS = (0.6, 0.8, 1.25, 1.6)
 _SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
@@ -187,12 +185,12 @@ def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> t
 
 
 def _moved(model, name, value):
-    values = {name: value}
-    if name == _SHARED and "coulomb.level" in model.parameters:
-        # what the load gains the motor loses
-        table = model.parameters
-        motor, more = table["coulomb.level"].value, value - table[_SHARED].value
-        values["coulomb.level"] = max(motor - more, 0.05 * motor)
+    values, table, shared = {name: value}, model.parameters, dry_level(model)
+    effect = model.named_effects.get(name.partition(".")[0])
+    if shared is not None and effect is not None and effect.role == "friction" and effect.side == "load":
+        # the sum of both shows best: what the load gains the motor loses
+        motor, more = table[shared].value, value - table[name].value
+        values[shared] = max(motor - more, 0.05 * motor)
     return model.with_parameters(feasible(model, values))
 
 

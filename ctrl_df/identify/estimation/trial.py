@@ -17,6 +17,7 @@ from .noise_model import NoiseModel, force_errors
 from .ripple_phase import rephased
 from .segments import CLEAN, Windows, cut, facts, split
 from .simulator import Simulator
+from .variables import Seen
 
 SAMPLES = 2500
 """Steps of the input a record is thinned to while candidates are screened."""
@@ -132,6 +133,7 @@ class Data:
     thin: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
+    seen: Seen  # of effects
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     colour: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
@@ -224,9 +226,17 @@ class Data:
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
+            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0, colour=self.colour,
             begins=self.begins, hopeless=hopeless, outlook=outlook,
         )  # fmt: skip
+
+    def limits_of(self, block) -> dict[str, tuple[float, float]]:
+        """Return least and largest values: the model's own, and what the records show of its effects."""
+        limits = {}
+        for key, effect in block.named_effects.items():
+            for name, span in effect.ranges(self.seen).items():
+                limits[f"{key}.{name}"] = span
+        return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3, hopeless=math.inf) -> Candidate:
         """Fit a model found over other windows to these; those that begin at one sample share states."""
@@ -282,16 +292,20 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
         thin //= 2
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
-    # What settles much faster than a sample is not seen, and a stiff equation.
-    scales, dt = _scales(block, records), min(r.dt for r in records)
-    limits["input_lag.time_constant"] = (0.05 * dt, max(r.duration for r in records))
-    limits["bristle.stiffness"] = (0.0, 2 * scales.force / (scales.speed * dt))
-    limits["bristle.damping"] = (0.0, 2 * scales.mass / dt)
-    limits["compliance.damping"] = (0.0, 0.1 * scales.mass / dt)
-    # A joint with next to nothing behind it is no joint, but a dashpot that stands in for other friction.
-    for name in ("compliance", "backlash"):
-        limits.setdefault(f"{name}.load_fraction", (0.05, 0.95))
-    return Data(learn, judge, thin, scales, limits)
+    scales = _scales(block, records)
+    seen = Seen(
+        scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
+        max(r.duration for r in records),
+    )  # fmt: skip
+    return Data(learn, judge, thin, scales, limits, seen)
+
+
+def _within(own, shown) -> tuple[float, float]:
+    """Return what both ranges have in common, or the model's own where that is nothing."""
+    if shown is None:
+        return own
+    low, high = max(own[0], shown[0]), min(own[1], shown[1])
+    return (low, high) if low < high else own
 
 
 def _rough(record, thin: int) -> bool:

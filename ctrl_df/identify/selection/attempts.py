@@ -23,7 +23,6 @@ from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import SHARES, resonant
 from ..starting.screen import Screen, starts_for
-from .evidence import ROUNDED
 
 # Steps of every start before the first look at them, and those of an effect that go on after it.
 _BEGUN, _KEPT = 2, 2
@@ -134,15 +133,10 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
 
 
 def itself(tried: Trial, span) -> bool:
-    """Whether the newest effect is what its name says, and no stand-in for another.
-
-    A ripple of which the stroke `span` [m] shows less than a period is a spring, a joint with nothing behind
-    it (or before it) is a dashpot.
-    """
-    bounds = dict(zip(tried.train.names, tried.train.at_bound, strict=True))
-    if bounds.get(f"{tried.block.newest}.load_fraction", False):
-        return False
-    return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+    """Whether the newest effect is what its name says over the stroke `span` [m]."""
+    own, pairs = tried.block.newest + ".", zip(tried.train.names, tried.train.at_bound, strict=True)
+    at_bound = {name.removeprefix(own) for name, bound in pairs if bound and name.startswith(own)}
+    return tried.block.effects[-1].genuine(span, at_bound)
 
 
 def _best(attempts, count) -> list[Attempt]:
@@ -162,7 +156,7 @@ def _begin(job) -> list[Attempt]:
     cls, share, screen, shortest, free, nominal = job
     if share is not None:
         found = []
-        for near in resonant(screen, share, _JOINTS):
+        for near in resonant(cls, screen, share, _JOINTS):
             added = own_names(near.model)
             found.append(
                 Attempt(
@@ -191,10 +185,10 @@ def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
     if block is None:
         return None
     added = own_names(block)
-    names = (*free, *(() if key == ROUNDED else added))
+    names = (*free, *(n for n in added if not block.parameters[n].stepped))
     if start.effect.multimodal:
         # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
-        bent = start.effect.role in ("contact", "coupling") or key == "load_friction"
+        bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
         steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
         return Attempt(key, block, names, shortest, steps, tolerance, len(added))
     begin = None if start.values else screen.starts(block)

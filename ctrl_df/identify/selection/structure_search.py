@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.core import level
+from ...blocks.effect import static_levels
 from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
+from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.multistart import HOPELESS, NEAR, all_hopped, begun_at, beyond, hopped, own, settled
 from ..estimation.simulator import feasible
 from ..estimation.trial import FORCED, Data, Trial, prepare
@@ -17,7 +20,7 @@ from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
 from .attempts import itself, tried
 from .equivalence import indistinguishable
-from .evidence import ROUNDED, ranked
+from .evidence import ranked, rounds
 
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
@@ -29,8 +32,8 @@ CONFIRMED_FORCED = 10
 _GROWTH = 1.35
 # Evidence [nats] by which candidates may differ because their fits stopped early.
 _CLOSE = 60.0
-# Width of a Stribeck bump over the typical speed below which it is stiction.
-_NARROW = 1e-3
+# Speed, over the typical one, at which a bump of friction is gone that only breaking away shows (to 1 %).
+_PASSED = 2.15e-3
 # Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain.
 _FLOOR = 1.03
 
@@ -68,11 +71,10 @@ class Study:
     def _baseline(self, block) -> Trial:
         """Fit the baseline from its own values and from a regression of the force; keep the better."""
         shortest, data = self.levels[:2]
-        begins, table = [block], block.parameters
-        names = {"mass", "coulomb.level", "viscous.coefficient"}
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, names)
-        guess = dict(zip(("mass", "coulomb.level", "viscous.coefficient"), w, strict=False))
-        guess = {k: float(v) for k, v in guess.items() if k in table and k in self.free and v > 0}
+        begins = [block]
+        names = (inertia(block), dry_level(block), viscous_slope(block))
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
         found = []
@@ -146,7 +148,7 @@ class Study:
             short = levels[0]
             stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
             at = _longest_coherent(stages)
-        if found and found[0].key == ROUNDED and not self.data.forced:
+        if found and rounds(found[0]) and not self.data.forced:
             # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
             at = len(stages) - 1
         self.data = levels[at]
@@ -231,12 +233,21 @@ class Study:
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise or as the limit of each other."""
-        if {a.key, b.key} == {"stiction", "stribeck"}:
-            # a bump this narrow is passed within a sample: only breaking away is seen of it
-            narrow = next(t for t in (a, b) if t.key == "stribeck").block.effects[-1].velocity
-            if narrow < _NARROW * self.data.scales.speed:
-                return True
+        if all(self._breaks_away_only(t) for t in (a, b)):
+            return True
         return indistinguishable(a.outputs, b.outputs, self.noise)
+
+    def _breaks_away_only(self, tried: Trial) -> bool:
+        """Whether a candidate is a static level whose bump over speed is passed within a sample."""
+        effect = tried.block.effects[-1]
+        if effect.role != "friction" or not static_levels(type(effect)):
+            return False
+        beside = [e for e in tried.block.effects if e.role == "friction" and e.side == effect.side]
+        beside.sort(key=lambda e: e.rank)
+        without, speed = [e for e in beside if e is not effect], _PASSED * self.data.scales.speed
+        kinetic = level(without, 1.0, 1.0, speed)
+        bump = level(beside, 1.0, 1.0, speed) - kinetic
+        return bump <= 0.01 * (level(beside, 0.0, 1.0, 0.0) - kinetic)
 
 
 def _best_of(base, trials) -> list[Trial]:

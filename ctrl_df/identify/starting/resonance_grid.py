@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...blocks.effects import Compliance
 from ..estimation.candidate import Candidate
 from .attach import attach
 from .screen import Screen
@@ -24,7 +23,7 @@ DAMPING = 0.1
 _LINEAR, _FITTED, _BEST = 1, 2, 4
 
 
-def resonant(screen: Screen, share: float, count: int) -> list[Candidate]:
+def resonant(cls, screen: Screen, share: float, count: int) -> list[Candidate]:
     """Return the baseline with the joints that fit best, as many as `count`: initial states alone fitted.
 
     `share`: of the mass, behind the joint; one of `SHARES`. Initial states are all but linear: one step tells
@@ -33,8 +32,8 @@ def resonant(screen: Screen, share: float, count: int) -> list[Candidate]:
     scales, found = screen.scales, []
     reduced = share * (1 - share) * scales.mass
     for rate in RATES * scales.speed / scales.position:
-        stiffness = reduced * rate**2
-        block = attach(screen.block, Compliance(stiffness, 2 * DAMPING * reduced * rate, share))
+        stiffness, damping = reduced * rate**2, 2 * DAMPING * reduced * rate
+        block = attach(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
         if block is not None:
             found.append(screen.data.fit(block, (), iterations=_LINEAR, tolerance=3e-2))
     near = sorted(found, key=lambda f: f.rmse)[:_BEST]

@@ -32,7 +32,7 @@ STEP = 0.3
 COARSEST = 6.0
 """Shortest wavelength over the error of the smoothed position."""
 
-_PLAIN = ("dry", "viscous", "constant")
+_PLAIN = ("dry", "linear", "constant")
 
 SAMPLES = 25_000
 """Longer records are looked at in means over more samples."""

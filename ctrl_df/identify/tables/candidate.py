@@ -15,19 +15,14 @@ from .fit import (
 )
 from .starts import best_starts
 
-SLOW = frozenset({"position_ripple", "sensor_quantization"})
-# Starts that are followed, where not three: each costs, and the plane of backlash has many valleys.
-FOLLOWED = {"position_ripple": 1, "sensor_quantization": 1, "bristle": 2, "compliance": 2, "backlash": 4}
-
 
 def try_effect(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
     """Fit one effect class from its best starts (a job of its own, for executors)."""
     cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
-    slow = cls.id in SLOW
+    slow = cls.costly
     work = ROUGH if slow else QUICK
-    keep = FOLLOWED.get(cls.id, 3)
-    grown, hopeful = best_starts(cls, block, points, slopes, keep, work)
+    grown, hopeful = best_starts(cls, block, points, slopes, cls.table_starts, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)

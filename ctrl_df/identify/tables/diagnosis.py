@@ -16,9 +16,10 @@ import numpy as np
 from ...drawing import draw
 from ..data.records import as_tables
 from ..diagnose import block_of, effect_classes, free_names
+from ..estimation.common_friction import inertia
 from ..results.diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..starting.attach import applicable
-from .candidate import FOLLOWED, SLOW, fit_either, try_effect
+from .candidate import fit_either, try_effect
 from .compare import plane_regions
 from .explain import explain_tables
 from .fit import (
@@ -138,11 +139,12 @@ class FrequencyStudy:
         """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
         inside = self.points.take(self.train)
         begins = [self.block]
-        if "mass" in self.free:
+        heavy = inertia(self.block)
+        if heavy in self.free:
             moved = inside.take(inside.N != 0)
             top = moved.omega >= np.quantile(moved.omega, 0.8)
             mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
-            begins.append(self.block.with_parameters({"mass": mass}))
+            begins.append(self.block.with_parameters({heavy: mass}))
         fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
@@ -161,7 +163,7 @@ class FrequencyStudy:
             slopes[len(some)] = slopes_of(block, some, self.free, self.scales, QUICK)
         jobs = []
         for c in kinds:
-            some = fewer if c.id in SLOW else few
+            some = fewer if c.costly else few
             jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         rough = [self._tried(*r, work=QUICK) for r in run(try_effect, jobs) if r is not None]
@@ -177,9 +179,10 @@ class FrequencyStudy:
         self.found = [*best, *(t for t in rough if t.id not in done)]
 
     def _confirmed(self, tried, inside):
-        iterations = 3 if tried.id in SLOW else 12
+        kind = tried.effect
+        iterations = 3 if kind.costly else 12
         names = (*self.free, *tried.extra)
-        work = QUICK if tried.id in FOLLOWED else None
+        work = QUICK if kind.costly or kind.multimodal else None
         fitted = fit_either(
             tried.fitted.block, inside, names, self.scales, iterations=iterations, budget=120, work=work
         )

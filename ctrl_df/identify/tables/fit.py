@@ -122,7 +122,7 @@ def simulate_table(model, points: Points, work=None) -> np.ndarray:
     """Return N of the model at the points; NaN where it has no answer within the work allowed."""
     N = np.empty(len(points), complex)
     rigid = _rigid(model, points, RIGID[1] if work in (None, CAREFUL) else RIGID[0])
-    for some, block in ((rigid, model.without_effect("bristle") if rigid.any() else model), (~rigid, model)):
+    for some, block in ((rigid, _without_bristles(model) if rigid.any() else model), (~rigid, model)):
         if some.any():
             N[some] = _described(block, points.A[some], points.omega[some], work or CAREFUL)
     return N
@@ -136,6 +136,10 @@ def _described(model, A, omega, work) -> np.ndarray:
     return np.asarray(describing_function(model, A, omega, **options))
 
 
+def _without_bristles(model):
+    return model.with_effects([e for e in model.effects if e.role != "presliding"])
+
+
 RIGID = (2e-3, 3e-4)  # share of the swing, when quick and when careful
 
 
@@ -145,7 +149,7 @@ def _rigid(model, points: Points, share: float) -> np.ndarray:
     There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by
     less than that share.
     """
-    bristles = [e for e in getattr(model, "effects", ()) if e.id == "bristle" and e.level == 0]
+    bristles = [e for e in getattr(model, "effects", ()) if e.role == "presliding" and e.level == 0]
     if not bristles:
         return np.zeros(len(points), bool)
     friction = [e for e in model.effects if e.role == "friction" and e.side == "motor"]
