@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ...blocks.effect import effect_class
 from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
 from ..estimation.multistart import HOPELESS
@@ -58,7 +58,7 @@ class Attempt:
     """
 
     key: str
-    block: object
+    block: Any
     names: tuple[str, ...]
     data: Data
     steps: int
@@ -73,6 +73,11 @@ class Attempt:
         """Error it has come to."""
         assert self.fit is not None
         return self.fit.rmse
+
+    @property
+    def multimodal(self) -> bool:
+        """Whether fits of its effect begin in short windows."""
+        return self.block.effects[-1].multimodal
 
     @property
     def trial(self) -> Trial:
@@ -110,11 +115,11 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     attempts = _best([a for found in begun for a in found if a.fit is not None], _JOINTS)
     attempts += [a for found in begun for a in found if a.fit is None]
     # those of few steps first: what they come to tells of the others which need no long look
-    short = [a for a in attempts if not effect_class(a.key).multimodal]
+    short = [a for a in attempts if not a.multimodal]
     begun = run(_first, [(a, np.inf) for a in short])
     least = min((a.error for a in begun), default=np.inf)
     least = min(least, screen.base.rmse)
-    begun += run(_first, [(a, HOPELESS * least) for a in attempts if effect_class(a.key).multimodal])
+    begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
     kept = _best(begun, _KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another valley

@@ -68,7 +68,7 @@ class Screen:
         return self.block.core.bodies
 
     def step(self) -> float:
-        """Return the step of the grid to which measured values keep [m]; 0 where the model errs by nothing."""
+        """Return the step of the grid to which measured values keep [m]; 0 where there is none."""
         noise = math.sqrt(float(self.residual @ self.residual) / len(self.residual))
         return value_grid(np.concatenate(self.data.train.outputs), noise)
 
