@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..blocks.effect import Effect, effect_class, effect_library
+from ..blocks.mechanism import Mechanism
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
 from .data.measurement import Measurement
 from .estimation.variables import default_free
@@ -28,6 +29,30 @@ def free_parameters(block, free=None) -> tuple[str, ...]:
             )
         chosen += [k for k in group if k not in chosen]
     return tuple(chosen)
+
+
+def parametric(block):
+    """Return a block whose parameters have names; TypeError for others."""
+    if hasattr(block, "with_parameters") and hasattr(block, "parameters"):
+        return block
+    raise TypeError(
+        f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got "
+        f"{type(block).__name__}. Build it from ctrl_df.Mass and effects."
+    )
+
+
+def mechanism_of(model) -> Mechanism:
+    """Return the mechanism of a block or of a closed loop."""
+    if isinstance(model, Mechanism):
+        return model
+    part = getattr(getattr(model, "parts", None), "block", None)
+    if isinstance(part, Mechanism):
+        return part
+    raise TypeError(
+        "diagnose needs a block made of an inertia and effects, or a closed_loop of one; got "
+        f"{type(model).__name__}. "
+        "Effects can only be added to ctrl_df.Mass and ctrl_df.TwoMass."
+    )
 
 
 def effect_classes(candidates: Any) -> list[Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...blocks.effect import Effect
-from ...drawing import draw
+from ...drawing import draw, go_on
 from ..data.measurement import Measurement
 
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
@@ -135,9 +135,7 @@ class Diagnosis:
     @property
     def next_experiment(self):
         """The input that would separate the candidates that remain; see `ctrl_df.identify.experiment`."""
-        from ..experiment import next_experiment
-
-        return next_experiment(self)
+        return go_on("next experiment", self)
 
     def table(self, rows: int = 8) -> str:
         """Return the ranking as text."""

@@ -1,4 +1,4 @@
-"""One diagnosis at work: the baseline, every candidate fitted, the best confirmed at the full rate."""
+"""The search over records: the baseline, every candidate fitted, the best confirmed at the full rate."""
 
 from __future__ import annotations
 
@@ -14,13 +14,27 @@ from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.multistart import HOPELESS, NEAR, all_hopped, begun_at, beyond, hopped, own, settled
+from ..estimation.segments import EXACT
 from ..estimation.simulator import feasible
 from ..estimation.trial import FORCED, Data, Trial, prepare
+from ..estimation.variables import default_free
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
 from .attempts import itself, tried
 from .equivalence import indistinguishable
 from .evidence import ranked, rounds
+from .remaining import located, remainder
+from .search import Search, Words
+
+SIGNIFICANT = 20.0
+"""Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
+
+HELD = 5.0
+"""Evidence [nats] it needs on held-out data alone.
+
+To these are fitted initial states, and what the others leave open: a threshold within a range, the phase of
+a ripple.
+"""
 
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
@@ -38,8 +52,8 @@ _PASSED = 2.15e-3
 _FLOOR = 1.03
 
 
-class Study:
-    """The fits of one diagnosis.
+class StructureSearch(Search):
+    """The fits of one diagnosis over time.
 
     Parameters
     ----------
@@ -51,8 +65,12 @@ class Study:
         Parameters of the model that may be refitted.
     """
 
+    significant = SIGNIFICANT
+    significant_held = HELD
+    words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
+
     def __init__(self, block, records, held, free):
-        self.free = free
+        self.block, self.free = block, tuple(free)
         data = prepare(block, records, held)
         self.nominal = {k: p.value for k, p in block.parameters.items()}
         self._look_at(data, 1)
@@ -81,6 +99,17 @@ class Study:
         for begin in begins:
             found.append(data.moved(shortest.fit(begin, self.free, iterations=8), 12))
         return Trial("", min(found, key=lambda f: f.rmse))
+
+    @property
+    def records(self):
+        """The records to fit, and those held out; none where parts of the former are."""
+        held = () if self.data.held.records is self.data.train.records else self.data.held.records
+        return self.data.train.records, held
+
+    @property
+    def measure(self) -> str:
+        """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
+        return "acceleration" if self.data.forced else "output"
 
     # --- every effect, coarsely -----------------------------------------------------------------------
 
@@ -248,6 +277,60 @@ class Study:
         kinetic = level(without, 1.0, 1.0, speed)
         bump = level(beside, 1.0, 1.0, speed) - kinetic
         return bump <= 0.01 * (level(beside, 0.0, 1.0, 0.0) - kinetic)
+
+    # --- what it comes to -----------------------------------------------------------------------------
+
+    def errors(self, judged):
+        """Return nrmse over the windows fitted, and over those held out."""
+        return judged.train.nrmse, judged.held.nrmse if judged.held is not None else math.nan
+
+    def standard_errors(self, judged):
+        """Return the standard errors of a fit that came to its end."""
+        return judged.train.standard_errors if len(judged.train.covariance) else {}
+
+    def exact(self):
+        """Whether the model errs by rounding alone."""
+        return self.base.train.nrmse < EXACT and not self.data.forced
+
+    def remainder(self, best, significant):
+        """Return what the best model leaves."""
+        return remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+
+    def located(self, best, remainder, unknown):
+        """Return where the error is."""
+        return located(
+            self.base, best, self.data, self.noise, remainder, unknown=unknown,
+            significant=self.significant, measure=self.measure,
+        )  # fmt: skip
+
+    def fitted(self, block, names, iterations):
+        """Return a block with these parameters fitted, and run over the windows held out."""
+        found = self.data.fit(block, names, iterations=iterations)
+        return self.data.judged(Trial(block.newest if block.effects else "", found, extra=len(names)))
+
+    def ranked(self, base, judged):
+        """Return models with their evidence over `base`, best first."""
+        return ranked(base, judged)[0]
+
+    def final(self, models, kept):
+        """Return the models with their errors at the full rate, over the windows that the last one bears.
+
+        Where disturbance forces blur parameters they are fitted over shorter windows first.
+        """
+        common = self.data.fine
+        if common.forced:
+            models = [self._sharpened(m, common, kept) for m in models]
+        return [(m, *common.errors(m)) for m in models]
+
+    @staticmethod
+    def _sharpened(model, data: Data, kept):
+        if data.carries(model):
+            return model
+        return data.brief.fit(model, [k for k in default_free(model) if k not in kept]).model
+
+    def relative(self, noise):
+        """Return noise over the rms of the centred output, or of the acceleration."""
+        return noise * self.base.train.nrmse / self.base.train.rmse
 
 
 def _best_of(base, trials) -> list[Trial]:

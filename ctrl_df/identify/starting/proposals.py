@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .screen import Screen
 
 
-def proposals(cls, screen: Screen) -> list:
-    """Return effects of one class to begin with: those the class suggests, or else sizes of all kinds."""
+def proposals(cls, screen) -> list:
+    """Return effects of one class to begin with: those it suggests to a `Screen`, or sizes of all kinds."""
     own = cls.suggest(screen)
     return list(_generic(cls, screen) if own is None else own)
 
 
-def _generic(cls, screen: Screen):
+def _generic(cls, screen):
     """Yield the effect with its main parameter from small to large, others at default or typical size."""
     values, main = {}, None
     for f in dataclasses.fields(cls):

@@ -16,7 +16,7 @@ from .fit import (
 from .starts import best_starts
 
 
-def try_effect(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
+def try_effect(job) -> tuple[str, FittedTable, int] | None:
     """Fit one effect class from its best starts (a job of its own, for executors)."""
     cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
@@ -34,10 +34,10 @@ def try_effect(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
         )  # fmt: skip
 
     if not hopeful:
-        return cls.id, fitted(grown[0], 0), own
+        return cls.id, fitted(grown[0], 0), len(own)
     begun = [fitted(g, 2) for g in grown]
     best = max(begun, key=_likelihood_of)
-    return cls.id, best if slow or best.converged else fitted(best.block, 8), own
+    return cls.id, best if slow or best.converged else fitted(best.block, 8), len(own)
 
 
 def fit_either(block, points, names, scales, *, again=True, **options) -> FittedTable:

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from .fit import QUICK
+from ..results.experiment import Experiment, separated
+from ..tables.fit import QUICK
 
 _SETTLE, _COUNTED = 12, 8  # periods before and while a point is measured
 _POINTS = 6
 
 
-def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=None, dt=None):
+def stepped_sines(
+    diagnosis, models, names, *, force=None, stroke=None, duration=None, dt=None, loop=None
+) -> Experiment:
     """Return the `Experiment` of up to six sines at which the models differ most, relative to the scatter.
 
     Parameters
@@ -28,6 +31,8 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
         Limits [N], [m]; None: the largest of the tables; no limit.
     duration, dt : float or None
         [s]; None: what twenty periods of each sine need; a hundred samples of the fastest period.
+    loop
+        Of no meaning here: a sine is held by its own amplitude.
 
     Returns
     -------
@@ -35,7 +40,6 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     """
     from ...df.describing import quiet_describing_function as describing_function
     from ...df.dispatch import method_for
-    from ..experiment import Experiment
 
     tables, given = diagnosis.train, diagnosis.limits
     force = float(force or given.get("force") or max(float(r.A[-1]) for r in tables))
@@ -76,13 +80,11 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
         # from rest with the sine, not the cosine: the mass then drifts off least
         parts.append(a * np.sin(w * dt * np.arange(n)))
     u = np.concatenate(parts)
-    words = " and ".join(n.replace("_", " ") for n in (names if len(names) > 1 else ("no effect", *names)))
     least, stroke_used = float(separation[i, k].min()), float(far[i, k].max())
     points = ", ".join(f"{a:.3g} N at {w:.3g} rad/s" for a, w in chosen)
     reason = (
-        f"sines of {points}: there {words} differ by {least:.2g} to {float(separation[i, k].max()):.2g} "
-        "times the "
-        f"scatter, within {stroke_used:.3g} m of swing."
+        f"sines of {points}: there {separated(names)} differ by {least:.2g} to "
+        f"{float(separation[i, k].max()):.2g} times the scatter, within {stroke_used:.3g} m of swing."
     )
     return Experiment(
         dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for
