@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -128,8 +129,12 @@ class _Loop:
         for loop in self.loops:
             # a drive at rest at `centre`: what it is told is relative to that
             try:
-                found = event_response(loop, self.t, (u - self.centre)[:: self.thin])
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", RuntimeWarning)  # its status tells the same
+                    found = event_response(loop, self.t, (u - self.centre)[:: self.thin])
             except (ValueError, RuntimeError):
+                return [np.full(2, np.inf)], math.inf, [0.0]
+            if not found.status.ok:
                 return [np.full(2, np.inf)], math.inf, [0.0]
             labels: list[str] = list(found.output_labels or ())
             outputs = dict(zip(labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
