@@ -8,6 +8,7 @@ from typing import Any
 from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.mechanism import Mechanism
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
+from ..units import dimension
 from .data.measurement import Measurement
 from .estimation.variables import default_free
 
@@ -94,6 +95,36 @@ def check_fit(block, start, robust, budget) -> None:
     count("refit", "budget", budget, meaning="bound on the simulations")
     if start is not None:
         block.with_parameters(mapping("refit", "start", start, "{'coulomb.level': 5.0}"))
+
+
+def check_quantities(model, records) -> None:
+    """Check that records hold what the model takes and gives: a force and a position, or torque and angle.
+
+    A loop may be driven by the reference, in the unit of its position.
+    """
+    closed = getattr(model, "parts", None) is not None
+    block = model.parts.block if closed else model
+    if not isinstance(block, Mechanism):
+        return  # nothing is known of its signals
+    moves = block.coordinates
+    taken = [moves.force_unit, moves.unit] if closed else [moves.force_unit]
+    for record in records:
+        if dimension(record.output_unit) != dimension(moves.unit):
+            raise ValueError(
+                f"this model gives {_article(moves.position)} [{moves.unit}]; the output of {record.name!r} "
+                f"is in {record.output_unit or 'no unit'}. State output_unit= as it was recorded (such as "
+                f"m{moves.unit}), or give the {moves.position} as y and a measured rate as velocity=."
+            )
+        if all(dimension(record.input_unit) != dimension(unit) for unit in taken):
+            raise ValueError(
+                f"this model takes {_article(moves.force)} [{moves.force_unit}]; the input of "
+                f"{record.name!r} is in {record.input_unit or 'no unit'}. State input_unit= as it was "
+                f"recorded, or convert it to {moves.force_unit} (a current by the motor's constant) first."
+            )
+
+
+def _article(word: str) -> str:
+    return f"an {word}" if word[0] in "aeiou" else f"a {word}"
 
 
 def check_limits(limits) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..checks import unknown_keywords
+from .arguments import check_quantities
 from .datasets.choice import dataset_of
 from .residuals.compared import Compared
 from .results.comparison import Comparison
@@ -33,4 +34,6 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
         For tables a `FrequencyComparison`.
     """
     unknown_keywords(keywords)
-    return dataset_of(data).compare(model, mode, window)
+    dataset = dataset_of(data)
+    check_quantities(model, dataset.records)
+    return dataset.compare(model, mode, window)

@@ -6,7 +6,7 @@ import time
 
 from ..checks import executor as checked_executor
 from ..checks import unknown_keywords
-from .arguments import check_limits, effect_classes, free_parameters, mechanism_of
+from .arguments import check_limits, check_quantities, effect_classes, free_parameters, mechanism_of
 from .datasets.choice import dataset_of
 from .results.diagnosis import Diagnosis
 from .selection.verdict import verdict_of
@@ -59,5 +59,6 @@ def diagnose(
     began = time.perf_counter()
     dataset = dataset_of(data, holdout)
     block = mechanism_of(model)
+    check_quantities(block, (*dataset.records, *dataset.held))
     search = dataset.search(block, free_parameters(block, free))
     return verdict_of(search, search.candidates(classes, executor), began, limits)

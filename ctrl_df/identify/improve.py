@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
-from .arguments import effect_classes, free_parameters, mechanism_of
+from .arguments import check_quantities, effect_classes, free_parameters, mechanism_of
 from .datasets.choice import dataset_of
 from .results.diagnosis import NONE
 from .results.ladder import Step, Study, last_diagnosis, outcome
@@ -48,6 +48,7 @@ def improve(
     began = time.perf_counter()
     dataset = dataset_of(train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
+    check_quantities(start, (*dataset.records, *dataset.held))
     kept = frozenset(start.parameters) - set(free_parameters(start, free))
     rivals: dict[str, list] = {}
     steps: list[Step] = []

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..checks import unknown_keywords
-from .arguments import check_fit, free_parameters, parametric
+from .arguments import check_fit, check_quantities, free_parameters, parametric
 from .datasets.choice import dataset_of
 from .results.fit import Fit, FittedParameter
 
@@ -70,6 +70,7 @@ def refit(
     """
     unknown_keywords(keywords)
     dataset = dataset_of(data)
+    check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)
     block: Any = parametric(dataset.block_of(model))
     names = free_parameters(block, free)

@@ -33,7 +33,7 @@ def input_that_separates(
         As for `next_experiment`.
     """
     record = diagnosis.train[0]
-    given = diagnosis.limits
+    given, long, strong = diagnosis.limits, record.output_unit, record.input_unit
     force = float(force or given.get("force") or np.max(np.abs(record.u)))
     centre = float(record.y[0])
     reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(record.y - centre)))
@@ -66,18 +66,17 @@ def input_that_separates(
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
     if best is None:
         raise ValueError(
-            f"every input tried leaves the stroke of {reach:g} m or asks more than {force:g} N: the "
-            "candidates drift. "
-            "Allow more stroke, or give loop= (a closed_loop whose controller holds the drive in place)."
+            f"every input tried leaves the stroke of {reach:g} {long} or asks more than {force:g} {strong}: "
+            "the candidates drift. Allow more stroke, or give loop= (a closed_loop whose controller holds the drive in place)."
         )
     what = (
-        f"{best.kind} of up to {best.force:.3g} N"
+        f"{best.kind} of up to {best.force:.3g} {strong}"
         if loop is None
-        else f"reference as {best.kind}, {best.force:.3g} N"
+        else f"reference as {best.kind}, {best.force:.3g} {strong}"
     )
     reason = (
         f"{what}: the outputs of {separated(names)} then differ by at least {best.separation:.2g} times the "
-        f"noise, within {best.stroke:.3g} m of stroke."
+        f"noise, within {best.stroke:.3g} {long} of stroke."
     )
     return replace(best, reason=reason)
 
@@ -116,6 +115,7 @@ class _Loop:
                 "and the block."
             )
         self.models, self.record, self.centre = models, record, centre
+        self.moves = parts.block.coordinates
         self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
         self.t = t[:: max(1, len(t) // 2500)]
         self.thin = max(1, len(t) // 2500)
@@ -138,8 +138,8 @@ class _Loop:
                 return [np.full(2, np.inf)], math.inf, [0.0]
             labels: list[str] = list(found.output_labels or ())
             outputs = dict(zip(labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
-            ys.append(self.centre + outputs["x"])
-            forces.append(outputs["F"])
+            ys.append(self.centre + outputs[self.moves.name("x")])
+            forces.append(outputs[self.moves.name("F")])
         gaps = []
         for i, force in enumerate(forces):
             played = self.record._with(

@@ -42,6 +42,7 @@ def stepped_sines(
     from ...df.dispatch import method_for
 
     tables, given = diagnosis.train, diagnosis.limits
+    long, strong = tables[0].output_unit, tables[0].input_unit
     force = float(force or given.get("force") or max(float(r.A[-1]) for r in tables))
     reach = float(stroke or given.get("stroke") or math.inf)
     if not (force > 0 and reach > 0):
@@ -65,9 +66,8 @@ def stepped_sines(
     i, k = np.unravel_index(order[separation.ravel()[order] > 0], separation.shape)
     if len(i) == 0:
         raise ValueError(
-            f"no sine of up to {force:g} N within {reach:g} m separates {' and '.join(names)}. Allow more "
-            "force or "
-            "stroke, or record a run over time."
+            f"no sine of up to {force:g} {strong} within {reach:g} {long} separates {' and '.join(names)}. "
+            "Allow more force or stroke, or record a run over time."
         )
     chosen = sorted(zip(A[i].tolist(), omega[k].tolist(), strict=True), key=lambda p: (p[1], p[0]))
     needed = sum((_SETTLE + _COUNTED) * 2 * math.pi / w for _, w in chosen)
@@ -81,10 +81,10 @@ def stepped_sines(
         parts.append(a * np.sin(w * dt * np.arange(n)))
     u = np.concatenate(parts)
     least, stroke_used = float(separation[i, k].min()), float(far[i, k].max())
-    points = ", ".join(f"{a:.3g} N at {w:.3g} rad/s" for a, w in chosen)
+    points = ", ".join(f"{a:.3g} {strong} at {w:.3g} rad/s" for a, w in chosen)
     reason = (
         f"sines of {points}: there {separated(names)} differ by {least:.2g} to "
-        f"{float(separation[i, k].max()):.2g} times the scatter, within {stroke_used:.3g} m of swing."
+        f"{float(separation[i, k].max()):.2g} times the scatter, within {stroke_used:.3g} {long} of swing."
     )
     return Experiment(
         dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for

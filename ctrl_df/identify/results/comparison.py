@@ -95,6 +95,7 @@ class RecordComparison:
             position=self.record.y[kept],
             velocity=velocity[kept],
             force=self.record.u[kept],
+            units=(self.record.output_unit, self.record.input_unit),
         )
 
     def _acceleration_error(self) -> tuple[np.ndarray, slice]:

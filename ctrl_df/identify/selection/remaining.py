@@ -106,5 +106,5 @@ def find_regions(tried, view):
         inside, residual = inside[colour.rows(windows)], colour.seen(residual, windows) / tried.train.unit
     return error_regions(
         record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],
-        force=record.u[inside],
+        force=record.u[inside], units=(record.output_unit, record.input_unit),
     )  # fmt: skip

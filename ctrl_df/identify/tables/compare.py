@@ -174,7 +174,7 @@ def plane_regions(points: Points, error) -> Regions:
         return Regions()
     found = []
     for kind, axis, unit, scale in (
-        ("amplitude", points.A, "N", 1.0),
+        ("amplitude", points.A, points.unit, 1.0),
         ("frequency", points.omega, "rad/s", 1 / (2 * math.pi)),
     ):
         for inside, low, high in _bands(axis):

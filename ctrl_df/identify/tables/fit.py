@@ -39,6 +39,8 @@ class Points:
         What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point
         is less (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with
         N).
+    unit : str
+        Of the amplitudes.
     """
 
     A: np.ndarray
@@ -48,6 +50,7 @@ class Points:
     noise: float
     record: np.ndarray
     scale: np.ndarray
+    unit: str = "N"
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -102,7 +105,7 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
     for value in np.unique(w):
         here = w == value
         scale[here] = np.maximum(scale[here], 0.1 * np.median(np.abs(n[here & (n != 0)])))
-    return Points(a, w, n, weight, noise, np.concatenate(numbers), scale)
+    return Points(a, w, n, weight, noise, np.concatenate(numbers), scale, records[0].input_unit)
 
 
 def counted(record: FrequencyMeasurement) -> np.ndarray:
