@@ -11,9 +11,9 @@ from ..checks import count, flag, known_name, mapping, names, number, positive, 
 from ..units import dimension
 from .data.measurement import Measurement
 from .estimation.variables import default_free
+from .thresholds import SEGMENT_SAMPLES
 
 MODES = ("auto", "free", "windows")
-_LEAST = 20  # samples of a window, below which nothing is left once its start is fitted
 
 
 def free_parameters(block, free=None) -> tuple[str, ...]:
@@ -82,10 +82,10 @@ def check_window(records: Sequence[Measurement], mode, window) -> None:
         "a comparison", "window", window, "s", remedy="Leave it out for one that fits the motion."
     )
     for record in records:
-        if not length >= _LEAST * record.dt * (1 - 1e-9):
+        if not length >= SEGMENT_SAMPLES * record.dt * (1 - 1e-9):
             raise ValueError(
-                f"window needs a length >= {_LEAST * record.dt:g} s ({_LEAST} samples of {record.name!r}); "
-                f"got window={window!r}. Leave it out for one that fits the motion."
+                f"window needs a length >= {SEGMENT_SAMPLES * record.dt:g} s ({SEGMENT_SAMPLES} samples of "
+                f"{record.name!r}); got window={window!r}. Leave it out for one that fits the motion."
             )
 
 

@@ -13,11 +13,9 @@ from .results.diagnosis import NONE
 from .results.ladder import Step, Study, last_diagnosis, outcome
 from .selection.revision import Revision, revised
 from .selection.verdict import verdict_of, worth
+from .thresholds import RIVALS
 
 __all__ = ["Step", "Study", "improve"]
-
-RIVALS = 2
-"""Candidates of a step that are tried again when a later step is taken."""
 
 
 def improve(

@@ -1,8 +1,8 @@
 """Every tuned number of identification, with what it follows from, or the benchmark that chose it.
 
-``rigs``: `benchmarks/diagnosis.py`, single effects, ladders, rigs with nothing or something unknown hidden.
-``records``: `benchmarks/studies.py`. ``tables``: `tests/test_frequency.py`. Numbers of one effect stand in its
-class, tolerances of one formula beside it.
+``rigs``: `benchmarks/diagnosis.py`, single effects, ladders, rigs with nothing or something unknown
+hidden. ``records``: `benchmarks/studies.py`. ``tables``: `tests/test_frequency.py`. Numbers of one effect
+stand in its class, tolerances of one formula beside it.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ GROWN = 2.0
 """Error over the least that the shortest segments leave, up to which it may be noise (rigs)."""
 
 OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
-"""Error of a segment over that of the good quarter, and over the noise, from which its start is sought anew."""
+"""Error of a segment over the good quarter's, and over the noise, from which its start is sought anew."""
 
 GOOD = 0.25
 """Share of the segments that are taken to be right when others are compared with them."""
@@ -109,7 +109,7 @@ GROSS = 0.02
 """Share of the points of a table expected to err by as much as N itself: motions coexist (tables)."""
 
 COARSE = 0.4
-"""rms residual over the step up to which rounding can be what makes it: 1/sqrt(12) = 0.29 of rounding alone."""
+"""rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
 
 FINEST = 0.02
 """Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from ..thresholds import GOOD
 from .initial_states import FITTED
 from .noise_model import power
-from .restarts import GOOD, rescue, scan_slack
+from .restarts import rescue, scan_slack
 from .segments import Windows, facts
 from .sensitivity import Tangent
 from .simulator import Simulator, feasible

@@ -4,13 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..thresholds import ANGLE_WORTH, ANGLES
 from .candidate import Candidate
-
-TRIED = 6
-"""Phases from which one is sought."""
-
-WORTH = 50.0
-"""Log likelihood ratio [nats, for white noise] that another phase must bring, or the model's own stands."""
 
 
 def rephased(near: Candidate, fit) -> Candidate:
@@ -26,11 +21,11 @@ def rephased(near: Candidate, fit) -> Candidate:
     best = near
     for name in [k for k, p in near.model.parameters.items() if p.per_record]:
         own, found = best.model.parameters[name].value, best
-        for i in range(1, TRIED):
-            block = best.model.with_parameters({name: own + 2 * math.pi * i / TRIED})
+        for i in range(1, ANGLES):
+            block = best.model.with_parameters({name: own + 2 * math.pi * i / ANGLES})
             tried = fit(block, (), best.starts, 1)
             found = min(found, tried, key=lambda f: f.rmse)
         found = fit(found.model, (name,), found.starts, 5)
-        if found.count * math.log(best.rmse / found.rmse) > WORTH:
+        if found.count * math.log(best.rmse / found.rmse) > ANGLE_WORTH:
             best = found
     return best

@@ -11,10 +11,7 @@ import numpy as np
 from ..estimation.segments import facts
 from ..estimation.simulator import free_run
 from ..results.experiment import Experiment, separated
-
-_SIZES = (1.0, 0.8, 0.6, 0.45, 0.35, 0.25, 0.15, 0.08, 0.04)
-_MARGIN = 0.9
-"""Share of the stroke that candidates may use: the drive itself is like them, not one of them."""
+from ..thresholds import PLAN_MARGIN, PLAN_SIZES
 
 
 def input_that_separates(
@@ -52,11 +49,11 @@ def input_that_separates(
     best, best_moves = None, False
     shapes = _shapes(t, record) if loop is None else _references(t, record)
     for kind, shape in shapes.items():
-        for size in _SIZES:
-            u = force * size * shape if loop is None else centre + _MARGIN * reach * size * shape
+        for size in PLAN_SIZES:
+            u = force * size * shape if loop is None else centre + PLAN_MARGIN * reach * size * shape
             ys, asked, gaps = play(u)
             far = max(float(np.max(np.abs(y - centre))) for y in ys)
-            if not np.isfinite(far) or far > _MARGIN * reach * 1.0001 or asked > force:
+            if not np.isfinite(far) or far > PLAN_MARGIN * reach * 1.0001 or asked > force:
                 continue
             separation = min(gaps) / max(diagnosis.noise, 1e-300)
             # A record in which nothing may move teaches one bit; where all candidates move it teaches their
@@ -67,7 +64,8 @@ def input_that_separates(
     if best is None:
         raise ValueError(
             f"every input tried leaves the stroke of {reach:g} {long} or asks more than {force:g} {strong}: "
-            "the candidates drift. Allow more stroke, or give loop= (a closed_loop whose controller holds the drive in place)."
+            "the candidates drift. Allow more stroke, or give loop= (a closed_loop whose controller holds "
+            "the drive in place)."
         )
     what = (
         f"{best.kind} of up to {best.force:.3g} {strong}"

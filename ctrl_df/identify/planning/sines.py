@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..results.experiment import Experiment, separated
-from ..tables.fit import QUICK
-
-_SETTLE, _COUNTED = 12, 8  # periods before and while a point is measured
-_POINTS = 6
+from ..thresholds import COUNTED, SETTLE, SINES, WORK_MEDIUM
 
 
 def stepped_sines(
@@ -52,7 +49,7 @@ def stepped_sines(
     omega = np.geomspace(0.5 * min(r.omega[0] for r in tables), 2 * max(r.omega[-1] for r in tables), 11)
     found = []
     for m in models:
-        options: dict[str, Any] = dict(QUICK) if method_for(m).takes_options else {}
+        options: dict[str, Any] = dict(WORK_MEDIUM) if method_for(m).takes_options else {}
         found.append(np.asarray(describing_function(m, A[:, None], omega[None], **options)))
     size = np.max(np.abs(np.nan_to_num(found)), axis=0)
     far = A[:, None] * size
@@ -62,7 +59,7 @@ def stepped_sines(
         for a, b in itertools.combinations(found, 2)
     ]
     separation = np.where((far <= reach) & (size > 0), np.min(gaps, axis=0) / sigma, 0.0)
-    order = np.argsort(separation, axis=None)[::-1][:_POINTS]
+    order = np.argsort(separation, axis=None)[::-1][:SINES]
     i, k = np.unravel_index(order[separation.ravel()[order] > 0], separation.shape)
     if len(i) == 0:
         raise ValueError(
@@ -70,12 +67,12 @@ def stepped_sines(
             "Allow more force or stroke, or record a run over time."
         )
     chosen = sorted(zip(A[i].tolist(), omega[k].tolist(), strict=True), key=lambda p: (p[1], p[0]))
-    needed = sum((_SETTLE + _COUNTED) * 2 * math.pi / w for _, w in chosen)
+    needed = sum((SETTLE + COUNTED) * 2 * math.pi / w for _, w in chosen)
     factor = 1.0 if duration is None else float(duration) / needed
     dt = float(dt or 2 * math.pi / (100 * max(w for _, w in chosen)))
     parts = []
     for a, w in chosen:
-        periods = max(int(round((_SETTLE + _COUNTED) * factor)), 2)
+        periods = max(int(round((SETTLE + COUNTED) * factor)), 2)
         n = max(int(round(periods * 2 * math.pi / w / dt)), 2)
         # from rest with the sine, not the cosine: the mass then drifts off least
         parts.append(a * np.sin(w * dt * np.arange(n)))

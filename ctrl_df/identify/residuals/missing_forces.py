@@ -16,15 +16,7 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_model
 from ..estimation.trial import Data, Trial
-
-# Amplitude of a test force over the rms of the force: linear still, and far above rounding.
-_SMALL = 3e-3
-
-FINER = 3
-"""How many times finer the second grid of every kind is."""
-
-# Travel after a reversal [typical positions] over which a force may build up.
-_REACHES = (0.03, 0.1, 0.3, 1.0)
+from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
 @dataclass(frozen=True)
@@ -125,7 +117,7 @@ class _Scene:
         self.view, self.data = data.train, data
         self.fit = tried.train
         self.scale = data.scales.position
-        self.size = _SMALL * data.scales.force
+        self.size = TEST_FORCE * data.scales.force
         self.motion = [
             _motion(r, w, y)
             for r, w, y in zip(self.view.records, self.view.windows, tried.train.simulated, strict=True)
@@ -167,7 +159,7 @@ class _Scene:
                     for f in factors
                 ]
             yield kind, families
-        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in _REACHES]]
+        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in REVERSAL_REACHES]]
         line = self._line()
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 

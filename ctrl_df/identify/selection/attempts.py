@@ -15,20 +15,14 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
-from ..estimation.multistart import HOPELESS
 from ..estimation.simulator import feasible
 from ..estimation.trial import Data, Trial
 from ..starting.attach import applicable, attach
 from ..starting.proposals import proposals
 from ..starting.regression import Start
-from ..starting.resonance_grid import SHARES, resonant
+from ..starting.resonance_grid import resonant
 from ..starting.screen import Screen, starts_for
-
-# Steps of every start before the first look at them, and those of an effect that go on after it.
-_BEGUN, _KEPT = 2, 2
-
-# Joints that resonate with which fits begin.
-_JOINTS = 3
+from ..thresholds import BEGUN, HOPELESS, JOINTS, KEPT, LOAD_SHARES
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +103,10 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
     joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1]
-    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in SHARES]
+    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in LOAD_SHARES]
     jobs += [(c, None, screen, shortest, free, nominal) for c in kinds]
     begun = run(_begin, jobs)
-    attempts = _best([a for found in begun for a in found if a.fit is not None], _JOINTS)
+    attempts = _best([a for found in begun for a in found if a.fit is not None], JOINTS)
     attempts += [a for found in begun for a in found if a.fit is None]
     # those of few steps first: what they come to tells of the others which need no long look
     short = [a for a in attempts if not a.multimodal]
@@ -121,7 +115,7 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     least = min(least, screen.base.rmse)
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
-    kept = _best(begun, _KEPT)
+    kept = _best(begun, KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another valley
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
@@ -161,7 +155,7 @@ def _begin(job) -> list[Attempt]:
     cls, share, screen, shortest, free, nominal = job
     if share is not None:
         found = []
-        for near in resonant(cls, screen, share, _JOINTS):
+        for near in resonant(cls, screen, share, JOINTS):
             added = own_names(near.model)
             found.append(
                 Attempt(
@@ -203,7 +197,7 @@ def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
 def _first(job) -> Attempt:
     """Take the first steps, fewer where all would not lead to an error below `hopeless` at their pace."""
     attempt, hopeless = job
-    return _on(attempt, min(_BEGUN, attempt.steps), hopeless)
+    return _on(attempt, min(BEGUN, attempt.steps), hopeless)
 
 
 def _on(attempt: Attempt, steps, hopeless) -> Attempt:

@@ -11,10 +11,8 @@ from dataclasses import replace
 
 from ..estimation.noise_model import NoiseModel, whitened_power, whitener
 from ..estimation.trial import Trial
+from ..thresholds import REFUTED
 from .rounding import rounding_evidence
-
-REFUTED = 20.0
-"""Evidence [nats] of held-out data against a candidate that puts it last."""
 
 
 def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:

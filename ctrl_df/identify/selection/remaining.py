@@ -11,12 +11,9 @@ from ..estimation.trial import Data, Trial
 from ..residuals.missing_forces import Lack, lacks
 from ..residuals.regions import error_regions
 from ..results.explain import places
+from ..thresholds import GROWN, LEFT, NOISIER
 from .evidence import rounds
 from .search import Located, Remainder
-
-_LEFT = 0.2  # share of the structure (rms) that the best candidate may leave
-_NOISIER = 1.4  # error on held-out windows over that on fitted ones that may be chance
-_GROWN = 2.0  # error over the least that the shortest windows leave, up to which it may be noise
 
 
 def remainder(base: Trial, best: Trial, data: Data, noise, floor: float, significant: float) -> Remainder:
@@ -44,7 +41,7 @@ def remainder(base: Trial, best: Trial, data: Data, noise, floor: float, signifi
     structure = missed[0].rms if telling else 0.0
     if not rounded and not data.forced:
         # what the right model misses over long windows it misses over short ones
-        structure = max(structure, math.sqrt(max(best.train.rmse**2 - (_GROWN * floor) ** 2, 0.0)))
+        structure = max(structure, math.sqrt(max(best.train.rmse**2 - (GROWN * floor) ** 2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, 1e-300))
     assert best.held is not None and base.held is not None
@@ -52,11 +49,11 @@ def remainder(base: Trial, best: Trial, data: Data, noise, floor: float, signifi
         math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records]))) for v in (data.train, data.held)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
-    expected = _NOISIER * spread * max(1.0, floors[1] / floors[0])
+    expected = NOISIER * spread * max(1.0, floors[1] / floors[0])
     outside = math.sqrt(max(best.held.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.held.rmse**2 - expected**2, outside**2, 1e-300))
     share = max(structure / there, outside / there_outside)
-    unexplained = telling if rounded else share > _LEFT
+    unexplained = telling if rounded else share > LEFT
     return Remainder(spread, max(structure, outside), unexplained, missed)
 
 

@@ -13,43 +13,34 @@ from ...blocks.effect import static_levels
 from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
-from ..estimation.multistart import HOPELESS, NEAR, all_hopped, begun_at, beyond, hopped, own, settled
-from ..estimation.segments import EXACT
+from ..estimation.multistart import all_hopped, begun_at, beyond, hopped, own, settled
 from ..estimation.simulator import feasible
-from ..estimation.trial import FORCED, Data, Trial, prepare
+from ..estimation.trial import Data, Trial, prepare
 from ..estimation.variables import default_free
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
+from ..thresholds import (
+    CONFIRMED,
+    CONFIRMED_FORCED,
+    EXACT,
+    EXPLAINS_LITTLE,
+    FLOOR,
+    GROWTH,
+    HOPELESS,
+    PASSED,
+    PROCESS_NOISE,
+    PROMISING,
+    SHOWS_HARDLY,
+    SIGNIFICANT,
+    SIGNIFICANT_HELD,
+    STILL_POSSIBLE,
+    STOPPED_EARLY,
+)
 from .attempts import itself, tried
 from .equivalence import indistinguishable
 from .evidence import ranked, rounds
 from .remaining import located, remainder
 from .search import Search, Words
-
-SIGNIFICANT = 20.0
-"""Evidence [nats] an effect needs: e^20 to 1, ample for the few hundred shapes that screening tries."""
-
-HELD = 5.0
-"""Evidence [nats] it needs on held-out data alone.
-
-To these are fitted initial states, and what the others leave open: a threshold within a range, the phase of
-a ripple.
-"""
-
-CONFIRMED = 6
-"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
-
-CONFIRMED_FORCED = 10
-"""The same where the machine's own forces wander."""
-
-# Best error over windows four times as long that still counts as the same.
-_GROWTH = 1.35
-# Evidence [nats] by which candidates may differ because their fits stopped early.
-_CLOSE = 60.0
-# Speed, over the typical one, at which a bump of friction is gone that only breaking away shows (to 1 %).
-_PASSED = 2.15e-3
-# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain.
-_FLOOR = 1.03
 
 
 class StructureSearch(Search):
@@ -66,7 +57,7 @@ class StructureSearch(Search):
     """
 
     significant = SIGNIFICANT
-    significant_held = HELD
+    significant_held = SIGNIFICANT_HELD
     words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
 
     def __init__(self, block, records, held, free):
@@ -78,7 +69,7 @@ class StructureSearch(Search):
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
         # friction that wanders drowns all else over longer windows
         near = self.levels[0].moved(self.base.train)
-        if near.rmse > FORCED * data.noise and not data.clean:
+        if near.rmse > PROCESS_NOISE * data.noise and not data.clean:
             self._look_at(self.levels[0].wandering, 0)
             self.base = Trial("", self.data.fit(near.model, self.free))
 
@@ -118,7 +109,7 @@ class StructureSearch(Search):
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
         there = base.rmse if self.data.forced else longest.moved(base).rmse
-        if there > _GROWTH * base.rmse:
+        if there > GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
             moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
@@ -133,12 +124,12 @@ class StructureSearch(Search):
 
         `here`, `there`: error of the baseline where the trials were fitted, and over the longest windows.
         """
-        if found and found[0].train.rmse <= 0.8 * here:
+        if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
             return None
         longest = self.levels[-1]
         best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
         moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, 4, 1e-2)), best)
-        shows = found and found[0].train.rmse <= 0.97 * here
+        shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
     def _look(self, classes, executor, data: Data):
@@ -193,7 +184,7 @@ class StructureSearch(Search):
             return []
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right valley.
-        near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
+        near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
         least = min(t.train.rmse for t in chosen)
         close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
         close = [t for t in close if t.train.rmse < HOPELESS * least]
@@ -213,7 +204,7 @@ class StructureSearch(Search):
         """
         shortest, middle, longest = self.levels
         short = side_by_side(shortest.moved, fits)
-        floor = _FLOOR * min(f.rmse for f in short)
+        floor = FLOOR * min(f.rmse for f in short)
         if self.data.forced:
             return [short], floor
         near = self._stage(middle, fits, short, floor)
@@ -273,7 +264,7 @@ class StructureSearch(Search):
             return False
         beside = [e for e in tried.block.effects if e.role == "friction" and e.side == effect.side]
         beside.sort(key=lambda e: e.rank)
-        without, speed = [e for e in beside if e is not effect], _PASSED * self.data.scales.speed
+        without, speed = [e for e in beside if e is not effect], PASSED * self.data.scales.speed
         kinetic = level(without, 1.0, 1.0, speed)
         bump = level(beside, 1.0, 1.0, speed) - kinetic
         return bump <= 0.01 * (level(beside, 0.0, 1.0, 0.0) - kinetic)
@@ -342,13 +333,13 @@ def _best_of(base, trials) -> list[Trial]:
     return ranked(Trial("", base), best.values())[0]
 
 
-def _promising(found, most=CONFIRMED, share=0.2) -> list[Trial]:
+def _promising(found, most=CONFIRMED, share=PROMISING) -> list[Trial]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
 
     `most`: of them by evidence, `share` of the best one's that is near.
     """
     close = sorted(found, key=lambda t: t.train.rmse)[:3]
-    close = [t for t in close if t.train.rmse < NEAR * close[0].train.rmse]
+    close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
     likely = found[:2] + [t for t in found[2:most] if t.evidence > share * found[0].evidence]
     return likely + [t for t in close if not any(t is o for o in likely)]
 
@@ -364,9 +355,13 @@ def _longest_coherent(stages) -> int:
     errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]
     base, best = [e[0] for e in errors], [min(e) for e in errors]
     at = 0
-    while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:
+    while at + 1 < len(errors) and best[at + 1] <= GROWTH * best[at]:
         at += 1
-    if at + 1 < len(errors) and best[at] > 0.8 * base[at] and _left(base, best, at) > _left(base, best, -1):
+    if (
+        at + 1 < len(errors)
+        and best[at] > EXPLAINS_LITTLE * base[at]
+        and _left(base, best, at) > _left(base, best, -1)
+    ):
         return len(errors) - 1
     return at
 

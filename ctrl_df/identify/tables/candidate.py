@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from ..estimation.trial import Scales
+from ..thresholds import WORK_LOW, WORK_MEDIUM
 from .fit import (
-    QUICK,
-    ROUGH,
     FittedTable,
     fit_table,
     log_density,
@@ -21,7 +20,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
     cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     slow = cls.costly
-    work = ROUGH if slow else QUICK
+    work = WORK_LOW if slow else WORK_MEDIUM
     grown, hopeful = best_starts(cls, block, points, slopes, cls.table_starts, work)
     if not grown:
         return None

@@ -19,6 +19,7 @@ from ..data.frequency_measurement import FrequencyMeasurement
 from ..estimation.simulator import feasible
 from ..estimation.trial import Scales
 from ..estimation.variables import Variable
+from ..thresholds import GROSS, RIGID, WORK_HIGH
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,20 +115,13 @@ def counted(record: FrequencyMeasurement) -> np.ndarray:
     return measured & np.any(measured & (record.N != 0), axis=0)
 
 
-# Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for
-# ever.
-ROUGH = {"max_steps": 4_000, "averages": 8}
-QUICK = {"max_steps": 25_000, "averages": 8}
-CAREFUL = {"max_steps": 60_000, "averages": 16}
-
-
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
     """Return N of the model at the points; NaN where it has no answer within the work allowed."""
     N = np.empty(len(points), complex)
-    rigid = _rigid(model, points, RIGID[1] if work in (None, CAREFUL) else RIGID[0])
+    rigid = _rigid(model, points, RIGID[1] if work in (None, WORK_HIGH) else RIGID[0])
     for some, block in ((rigid, _without_bristles(model) if rigid.any() else model), (~rigid, model)):
         if some.any():
-            N[some] = _described(block, points.A[some], points.omega[some], work or CAREFUL)
+            N[some] = _described(block, points.A[some], points.omega[some], work or WORK_HIGH)
     return N
 
 
@@ -141,9 +135,6 @@ def _described(model, A, omega, work) -> np.ndarray:
 
 def _without_bristles(model):
     return model.with_effects([e for e in model.effects if e.role != "presliding"])
-
-
-RIGID = (2e-3, 3e-4)  # share of the swing, when quick and when careful
 
 
 def _rigid(model, points: Points, share: float) -> np.ndarray:
@@ -185,9 +176,6 @@ def outlying(error) -> np.ndarray:
     return far if np.count_nonzero(far) <= max(len(size) // 16, 2) else np.zeros(len(size), bool)
 
 
-_GROSS = 0.02  # share of points expected to err by as much as N itself
-
-
 def log_density(error, least: float) -> tuple[np.ndarray, float]:
     """Return the log density [nats] of every point's error, and the variance of what is mere scatter.
 
@@ -199,15 +187,15 @@ def log_density(error, least: float) -> tuple[np.ndarray, float]:
         The variance is no less.
     """
     size = np.abs(error) ** 2
-    gross = _GROSS * np.exp(-np.minimum(size, 700.0))
+    gross = GROSS * np.exp(-np.minimum(size, 700.0))
     best = (np.full(len(size), -np.inf), least)
     for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
         variance = max(variance, least)
         for _ in range(30):
-            usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+            usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
             share = usual / (usual + gross)
             variance = max(float(share @ size) / max(float(share.sum()), 1e-300), least)
-        usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+        usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
         density = np.log(usual + gross)
         if density.sum() > best[0].sum():
             best = density, variance
@@ -284,7 +272,7 @@ def fit_table(
     budget : int
         Bound on the tables computed.
     work : mapping or None
-        Bounds on the work of one point, `ROUGH`, `QUICK` or `CAREFUL` (the default).
+        Bounds on the work of one point, `WORK_LOW`, `WORK_MEDIUM` or `WORK_HIGH` (the default).
     """
     table = block.parameters
     job = _Job(

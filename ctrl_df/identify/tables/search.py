@@ -16,10 +16,19 @@ from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
 from ..starting.attach import applicable
+from ..thresholds import (
+    CONFIRMED_ON_TABLE,
+    HOPELESS_ON_TABLE,
+    POINTS,
+    POINTS_COSTLY,
+    SIGNIFICANT_TABLE,
+    SIGNIFICANT_TABLE_HELD,
+    TOLD_APART,
+    WORK_MEDIUM,
+)
 from .candidate import fit_either, try_effect
 from .compare import comparison_of_tables, plane_regions, scatter
 from .fit import (
-    QUICK,
     FittedTable,
     Points,
     counted,
@@ -34,18 +43,6 @@ from .fit import (
     table_scales,
 )
 from .uncertainty import uncertainty
-
-SIGNIFICANT = 12.0
-"""Evidence [nats] an effect needs on the points fitted; fewer shapes are tried than over time."""
-
-HELD = 2.0
-"""Evidence [nats] it needs on the points held out; there are few of them."""
-
-_SCREEN = 20  # points while screening, those where the model errs most in their part of the plane
-_ROUGH = 10  # of effects whose orbits take many times as long
-_CONFIRM = 5
-_HOPELESS = -20.0  # evidence: what explains next to nothing of a few points will not explain all of them
-_ALIKE = 6.0  # log likelihood ratio [nats] that would tell two candidates apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +82,8 @@ class TableSearch(Search):
         Parameters of the model that may be refitted.
     """
 
-    significant = SIGNIFICANT
-    significant_held = HELD
+    significant = SIGNIFICANT_TABLE
+    significant_held = SIGNIFICANT_TABLE_HELD
     measure = "N"
     words = Words("tables", "scatter", " of |N|", "the points of the plane", "")
     kind = FrequencyDiagnosis
@@ -132,22 +129,22 @@ class TableSearch(Search):
     def candidates(self, classes, executor=None):
         """Return every effect that can be added, fitted roughly to some points, the best first."""
         size = np.abs(self.inside.weight * self.base.error[self.train])
-        few, fewer = self.inside.thinned(_SCREEN, size), self.inside.thinned(_ROUGH, size)
+        few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
         for some in (few, fewer):
-            slopes[len(some)] = slopes_of(block, some, self.free, self.scales, QUICK)
+            slopes[len(some)] = slopes_of(block, some, self.free, self.scales, WORK_MEDIUM)
         jobs = []
         for c in classes:
             if applicable(c, block):
                 some = fewer if c.costly else few
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
-        found = [self._trial(*r, work=QUICK) for r in run(try_effect, jobs) if r is not None]
+        found = [self._trial(*r, work=WORK_MEDIUM) for r in run(try_effect, jobs) if r is not None]
         return self.ranked(self.base, found)
 
     def confirm(self, found):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
-        best = [self._confirmed(t) for t in found[:_CONFIRM] if t.evidence > _HOPELESS]
+        best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
             try:
@@ -163,7 +160,7 @@ class TableSearch(Search):
         kind = tried.block.effects[-1]
         fitted = fit_either(
             tried.block, self.inside, tried.fitted.names, self.scales, iterations=3 if kind.costly else 12,
-            budget=120, work=QUICK if kind.costly or kind.multimodal else None,
+            budget=120, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
         )  # fmt: skip
         return self._trial(tried.key, fitted, tried.extra, confirmed=True)
 
@@ -202,7 +199,7 @@ class TableSearch(Search):
             return False
         sigma2 = min(self._likelihood(a)[1], self._likelihood(b)[1])
         gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
-        return float(np.sum(gap[both] ** 2)) / sigma2 < _ALIKE
+        return float(np.sum(gap[both] ** 2)) / sigma2 < TOLD_APART
 
     def errors(self, judged):
         """Return the rms of the relative errors of the points fitted, and of those held out."""

@@ -19,9 +19,8 @@ import numpy as np
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
 from ..starting.attach import attach
-from .fit import QUICK, Points, Scales, relative_error, simulate_table
-
-_USUAL = (0.01, 0.05, 0.2, 0.7)
+from ..thresholds import HOPELESS_START, TABLE_SIZES, WORK_MEDIUM
+from .fit import Points, Scales, relative_error, simulate_table
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def _any(cls, plane: Plane):
     for f in fields:
         spec = f.metadata["parameter"]
         if f is fields[0]:
-            grids[f] = (*_USUAL, *(-m for m in _USUAL)) if spec["lower"] < 0 else _USUAL
+            grids[f] = (*TABLE_SIZES, *(-m for m in TABLE_SIZES)) if spec["lower"] < 0 else TABLE_SIZES
         elif f.default is dataclasses.MISSING:
             grids[f] = (0.1, 1.0)
     for multiples in itertools.product(*grids.values()):
@@ -124,10 +123,7 @@ def proposals(cls, block, points: Points) -> Iterator:
             yield grown
 
 
-_HOPELESS = 3.0  # times the error of the model itself: no start value to begin with
-
-
-def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -> tuple[list, bool]:
+def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=WORK_MEDIUM) -> tuple[list, bool]:
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 
     A start is judged by what remains of its errors once the model's own parameters have moved along `slopes`
@@ -154,6 +150,6 @@ def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=QUICK) -
         if not np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
             scored.append((float(np.sum(np.log(left(table) + common))), len(scored), grown))
     scored.sort(key=lambda s: s[:2])
-    bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(_HOPELESS)
+    bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(HOPELESS_START)
     hopeful = [g for size, _, g in scored[:keep] if size < bound]
     return hopeful or [g for _, _, g in scored[:1]], bool(hopeful)
