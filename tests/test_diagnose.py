@@ -9,11 +9,11 @@ import rigs
 import ctrl_df as cdf
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.estimation.noise_model import whitener
+from ctrl_df.identify.estimation.noise_model import prediction_error_filter
+from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.simulator import feasible
-from ctrl_df.identify.estimation.trial import Trial, prepare
 from ctrl_df.identify.estimation.variables import default_free
-from ctrl_df.identify.residuals.missing_forces import lacks
+from ctrl_df.identify.residuals.missing_forces import missing_forces
 
 FEW = ("constant_force", "asymmetric_coulomb", "linear_spring", "input_delay", "sensor_delay")
 
@@ -33,7 +33,7 @@ def test_initial_states_carried_from_short_windows_to_long_ones_find_the_truth(h
     found = data.level(16).fit(block.with_parameters(feasible(block, off)), free)
     for factor in (4, 1):
         found = data.level(factor).moved(found)
-    trial = data.judged(Trial("", found))
+    trial = data.validate(CandidateFit("", found))
     # worst of twelve such rigs: 1.02 on the record fitted, 1.16 on the one held out
     assert found.rmse < 1.06 * rig.train[0].noise
     assert trial.held.rmse < 1.3 * rig.holdout[0].noise
@@ -54,7 +54,7 @@ def test_free_forces_tell_what_a_model_misses_and_where():
     def most_telling(rig, block):
         data = prepare(rig.baseline, [of(rig)[0]]).level(4)
         found = data.fit(block, default_free(block))
-        return lacks(Trial("", found), data, whitener(found.residual))[0]
+        return missing_forces(CandidateFit("", found), data, prediction_error_filter(found.residual))[0]
 
     rig = rigs.draw("linear_spring", 4, excitation="chirp")
     assert most_telling(rig, rig.true_block).evidence < 0
@@ -162,7 +162,7 @@ def test_errors_are_clear():
     with pytest.raises(TypeError, match="Measurement"):
         diagnose(cdf.Mass(1), (t, t, t))
     with pytest.raises(TypeError, match="unrecognized keyword"):
-        diagnose(cdf.Mass(1), data, colour="red")
+        diagnose(cdf.Mass(1), data, error_filter="red")
     with pytest.raises(ValueError, match="effect id"):
         diagnose(cdf.Mass(1), data, candidates=["gremlin"])
     with pytest.raises(TypeError, match="inertia"):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from ..checks import unknown_keywords
 from .arguments import check_quantities
 from .datasets.choice import dataset_of
-from .residuals.compared import Compared
+from .residuals.comparison_base import ComparisonBase
 from .results.comparison import Comparison
 
 __all__ = ["Comparison", "compare"]
 
 
-def compare(model, data, *, mode: str = "auto", window: float | None = None, **keywords) -> Compared:
+def compare(model, data, *, mode: str = "auto", window: float | None = None, **keywords) -> ComparisonBase:
     """Simulate a model on records with the event engine and compare.
 
     Parameters

@@ -59,6 +59,6 @@ def diagnose(
     began = time.perf_counter()
     dataset = dataset_of(data, holdout)
     block = mechanism_of(model)
-    check_quantities(block, (*dataset.records, *dataset.held))
+    check_quantities(block, (*dataset.records, *dataset.validation))
     search = dataset.search(block, free_parameters(block, free))
     return verdict_of(search, search.candidates(classes, executor), began, limits)

@@ -46,7 +46,7 @@ def improve(
     began = time.perf_counter()
     dataset = dataset_of(train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
-    check_quantities(start, (*dataset.records, *dataset.held))
+    check_quantities(start, (*dataset.records, *dataset.validation))
     kept = frozenset(start.parameters) - set(free_parameters(start, free))
     rivals: dict[str, list] = {}
     steps: list[Step] = []
@@ -74,7 +74,7 @@ def improve(
         ]
     noise = search.relative(last_diagnosis(steps).noise)
     return Study(
-        tuple(steps), steps[-1].model, outcome(steps), noise, start, dataset.records, dataset.held,
+        tuple(steps), steps[-1].model, outcome(steps), noise, start, dataset.records, dataset.validation,
         time.perf_counter() - began,
     )  # fmt: skip
 

@@ -21,7 +21,7 @@ SEEN: tuple[str, ...] = ("x", "v")
 SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "deflection"})
 """Names of those hidden that come to be what the motion makes them, wherever they began."""
 
-FITTED, CHAINED, MEASURED = "fitted", "chained", "measured"
+FREE, CONTINUED, MEASURED = "fitted", "chained", "measured"
 """How windows begin: every state is fitted, window by window; all but those that settle are, which go on from
 one window into the next; none is: windows begin as the record says, and what is hidden goes on.
 """
@@ -43,7 +43,7 @@ def fitted_names(core, begins: str) -> tuple[str, ...]:
     """Return the names of those that are fitted where windows begin so."""
     if begins == MEASURED:
         return ()
-    return tuple(n for n in names(core) if begins == FITTED or n not in SETTLING)
+    return tuple(n for n in names(core) if begins == FREE or n not in SETTLING)
 
 
 def carried_names(core, begins: str) -> tuple[str, ...]:

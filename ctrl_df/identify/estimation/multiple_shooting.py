@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..thresholds import GOOD
-from .initial_states import FITTED
+from .initial_states import FREE
 from .noise_model import power
-from .restarts import rescue, scan_slack
-from .segments import Windows, facts
-from .sensitivity import Tangent
+from .restarts import restart_segments, scan_gap_state
+from .segments import Segments, facts
+from .sensitivity import OutputSensitivity
 from .simulator import Simulator, feasible
 from .variables import step_of_sensor, variables_of
 
@@ -34,10 +34,18 @@ class Problem:
     """
 
     def __init__(
-        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=(math.inf, 0)
+        self,
+        model,
+        records,
+        names,
+        budget,
+        limits=None,
+        error_filter=None,
+        begins=FREE,
+        hopeless=(math.inf, 0),
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.colour, self.begins = colour, begins
+        self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
@@ -46,7 +54,7 @@ class Problem:
         self.nfev = 0
         self.converged = False
         self.simulators: list[Simulator] = []
-        self.windows: list[Windows] = []
+        self.windows: list[Segments] = []
         self.measured: Signals = []
         self.nuisance: list[np.ndarray] = []
         self.priors: list[np.ndarray] = []
@@ -64,7 +72,7 @@ class Problem:
         given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
         return feasible(self.block, given) if given else None
 
-    def stage(self, windows: list[Windows], thin, starts=None):
+    def stage(self, windows: list[Segments], thin, starts=None):
         """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
         self.simulators = [Simulator(self.model, r, thin=thin, begins=self.begins) for r in self.records]
         self.windows = windows
@@ -104,7 +112,7 @@ class Problem:
 
     def cost(self, residual, nuisance, weights) -> float:
         """Return half the weighted sum of squares, initial states weighed by what is known of them."""
-        if self.colour is not None:
+        if self.error_filter is not None:
             return 0.5 * power([self.weighed(k, r) for k, r in enumerate(residual)])
         total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
         known = sum(
@@ -116,7 +124,7 @@ class Problem:
 
     def weighed(self, k, x) -> np.ndarray:
         """Return what the cost sees of signals (n,) or (n, m) of one record."""
-        return x if self.colour is None else self.colour.seen(x, self.windows[k].slices)
+        return x if self.error_filter is None else self.error_filter.filtered(x, self.windows[k].slices)
 
     def power(self, signals: Signals) -> tuple[float, int]:
         """Return the sum of squares of what the cost sees of signals, and of how many values."""
@@ -126,7 +134,7 @@ class Problem:
     @property
     def unit(self) -> float:
         """Unit of what the cost sees: accelerations make second differences of their step squared."""
-        return 1.0 if self.colour is None else (self.colour.step * self.known[0].dt) ** 2
+        return 1.0 if self.error_filter is None else (self.error_filter.step * self.known[0].dt) ** 2
 
     def means(self):
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
@@ -136,38 +144,38 @@ class Problem:
                 mean[:, simulator.nuisances.index("slack")] = 0.5
         return means
 
-    def tangent(self) -> Tangent:
+    def sensitivity(self) -> OutputSensitivity:
         """Return the linear map about the last step of `solve`."""
         assert self.slopes is not None
         ridge = [self.noise**2 / p**2 for p in self.priors]
-        return Tangent(*self.slopes, self.windows, ridge, self.colour)
+        return OutputSensitivity(*self.slopes, self.windows, ridge, self.error_filter)
 
     # --- solving --------------------------------------------------------------------------------------
 
     def solve(self, theta, iterations, tolerance, robust):
         """Levenberg-Marquardt from `theta`; the initial states go along."""
         if self.fresh:
-            scan_slack(self, theta)
+            scan_gap_state(self, theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
         again = max(iterations // 2, 3)
         # without parameters a window found lets the next one go on where it ends
         for _ in range(1 if self.names else 4):
-            if not self._worth_a_rescue() or not rescue(self, theta):
+            if not self._worth_restarting() or not restart_segments(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
         rough = any(e.nonsmooth for e in getattr(self.block, "effects", ()))
-        rough = rough and self.names and self.colour is None
+        rough = rough and self.names and self.error_filter is None
         if (
             rough
-            and self._worth_a_rescue()
+            and self._worth_restarting()
             and self.nfev < self.budget
             and any(t.min() < 0.5 for t in self._trusts())
         ):
-            theta = self._without_the_lost(theta, again, tolerance, robust)
+            theta = self._without_outliers(theta, again, tolerance, robust)
         return theta
 
-    def _without_the_lost(self, theta, iterations, tolerance, robust):
+    def _without_outliers(self, theta, iterations, tolerance, robust):
         """Let the windows that fit decide the parameters, then find where the others begin.
 
         A window whose start lies in a wrong valley pulls the parameters to where it can never leave that
@@ -175,16 +183,16 @@ class Problem:
         """
         kept = theta, self.nuisance, self.last, self.slopes, self.converged
         trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
-        rescue(self, trial)
+        restart_segments(self, trial)
         trial = self._descend(trial, iterations, tolerance, robust)
         if power(self.last) < power(kept[2]):
             return trial
         theta, self.nuisance, self.last, self.slopes, self.converged = kept
         return theta
 
-    def _worth_a_rescue(self) -> bool:
+    def _worth_restarting(self) -> bool:
         """Whether the error could come below what is hopeless if all windows erred like the good ones."""
-        if self.colour is not None or math.isinf(self.hopeless):
+        if self.error_filter is not None or math.isinf(self.hopeless):
             return True
         rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.windows, self.last, strict=True)]
         return float(np.quantile(np.concatenate(rms), GOOD)) < self.hopeless
@@ -312,7 +320,7 @@ class Problem:
         simulator, windows = self.simulators[k], self.windows[k]
         starts, widths = [], []
         for j, name in enumerate(simulator.nuisances):
-            if name == "x" and not simulator.tied:
+            if name == "x" and not simulator.position_dependent:
                 starts.append(None)
                 widths.append(None)
                 continue
@@ -341,12 +349,12 @@ class Problem:
         h, g, pieces = np.zeros((p, p)), np.zeros(p), []
         prior, means = self.noise**2, self.means()
         for k, windows in enumerate(self.windows):
-            if self.colour is not None:
+            if self.error_filter is not None:
                 a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
                 h += a.T @ a
                 g += a.T @ r
                 continue
-            products = _by_window(js[k], jp[k], residual[k], weights[k], windows)
+            products = _by_segment(js[k], jp[k], residual[k], weights[k], windows)
             ns = js[k].shape[1]
             h += products[:, ns:-1, ns:-1].sum(axis=0)
             g += products[:, ns:-1, -1].sum(axis=0)
@@ -414,7 +422,7 @@ class Problem:
         return step / max(largest, 1.0)
 
 
-def _by_window(states, parameters, residual, weights, windows: Windows) -> np.ndarray:
+def _by_segment(states, parameters, residual, weights, windows: Segments) -> np.ndarray:
     """Return Z' W Z of every window, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
     z = np.column_stack((states, parameters, residual))
     weighted = z * weights[:, None]

@@ -40,7 +40,7 @@ class NoiseModel:
             return x
         return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], x, axis=0))
 
-    def seen(self, x, windows) -> np.ndarray:
+    def filtered(self, x, windows) -> np.ndarray:
         """Return what counts of signals (n,) or (n, m) that begin anew in each of `windows` (slices).
 
         The mean of every `step` samples, whitened; values that would mix two windows are left out.
@@ -136,7 +136,7 @@ def averaged(x, windows, step: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(means), begins
 
 
-def force_errors(step: int) -> NoiseModel:
+def second_difference_filter(step: int) -> NoiseModel:
     """Return the filter that makes accelerations of residuals in position: their second differences.
 
     Where wandering forces, integrated twice, make the residuals, their slow parts are the largest and tell
@@ -146,21 +146,21 @@ def force_errors(step: int) -> NoiseModel:
     return NoiseModel(np.array([2.0, -1.0]), 1.0, step)
 
 
-def whitener(pieces: Pieces, plain: NoiseModel | None = None) -> NoiseModel:
+def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None) -> NoiseModel:
     """Return the noise model that evidence is judged by.
 
-    Of the longest record; `plain`: the `force_errors` that fits see, then of these in all windows.
+    Of the longest record; `plain`: the `second_difference_filter` of fits, then of these in all windows.
     """
     if plain is None:
         return noise_model(max(pieces, key=len), max_order=12)
-    left = noise_model([plain.seen(r, [slice(0, len(r))]) for r in pieces], max_order=4)
+    left = noise_model([plain.filtered(r, [slice(0, len(r))]) for r in pieces], max_order=4)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
     return NoiseModel(-both[1:], left.sigma, plain.step)
 
 
 def whitened_power(pieces: Pieces, noise: NoiseModel) -> tuple[float, int]:
     """Return the sum of squares of the whitened residuals, and their number."""
-    white = [noise.seen(r, [slice(0, len(r))]) for r in pieces]
+    white = [noise.filtered(r, [slice(0, len(r))]) for r in pieces]
     return power(white), sum(map(len, white))
 
 

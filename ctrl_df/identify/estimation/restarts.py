@@ -12,7 +12,7 @@ import numpy as np
 from ..thresholds import GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS
 
 
-def rescue(problem, theta) -> bool:
+def restart_segments(problem, theta) -> bool:
     """Try other starts where single windows err far more than the rest; whether any was better.
 
     Stick and slip make the error of a window a rough function of the speed it begins with, and so does a gap
@@ -21,7 +21,7 @@ def rescue(problem, theta) -> bool:
     """
     found, values = False, problem.values(theta)
     for k, simulator in enumerate(problem.simulators):
-        if "v" not in simulator.nuisances or simulator.chained:
+        if "v" not in simulator.nuisances or simulator.continued:
             continue
         column, windows, starts = simulator.nuisances.index("v"), problem.windows[k], problem.nuisance[k]
         rms = np.sqrt(windows.means(problem.last[k] ** 2))
@@ -47,7 +47,7 @@ def rescue(problem, theta) -> bool:
             trial[:, which] = value
         for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
             e = measured - y
-            shift = np.zeros(len(some)) if simulator.tied else some.means(e)
+            shift = np.zeros(len(some)) if simulator.position_dependent else some.means(e)
             powers = some.means(e**2) - shift**2
             better = powers < least
             trial[:, 0] += shift
@@ -58,7 +58,7 @@ def rescue(problem, theta) -> bool:
     return found
 
 
-def scan_slack(problem, theta):
+def scan_gap_state(problem, theta):
     """Find where in its gap each window begins, and how fast it crosses it (the cost has several minima)."""
     for k, simulator in enumerate(problem.simulators):
         if "slack" not in simulator.nuisances:

@@ -63,7 +63,7 @@ def _turns(y) -> int:
 
 
 @dataclass(frozen=True)
-class Windows:
+class Segments:
     """Parts of a record, and the state in which the data say each begins.
 
     Attributes
@@ -112,23 +112,23 @@ class Windows:
         lengths = self.ends - self.begins
         return np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1]))) / lengths
 
-    def only(self, which) -> Windows:
+    def only(self, which) -> Segments:
         """Return some of the windows; `which` a boolean array (nw,)."""
-        return Windows(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        return Segments(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
-def usual_window(record: Measurement) -> float:
+def usual_segment(record: Measurement) -> float:
     """Return a length of window [s] that shows two to-and-fro motions, 40 samples at least."""
     known = facts(record)
     return max(2 * known.swing, 40 * known.dt)
 
 
-def make_windows(record: Measurement, length: float | None = None) -> Windows:
+def make_segments(record: Measurement, length: float | None = None) -> Segments:
     """Cut a record into windows of about `length` [s] (None: one window) and estimate where each begins."""
     return cut(record, 1 if length is None else max(round(record.duration / length), 1))
 
 
-def cut(record: Measurement, count: int) -> Windows:
+def cut(record: Measurement, count: int) -> Segments:
     """Cut a record into `count` windows of equal time, of 20 samples at least."""
     n = len(record)
     count = max(min(count, n // 20), 1)
@@ -138,7 +138,7 @@ def cut(record: Measurement, count: int) -> Windows:
     return _between(record, edges[:-1], edges[1:])
 
 
-def split(record: Measurement, windows: Windows, factor: int, least: int) -> Windows:
+def split(record: Measurement, windows: Segments, factor: int, least: int) -> Segments:
     """Split each window into up to `factor` equal parts, none shorter than `least` samples."""
     begins, ends = [], []
     for i, j in zip(windows.begins, windows.ends, strict=True):
@@ -148,10 +148,10 @@ def split(record: Measurement, windows: Windows, factor: int, least: int) -> Win
     return _between(record, np.concatenate(begins), np.concatenate(ends))
 
 
-def _between(record, begins, ends) -> Windows:
+def _between(record, begins, ends) -> Segments:
     known = facts(record)
     rows = np.array([_local(record, int(i), known) for i in begins])
-    return Windows(begins, ends, *rows.T)
+    return Segments(begins, ends, *rows.T)
 
 
 def _local(record, i, known) -> tuple[float, float, float, float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 
-class Tangent:
+class OutputSensitivity:
     """A fitted model as a linear map: what its parameters and initial states can change in the output.
 
     Parameters
@@ -17,12 +17,12 @@ class Tangent:
     windows : list of Windows
     ridge : list of (nw, ns) arrays
         Precision of what is known of the initial states beforehand, in units of one sample.
-    colour : NoiseModel or None
+    error_filter : NoiseModel or None
         What fits see of the output, where that is not the output itself.
     """
 
-    def __init__(self, parameters, states, windows, ridge, colour=None):
-        self.states, self.windows, self.ridge, self.colour = states, windows, ridge, colour
+    def __init__(self, parameters, states, windows, ridge, error_filter=None):
+        self.states, self.windows, self.ridge, self.error_filter = states, windows, ridge, error_filter
         self.parameters = [self._without_starts(k, j) for k, j in enumerate(parameters)]
         stacked = np.concatenate(self.parameters)
         norms = np.linalg.norm(stacked, axis=0)
@@ -33,8 +33,8 @@ class Tangent:
     def _without_starts(self, k, columns):
         """Remove from the columns (n, m) of one record what its initial states can explain."""
         out = np.array(columns, dtype=float)
-        if self.colour is not None:
-            return self.colour.seen(out, self.windows[k].slices)
+        if self.error_filter is not None:
+            return self.error_filter.filtered(out, self.windows[k].slices)
         for w, where in enumerate(self.windows[k].slices):
             s = self.states[k][where]
             if s.shape[1]:
@@ -44,10 +44,10 @@ class Tangent:
     @property
     def pieces(self) -> list[slice]:
         """What `project` returns as evidence takes it: whole, or by windows where errors are of forces."""
-        if self.colour is None:
+        if self.error_filter is None:
             return [slice(0, sum(map(len, self.states)))]
         lengths = [
-            (w.stop - w.start) // self.colour.step - self.colour.order
+            (w.stop - w.start) // self.error_filter.step - self.error_filter.order
             for windows in self.windows
             for w in windows.slices
         ]

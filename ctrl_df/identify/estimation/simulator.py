@@ -18,10 +18,10 @@ from ...simulate.loop import closed_loop
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from . import initial_states
-from .prepared import Ready, of_block, of_loop, of_system
-from .segments import Windows, facts
+from .prepared import PreparedModel, of_block, of_loop, of_system
+from .segments import Segments, facts
 
-Request = tuple[Windows, Mapping[str, float] | None, np.ndarray | None]
+Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
 
 _PREPARED = 4  # parameter sets whose models are kept ready
@@ -45,7 +45,7 @@ class Simulator:
     force : (n,) array or None
         Input in place of the recorded one.
     begins : str
-        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+        How windows begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class Simulator:
         thin: int = 1,
         rtol: float = 1e-8,
         force: np.ndarray | None = None,
-        begins: str = initial_states.FITTED,
+        begins: str = initial_states.FREE,
     ):
         self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
         self.input = np.asarray(record.u if force is None else force)
@@ -77,15 +77,15 @@ class Simulator:
         self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
         self.facts = facts(record)
         self.runs = 0
-        self._prepared: dict[Any, Ready] = {}
+        self._prepared: dict[Any, PreparedModel] = {}
 
     @property
-    def tied(self) -> bool:
+    def position_dependent(self) -> bool:
         """Whether the block's laws depend on the place (a spring, a ripple, a stop, or a law not known)."""
         return self.closed or not self.mechanism or self.block.core.position_dependent
 
     @property
-    def anchored(self) -> bool:
+    def restoring(self) -> bool:
         """Whether something pulls the model back, so that a free run does not drift."""
         if self.closed or not self.mechanism:
             return True
@@ -106,11 +106,11 @@ class Simulator:
         return initial_states.fitted_names(self.block.core, self.begins) if self.mechanism else ()
 
     @property
-    def chained(self) -> bool:
+    def continued(self) -> bool:
         """Whether some of the initial states go on from one window into the next."""
         return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
 
-    def priors(self, windows: Windows) -> np.ndarray:
+    def priors(self, windows: Segments) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
         if not self.nuisances:
             return np.zeros((len(windows), 0))
@@ -125,7 +125,7 @@ class Simulator:
 
     def run(
         self,
-        windows: Windows,
+        windows: Segments,
         values: Mapping[str, float] | None = None,
         start: np.ndarray | None = None,
         *,
@@ -135,7 +135,7 @@ class Simulator:
 
         Parameters
         ----------
-        windows : Windows
+        windows : Segments
             Where the state is set anew.
         values : mapping or None
             Parameters that differ from the model's.
@@ -164,7 +164,7 @@ class Simulator:
         """
         self.runs += len(asked)
         parts = [self._prepare(values) for _, values, _ in asked]
-        if self.chained:
+        if self.continued:
             outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
         else:
             outputs = self._together(parts, asked)
@@ -173,7 +173,7 @@ class Simulator:
             for part, (windows, _, _), out in zip(parts, asked, outputs, strict=True)
         ]
 
-    def _one_by_one(self, part, windows: Windows, start) -> np.ndarray:
+    def _one_by_one(self, part, windows: Segments, start) -> np.ndarray:
         """Run the windows one after the other: hidden states go on from each into the next."""
         record, inside = self.record, windows.samples
         out = np.empty(len(inside))
@@ -192,7 +192,7 @@ class Simulator:
             hidden = {k: came[k] for k in carried if k in came}
         return out
 
-    def _together(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
+    def _together(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
         """Run all windows of all that is asked for at once, except where systems differ in their states."""
         outputs: list[np.ndarray] = [np.empty(0)] * len(asked)
         sizes = [(p.engine.nstates, len(p.drive_time), p.hold) for p in parts]
@@ -203,7 +203,7 @@ class Simulator:
                 outputs[i] = out
         return outputs
 
-    def _alike(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
+    def _alike(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
         counts = [len(windows) for windows, _, _ in asked]
         edges = np.concatenate(([0], np.cumsum(counts)))
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
@@ -234,7 +234,7 @@ class Simulator:
         column, ends = result.outputs[:, 0], np.concatenate((first, [len(every)]))
         return [column[ends[i] : ends[j]] for i, j in zip(edges[:-1], edges[1:], strict=True)]
 
-    def _starts(self, part, windows: Windows, start) -> np.ndarray:
+    def _starts(self, part, windows: Segments, start) -> np.ndarray:
         """Return the states (nw, nx) in which windows begin."""
         x0 = np.zeros((len(windows), part.engine.nstates))
         if part.core is None:
@@ -247,7 +247,7 @@ class Simulator:
             states[:, state] = samples[windows.begins]
         return x0
 
-    def _read(self, part, windows: Windows, out: np.ndarray, rounded: bool) -> np.ndarray:
+    def _read(self, part, windows: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
         """Return what the sensors make of outputs; what ran away is set aside."""
         record, inside = self.record, windows.samples
         for primitive, later in part.output:
@@ -263,7 +263,7 @@ class Simulator:
             )
         return out
 
-    def _followed(self, windows: Windows) -> set[int]:
+    def _followed(self, windows: Segments) -> set[int]:
         """Return the windows that another one follows, after a pause no longer than two of them."""
         pause = windows.begins[1:] - windows.ends[:-1]
         return set(np.flatnonzero(pause <= 2 * (windows.ends - windows.begins)[:-1]).tolist())
@@ -273,7 +273,7 @@ class Simulator:
         usual = self._usual(part, windows, w)
         return initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
 
-    def at_rest(self, windows: Windows, values) -> np.ndarray:
+    def at_rest(self, windows: Segments, values) -> np.ndarray:
         """Return the initial states (nw, number of nuisances) with which every window begins at rest."""
         part, rows = self._prepare(values), []
         for w in range(len(windows)):
@@ -281,7 +281,7 @@ class Simulator:
             rows.append([given[name] for name in self.nuisances])
         return np.array(rows)
 
-    def carried_on(self, windows: Windows, values, start: np.ndarray) -> np.ndarray:
+    def carried_on(self, windows: Segments, values, start: np.ndarray) -> np.ndarray:
         """Return the initial states that let every window go on where the one before it ends.
 
         Returns
@@ -331,7 +331,7 @@ class Simulator:
 
     # --- preparing ------------------------------------------------------------------------------------
 
-    def _prepare(self, values) -> Ready:
+    def _prepare(self, values) -> PreparedModel:
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]
@@ -394,7 +394,7 @@ def free_run(
     simulator = Simulator(model, record, thin=thin)
     known = {"x": position, "v": velocity, "slack": slack}
     one = np.zeros(1)
-    whole = Windows(np.array([0]), np.array([len(record)]), one, one, one, one, one)
+    whole = Segments(np.array([0]), np.array([len(record)]), one, one, one, one, one)
     start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
     return simulator.run(whole, None, start, rounded=True)
 

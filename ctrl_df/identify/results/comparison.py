@@ -12,7 +12,7 @@ from ...drawing import draw
 from ..data.derivatives import automatic_cutoff, derivative
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
-from ..residuals.compared import Compared
+from ..residuals.comparison_base import ComparisonBase
 from ..residuals.regions import Regions, error_regions
 from ..residuals.residual_tests import (
     InputTest,
@@ -119,7 +119,7 @@ class RecordComparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Compared):
+class Comparison(ComparisonBase):
     """Outcome of `compare`: the sum over all records, and each by itself in `records`.
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and

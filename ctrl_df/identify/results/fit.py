@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..residuals.compared import Compared
+from ..residuals.comparison_base import ComparisonBase
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Fit:
         The model given, with the parameters found.
     parameters : mapping of str to FittedParameter
         Those that were free.
-    comparison : Compared
+    comparison : ComparisonBase
         The refitted model beside the records.
     covariance : (p, p) array
         Of the free parameters, in their order.
@@ -73,7 +73,7 @@ class Fit:
 
     model: Any
     parameters: Mapping[str, FittedParameter]
-    comparison: Compared
+    comparison: ComparisonBase
     covariance: np.ndarray
     unidentifiable: tuple[str, ...]
     converged: bool

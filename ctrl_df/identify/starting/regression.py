@@ -14,8 +14,8 @@ import numpy as np
 
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
+from ..estimation.segmented import Scales
 from ..estimation.segments import facts
-from ..estimation.trial import Scales
 
 
 @dataclass(frozen=True)

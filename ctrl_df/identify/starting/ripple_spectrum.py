@@ -43,7 +43,7 @@ class Wave:
     viscous: float
 
 
-class WaveSearch:
+class RippleSpectrum:
     """Records as one linear regression.
 
     Parameters

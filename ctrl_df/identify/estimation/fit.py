@@ -12,11 +12,11 @@ import numpy as np
 
 from ..data.measurement import Measurement
 from .covariance import covariance_of
-from .initial_states import FITTED
+from .initial_states import FREE
 from .multiple_shooting import Problem
 from .noise_model import NoiseModel
-from .segments import Windows, facts, make_windows, usual_window
-from .sensitivity import Tangent
+from .segments import Segments, facts, make_segments, usual_segment
+from .sensitivity import OutputSensitivity
 from .simulator import Simulator
 from .variables import default_free
 
@@ -24,8 +24,8 @@ MODES = ("auto", "free", "windows")
 
 
 @dataclass
-class Candidate:
-    """Outcome of `fit_candidate`.
+class FitResult:
+    """Outcome of `fit_records`.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class Candidate:
         Values that the cost is of.
     unit : float
         Of these values, where they are not in the unit of `rmse`.
-    colour : NoiseModel or None
-        What the cost sees of the output where it is of forces (see `fit_windows`).
+    error_filter : NoiseModel or None
+        What the cost sees of the output where it is of forces (see `fit_segments`).
     rmse, nrmse : float
         Error over all records; nrmse over the rms of the centred outputs. Where the cost is of forces (see
-        `fit_windows`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
+        `fit_segments`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
     nfev : int
         Simulations of all records together.
     converged : bool
@@ -61,7 +61,7 @@ class Candidate:
     windows : list of Windows
         Where the model was started anew.
     linear : callable or None
-        Works out `tangent`, once it is asked for.
+        Works out `sensitivity`, once it is asked for.
     """
 
     model: Any
@@ -72,7 +72,7 @@ class Candidate:
     simulated: list
     count: int
     unit: float
-    colour: NoiseModel | None
+    error_filter: NoiseModel | None
     rmse: float
     nrmse: float
     nfev: int
@@ -82,10 +82,10 @@ class Candidate:
     scale: np.ndarray
     starts: list
     windows: list
-    linear: Callable[[], Tangent] | None = field(repr=False, default=None)
+    linear: Callable[[], OutputSensitivity] | None = field(repr=False, default=None)
 
     @cached_property
-    def tangent(self) -> Tangent | None:
+    def sensitivity(self) -> OutputSensitivity | None:
         """The fitted model as a linear map of its parameters and initial states; None without parameters."""
         return self.linear() if self.linear is not None else None
 
@@ -96,14 +96,14 @@ class Candidate:
     @property
     def residual_pieces(self) -> list[np.ndarray]:
         """The residual as evidence takes it: of every record, or every window where errors are of forces."""
-        return self.by_window(self.residual) if self.colour is not None else list(self.residual)
+        return self.by_segment(self.residual) if self.error_filter is not None else list(self.residual)
 
     @property
     def simulated_pieces(self) -> list[np.ndarray]:
         """The simulated output, as `residual_pieces`."""
-        return self.by_window(self.simulated) if self.colour is not None else list(self.simulated)
+        return self.by_segment(self.simulated) if self.error_filter is not None else list(self.simulated)
 
-    def by_window(self, signals) -> list[np.ndarray]:
+    def by_segment(self, signals) -> list[np.ndarray]:
         """Return signals, one a record, window by window."""
         return [x[where] for w, x in zip(self.windows, signals, strict=True) for where in w.slices]
 
@@ -120,7 +120,7 @@ class Candidate:
         )
 
 
-def window_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
+def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
     """Return per record the length of window [s] that `mode` means; None: the whole record."""
     if mode not in MODES:
         raise ValueError(f"mode must be one of {', '.join(MODES)}; got {mode!r}.")
@@ -131,15 +131,15 @@ def window_lengths(model, records: Sequence[Measurement], mode="auto", window=No
     lengths: list[float | None] = []
     for record in records:
         simulator = Simulator(model, record)
-        usual = float(window) if window is not None else usual_window(record)
+        usual = float(window) if window is not None else usual_segment(record)
         free = mode == "free" or simulator.closed
         if mode == "auto" and window is None:
-            free = free or simulator.anchored or record.duration < 1.5 * usual
+            free = free or simulator.restoring or record.duration < 1.5 * usual
         lengths.append(None if free else usual)
     return lengths
 
 
-def fit_candidate(
+def fit_records(
     model,
     records: Sequence[Measurement],
     start: Mapping[str, float] | None = None,
@@ -156,7 +156,7 @@ def fit_candidate(
     tolerance: float = 1e-3,
     central: bool = False,
     iterations: int = 12,
-) -> Candidate:
+) -> FitResult:
     """Fit a model to records, fast.
 
     Parameters
@@ -198,13 +198,13 @@ def fit_candidate(
     for name in names:
         if name not in table:
             raise ValueError(f"a free parameter must be one of {', '.join(table)}; got {name!r}.")
-    lengths = window_lengths(model, records, mode, window)
+    lengths = segment_lengths(model, records, mode, window)
     problem = Problem(model, records, names, budget)
     theta = problem.start()
     if coarse is None:
         coarse = start is None
     if coarse and names and not first.closed:
-        for short in _short_windows(first, records, lengths):
+        for short in _short_segments(first, records, lengths):
             problem.stage(_cut(records, short), thin)
             theta = problem.solve(theta, iterations=6, tolerance=0.02, robust=False)
     problem.stage(_cut(records, lengths), thin if polish else max(thin, 1), starts)
@@ -215,10 +215,10 @@ def fit_candidate(
     return _candidate(problem, theta, central)
 
 
-def fit_windows(
+def fit_segments(
     model,
     records: Sequence[Measurement],
-    windows: Sequence[Windows],
+    windows: Sequence[Segments],
     names: Sequence[str],
     *,
     thin: int = 4,
@@ -228,11 +228,11 @@ def fit_windows(
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
     errors: bool = False,
-    colour: NoiseModel | None = None,
-    begins: str = FITTED,
+    error_filter: NoiseModel | None = None,
+    begins: str = FREE,
     hopeless: float = math.inf,
     outlook: int = 0,
-) -> Candidate:
+) -> FitResult:
     """Fit the named parameters over given windows in one stage.
 
     Parameters
@@ -247,17 +247,17 @@ def fit_windows(
     starts : sequence of arrays or None
         Initial states to begin with.
     iterations, tolerance, robust
-        As for `fit_candidate`.
+        As for `fit_records`.
     limits : mapping or None
         Least and largest values of some parameters, within their ranges.
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
-    colour : NoiseModel or None
-        The `force_errors` whose squares are made least, where the machine's own forces make the error.
+    error_filter : NoiseModel or None
+        The `second_difference_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
-        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+        How windows begin: `initial_states.FITTED`, `CONTINUED` or `MEASURED`.
     hopeless : float
-        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there
+        Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
     outlook : int
         Iterations that are to follow in other fits.
@@ -266,22 +266,22 @@ def fit_windows(
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, colour, begins, (hopeless, outlook))
+    problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
     problem.stage(list(windows), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)
     if not errors or problem.slopes is None or not names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
-    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    covariance, null = covariance_of(problem, problem.sensitivity(), *problem.slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
-def _cut(records, lengths) -> list[Windows]:
-    return [make_windows(r, n) for r, n in zip(records, lengths, strict=True)]
+def _cut(records, lengths) -> list[Segments]:
+    return [make_segments(r, n) for r, n in zip(records, lengths, strict=True)]
 
 
-def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
+def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
     """Return the lengths of windows of the stages before the last, shortest first.
 
     Over half a stroke an error of a parameter has not grown beyond what its slope tells. An elastic joint
@@ -307,23 +307,23 @@ def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
 # --- the answer -----------------------------------------------------------------------------------
 
 
-def _candidate(problem: Problem, theta, central) -> Candidate:
+def _candidate(problem: Problem, theta, central) -> FitResult:
     """Return the outcome with covariance, from derivatives about the solution."""
     if not problem.names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
     base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
     problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
-    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    covariance, null = covariance_of(problem, problem.sensitivity(), *problem.slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
-def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
+def _outcome(problem: Problem, theta, covariance, null) -> FitResult:
     values = problem.values(theta) or {}
     residual = problem.last
     total, count = problem.power(residual)
     spread, _ = problem.power([y - y.mean() for y in problem.measured])
-    return Candidate(
+    return FitResult(
         model=problem.simulators[0].with_values(values),
         names=problem.names,
         values=np.array([values[k] for k in problem.names]),
@@ -332,7 +332,7 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
         count=count,
         unit=problem.unit,
-        colour=problem.colour,
+        error_filter=problem.error_filter,
         rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
@@ -349,5 +349,5 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
         starts=problem.nuisance,
         windows=problem.windows,
-        linear=problem.tangent if problem.slopes is not None and problem.names else None,
+        linear=problem.sensitivity if problem.slopes is not None and problem.names else None,
     )

@@ -24,13 +24,13 @@ from ..thresholds import (
     SEGMENT_LEAST,
     SHORTEST,
 )
-from .candidate import Candidate, fit_windows
-from .initial_states import CHAINED, FITTED, MEASURED
-from .noise_model import NoiseModel, force_errors
-from .ripple_phase import rephased
-from .segments import Windows, cut, facts, split
+from .angles_per_record import reestimated_per_record
+from .fit import FitResult, fit_segments
+from .initial_states import CONTINUED, FREE, MEASURED
+from .noise_model import NoiseModel, second_difference_filter
+from .segments import Segments, cut, facts, split
 from .simulator import Simulator
-from .variables import Seen
+from .variables import RecordScales
 
 
 @dataclass(frozen=True)
@@ -49,20 +49,22 @@ class Scales:
 
 
 @dataclass(frozen=True)
-class View:
+class SegmentedRecords:
     """Records and the windows of each that count."""
 
     records: tuple[Measurement, ...]
-    windows: tuple[Windows, ...]
+    windows: tuple[Segments, ...]
 
-    def shorter(self, factor: int) -> View:
+    def shorter(self, factor: int) -> SegmentedRecords:
         """Return up to `factor` times as many windows over the same samples, none too short."""
         pairs = zip(self.records, self.windows, strict=True)
-        return View(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
+        return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
 
-    def every(self, step: int) -> View:
+    def every(self, step: int) -> SegmentedRecords:
         """Return every `step`-th window."""
-        return View(self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.windows))
+        return SegmentedRecords(
+            self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.windows)
+        )
 
     @property
     def outputs(self) -> list[np.ndarray]:
@@ -71,15 +73,15 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class CandidateFit:
     """A model fitted to the windows to learn from, and (once judged) run over those to be judged by."""
 
     key: str
-    train: Candidate
-    held: Candidate | None = None
+    train: FitResult
+    validation: FitResult | None = None
     extra: int = 0  # parameters beyond the baseline's
     evidence: float = 0.0
-    evidence_held: float = 0.0  # of the windows to be judged by alone
+    evidence_validation: float = 0.0  # of the windows to be judged by alone
     confirmed: bool = False
 
     @property
@@ -88,21 +90,21 @@ class Trial:
         return self.train.model
 
     @property
-    def held_rmse(self) -> float:
+    def validation_rmse(self) -> float:
         """Error over the windows to be judged by; NaN before it was run over them."""
-        return self.held.rmse if self.held is not None else math.nan
+        return self.validation.rmse if self.validation is not None else math.nan
 
     @property
     def residuals(self) -> list[np.ndarray]:
         """Of all windows, as evidence takes them."""
-        held = self.held.residual_pieces if self.held is not None else ()
-        return [*self.train.residual_pieces, *held]
+        validation = self.validation.residual_pieces if self.validation is not None else ()
+        return [*self.train.residual_pieces, *validation]
 
     @property
     def outputs(self) -> list[np.ndarray]:
         """Simulated, of all windows, as evidence takes them."""
-        held = self.held.simulated_pieces if self.held is not None else ()
-        return [*self.train.simulated_pieces, *held]
+        validation = self.validation.simulated_pieces if self.validation is not None else ()
+        return [*self.train.simulated_pieces, *validation]
 
     @property
     def size(self) -> float:
@@ -111,24 +113,29 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
+class SegmentedData:
     """Everything the fits of one diagnosis share: windows of one length, and those of others."""
 
-    train: View
-    held: View
+    train: SegmentedRecords
+    validation: SegmentedRecords
     thin: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
-    seen: Seen  # of effects
-    whole: tuple[View, View] | None = None
+    filtered: RecordScales  # of effects
+    whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
-    colour: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
-    begins: str = FITTED  # how windows begin
+    error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
+    begins: str = FREE  # how windows begin
 
-    def level(self, factor: int) -> Data:
+    def level(self, factor: int) -> SegmentedData:
         """Return the same data in windows `factor` times as many as the longest."""
-        train, held = self.whole or (self.train, self.held)
-        return replace(self, train=train.shorter(factor), held=held.shorter(factor), whole=(train, held))
+        train, validation = self.whole or (self.train, self.validation)
+        return replace(
+            self,
+            train=train.shorter(factor),
+            validation=validation.shorter(factor),
+            whole=(train, validation),
+        )
 
     @property
     def noise(self) -> float:
@@ -136,22 +143,22 @@ class Data:
         return math.sqrt(float(np.mean([facts(r).noise ** 2 for r in self.train.records])))
 
     @property
-    def levels(self) -> list[Data]:
+    def segmentations(self) -> list[SegmentedData]:
         """The same in windows of three lengths, the shortest first."""
         return [self.level(f) for f in LEVELS]
 
     @property
-    def clean(self) -> bool:
+    def noise_free(self) -> bool:
         """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
         return all(derivatives.grain(r.y) < NOISE_FREE * facts(r).spread for r in self.train.records)
 
     @property
-    def forced(self) -> bool:
+    def disturbed(self) -> bool:
         """Whether forces that no model has (friction that wanders) outweigh the noise."""
-        return self.colour is not None
+        return self.error_filter is not None
 
     @property
-    def wandering(self) -> Data:
+    def with_process_noise(self) -> SegmentedData:
         """The same for a machine whose own forces wander.
 
         The slow error that such forces leave would drown all else: what counts are the forces, averaged.
@@ -159,33 +166,36 @@ class Data:
         length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.windows])))
         thin = max(self.thin // 2, 1)
         return replace(
-            self, colour=force_errors(max(thin, round(length / FILTERED), 2)), thin=thin, begins=MEASURED
+            self,
+            error_filter=second_difference_filter(max(thin, round(length / FILTERED), 2)),
+            thin=thin,
+            begins=MEASURED,
         )
 
     @property
-    def brief(self) -> Data:
+    def short_segments(self) -> SegmentedData:
         """The same by position over windows so short that slow forces move nothing far: for parameters alone.
 
         Wandering forces blur parameters least there. What hides in a joint or in bristles is not told: their
         states, fitted anew in every window, pass for it. No limits: models of any rung of a ladder
         begin near.
         """
-        return replace(self.level(BRIEF), colour=None, begins=FITTED, limits={})
+        return replace(self.level(BRIEF), error_filter=None, begins=FREE, limits={})
 
     @property
-    def chained(self) -> Data:
+    def continued(self) -> SegmentedData:
         """The same with hidden states that go on from window to window."""
-        return replace(self, begins=CHAINED)
+        return replace(self, begins=CONTINUED)
 
     @property
-    def sampled(self) -> Data:
+    def sampled(self) -> SegmentedData:
         """The same with every second window to learn from, for a first look."""
         return replace(self, train=self.train.every(2))
 
     @property
-    def fine(self) -> Data:
+    def fine(self) -> SegmentedData:
         """The same at the records' full rate, or as many steps of a longer one as do."""
-        longest = max(len(r) for view in (self.train, self.held) for r in view.records)
+        longest = max(len(r) for view in (self.train, self.validation) for r in view.records)
         return replace(self, thin=min(max(1, round(longest / FULL_SAMPLES)), self.thin), step=self.thin)
 
     def simulator(self, block, record, **keywords) -> Simulator:
@@ -194,7 +204,7 @@ class Data:
 
     def carries(self, block) -> bool:
         """Whether the block has hidden states that go on from window to window."""
-        return any(self.simulator(block, r).chained for r in self.train.records)
+        return any(self.simulator(block, r).continued for r in self.train.records)
 
     def fit(
         self,
@@ -207,24 +217,24 @@ class Data:
         tolerance=1e-3,
         hopeless=math.inf,
         outlook=0,
-    ) -> Candidate:
+    ) -> FitResult:
         """Fit the named parameters over the windows to learn from (or those of `view`)."""
         view = view or self.train
-        return fit_windows(
+        return fit_segments(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0, colour=self.colour,
-            begins=self.begins, hopeless=hopeless, outlook=outlook,
+            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
+            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
         )  # fmt: skip
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
         """Return least and largest values: the model's own, and what the records show of its effects."""
         limits = {}
         for key, effect in block.named_effects.items():
-            for name, span in effect.ranges(self.seen).items():
+            for name, span in effect.ranges(self.filtered).items():
                 limits[f"{key}.{name}"] = span
         return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
-    def moved(self, found: Candidate, iterations=6, tolerance=5e-3, hopeless=math.inf) -> Candidate:
+    def moved(self, found: FitResult, iterations=6, tolerance=5e-3, hopeless=math.inf) -> FitResult:
         """Fit a model found over other windows to these; those that begin at one sample share states."""
         starts = same_begins(found, self.train.windows)
         if sum(map(len, self.train.windows)) > sum(map(len, found.windows)):
@@ -236,32 +246,34 @@ class Data:
             hopeless=hopeless,
         )  # fmt: skip
 
-    def judged(self, tried: Trial) -> Trial:
+    def validate(self, tried: CandidateFit) -> CandidateFit:
         """Run a fitted model over the windows to be judged by, from initial states of their own."""
-        return replace(tried, held=self._ran(tried.block, "held"))
+        return replace(tried, validation=self._ran(tried.block, "validation"))
 
     def errors(self, model) -> tuple[float, float]:
         """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
-        return self._ran(model, "train").nrmse, self._ran(model, "held").nrmse
+        return self._ran(model, "train").nrmse, self._ran(model, "validation").nrmse
 
-    def _ran(self, model, name) -> Candidate:
+    def _ran(self, model, name) -> FitResult:
         """Fit the initial states alone: short windows first, found without fail; the others begin there."""
         rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
         short = getattr(self.level(SHORTEST), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
-        if name == "held" and view.records is not self.train.records:
-            near = rephased(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
+        if name == "validation" and view.records is not self.train.records:
+            near = reestimated_per_record(
+                near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
+            )
             model = near.model
         near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
         return self.fit(model, (), view=view, starts=near.starts, iterations=1)
 
 
-def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] = ()) -> Data:
+def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
     """Cut records into windows; without records held out, every third ninth of each is."""
     records = tuple(records)
-    if held:
-        learn = View(records, tuple(cut(r, _count(r)) for r in records))
-        judge = View(tuple(held), tuple(cut(r, _count(r)) for r in held))
+    if validation:
+        learn = SegmentedRecords(records, tuple(cut(r, _count(r)) for r in records))
+        judge = SegmentedRecords(tuple(validation), tuple(cut(r, _count(r)) for r in validation))
     else:
         whole = [cut(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
         third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
@@ -270,20 +282,20 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
                 "diagnose needs records of at least 180 samples where none is held out; "
                 f"got {min(map(len, records))}. Give holdout=, or a longer record."
             )
-        learn = View(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
-        judge = View(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+        learn = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
+        judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
-    while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
+    while thin > 1 and any(_rough(r, thin) for r in (*records, *validation)):
         thin //= 2
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = _scales(block, records)
-    seen = Seen(
+    seen = RecordScales(
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
     )  # fmt: skip
-    return Data(learn, judge, thin, scales, limits, seen)
+    return SegmentedData(learn, judge, thin, scales, limits, seen)
 
 
 def _within(own, shown) -> tuple[float, float]:
@@ -316,23 +328,26 @@ def _scales(block, records) -> Scales:
     return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
 
 
-def brief_window(model, records: Sequence[Measurement]) -> float | None:
-    """Return the length [s] of `Data.brief` where forces wander beyond a fitted model; or None.
+def short_segment(model, records: Sequence[Measurement]) -> float | None:
+    """Return the length [s] of `SegmentedData.brief` where forces wander beyond a fitted model; or None.
 
     Not for models of which something is hidden, nor for records too short to tell.
     """
     if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST:
         return None
     data = prepare(model, records, records)
-    near, forced = data.levels[0].fit(model, (), iterations=4, tolerance=2e-2), data.wandering
-    if near.rmse <= PROCESS_NOISE * data.noise or data.clean or forced.carries(model):
+    near, disturbed = (
+        data.segmentations[0].fit(model, (), iterations=4, tolerance=2e-2),
+        data.with_process_noise,
+    )
+    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
         return None
-    windows = forced.brief.train.windows
+    windows = disturbed.short_segments.train.windows
     spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, windows, strict=True)]
     return float(np.median(np.concatenate(spans)))
 
 
-def same_begins(found: Candidate, windows) -> list[np.ndarray]:
+def same_begins(found: FitResult, windows) -> list[np.ndarray]:
     """Return initial states from a fit over other windows: theirs where both begin at one sample, else 0."""
     starts = []
     for old, new, states in zip(found.windows, windows, found.starts, strict=True):
@@ -344,7 +359,7 @@ def same_begins(found: Candidate, windows) -> list[np.ndarray]:
     return starts
 
 
-def carried(simulator: Simulator, windows: Windows, before: Simulator, starts: np.ndarray) -> np.ndarray:
+def carried(simulator: Simulator, windows: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
     """Return one model's initial states as those of another: what the first lacks begins as usual."""
     given = dict(zip(before.nuisances, starts.T, strict=True))
     columns = []
