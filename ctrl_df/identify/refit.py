@@ -45,7 +45,7 @@ def refit(
     start : mapping or None
         Start values other than the model's; the short windows are then left out.
     mode, window
-        As for `ctrl_df.compare`; where forces that no model has (friction that wanders) outweigh the noise of
+        As for `ctrl_df.compare`; where disturbance forces (friction that drifts) outweigh the noise of
         the sensor, "auto" fits over windows of some ten samples, in which slow forces move nothing far, and
         compares over the usual ones.
     robust : bool

@@ -40,12 +40,12 @@ class TimeDataset(Dataset):
         cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
         problem.stage(cut, 1)
         problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
-        return self._comparison(model, problem.windows, problem.nuisance)
+        return self._comparison(model, problem.segments, problem.nuisance)
 
-    def _comparison(self, model, windows, starts, fitted: int = 0) -> Comparison:
+    def _comparison(self, model, segments, starts, fitted: int = 0) -> Comparison:
         """Return the comparison of a model whose initial states in each segment are known already."""
         rows = []
-        for record, w, start in zip(self.records, windows, starts, strict=True):
+        for record, w, start in zip(self.records, segments, starts, strict=True):
             simulated = Simulator(model, record).run(w, None, start, rounded=True)
             rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
         return Comparison(model, tuple(rows))
@@ -58,7 +58,7 @@ class TimeDataset(Dataset):
             model, self.records, names, start, whole=whole, mode=mode, window=window, robust=robust,
             budget=budget,
         )  # fmt: skip
-        comparison = self._comparison(found.model, seen.windows, seen.starts, fitted=len(names))
+        comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
             self.block_of(found.model), found.standard_errors, found.at_bound, blurred(found), doubts(found),
             found.covariance, comparison, found.converged, found.nfev,

@@ -16,7 +16,7 @@ def reestimated_per_record(near: FitResult, fit) -> FitResult:
     near : FitResult
         The model with its initial states fitted.
     fit : callable
-        ``fit(block, names, starts, iterations)`` over the same windows.
+        ``fit(block, names, starts, iterations)`` over the same segments.
     """
     best = near
     for name in [k for k, p in near.model.parameters.items() if p.per_record]:

@@ -19,8 +19,8 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
 
     The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
     H^-1, Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost
-    degrees of freedom are given back. Errors that go on from one of many windows into the next (forces that
-    wander, whose trace in position every fitted start cuts off) are seen from the scores of the windows.
+    degrees of freedom are given back. Errors that go on from one of many segments into the next (forces that
+    wander, whose trace in position every fitted start cuts off) are seen from the scores of the segments.
 
     Returns
     -------
@@ -48,12 +48,12 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     middle = np.zeros_like(h)
     for k, e in enumerate(residual):
         e, columns = problem.weighed(k, e), sensitivity.parameters[k]
-        if problem.error_filter is None and len(problem.windows[k]) >= MANY:
-            scores = np.array([columns[w].T @ e[w] for w in problem.windows[k].slices])
+        if problem.error_filter is None and len(problem.segments[k]) >= MANY:
+            scores = np.array([columns[w].T @ e[w] for w in problem.segments[k].slices])
             middle += _long_run(scores)
             continue
         n = len(e)
-        lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.windows[k])
+        lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.segments[k])
         length = 1 << (n - 1).bit_length()
         transform = np.fft.rfft(columns, length, axis=0)
         omega = np.linspace(0, math.pi, transform.shape[0])
@@ -68,7 +68,7 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
 
 
 def _long_run(scores) -> np.ndarray:
-    """Return the covariance (p, p) of the sum of scores (nw, p) of windows that follow each other."""
+    """Return the covariance (p, p) of the sum of scores (nw, p) of segments that follow each other."""
     n = len(scores)
     reach, total = round(2 * n ** (1 / 3)), scores.T @ scores
     for lag in range(1, reach + 1):

@@ -1,4 +1,4 @@
-"""Fit a model to records: stages from short windows and a thinned input to whole ones at full rate."""
+"""Fit a model to records: stages from short segments and a thinned input to whole ones at full rate."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class FitResult:
         Natural scale of each parameter.
     starts : list of (nw, ns) array
         Initial states, as corrections (see `Simulator.run`).
-    windows : list of Windows
+    segments : list of Windows
         Where the model was started anew.
     linear : callable or None
         Works out `sensitivity`, once it is asked for.
@@ -81,7 +81,7 @@ class FitResult:
     null: list
     scale: np.ndarray
     starts: list
-    windows: list
+    segments: list
     linear: Callable[[], OutputSensitivity] | None = field(repr=False, default=None)
 
     @cached_property
@@ -95,7 +95,7 @@ class FitResult:
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
-        """The residual as evidence takes it: of every record, or every window where errors are of forces."""
+        """The residual as evidence takes it: of every record, or every segment where errors are of forces."""
         return self.by_segment(self.residual) if self.error_filter is not None else list(self.residual)
 
     @property
@@ -104,8 +104,8 @@ class FitResult:
         return self.by_segment(self.simulated) if self.error_filter is not None else list(self.simulated)
 
     def by_segment(self, signals) -> list[np.ndarray]:
-        """Return signals, one a record, window by window."""
-        return [x[where] for w, x in zip(self.windows, signals, strict=True) for where in w.slices]
+        """Return signals, one a record, segment by segment."""
+        return [x[where] for w, x in zip(self.segments, signals, strict=True) for where in w.slices]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -121,7 +121,7 @@ class FitResult:
 
 
 def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
-    """Return per record the length of window [s] that `mode` means; None: the whole record."""
+    """Return per record the length of segment [s] that `mode` means; None: the whole record."""
     if mode not in MODES:
         raise ValueError(f"mode must be one of {', '.join(MODES)}; got {mode!r}.")
     if window is not None and not window > 0:
@@ -177,17 +177,17 @@ def fit_records(
     polish : int
         Iterations at full rate at the end; 0 leaves the fit at the thinned input.
     coarse : bool or None
-        Whether to begin with short windows, which converge from far off; None: unless `start` is given.
+        Whether to begin with short segments, which converge from far off; None: unless `start` is given.
     robust : bool
         Huber's loss beyond four times the median deviation.
     starts : sequence of arrays or None
-        Initial states of an earlier fit with the same windows, to begin with.
+        Initial states of an earlier fit with the same segments, to begin with.
     tolerance : float
         Relative decrease of the cost that is not worth another iteration.
     central : bool
         Whether the last Jacobian is by central differences.
     iterations : int
-        Bound on the iterations over the full windows.
+        Bound on the iterations over the full segments.
     """
     records = list(records)
     first = Simulator(model, records[0])
@@ -210,7 +210,7 @@ def fit_records(
     problem.stage(_cut(records, lengths), thin if polish else max(thin, 1), starts)
     theta = problem.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and thin > 1:
-        problem.stage(problem.windows, 1, problem.nuisance)
+        problem.stage(problem.segments, 1, problem.nuisance)
         theta = problem.solve(theta, iterations=polish, tolerance=tolerance, robust=robust)
     return _candidate(problem, theta, central)
 
@@ -218,7 +218,7 @@ def fit_records(
 def fit_segments(
     model,
     records: Sequence[Measurement],
-    windows: Sequence[Segments],
+    segments: Sequence[Segments],
     names: Sequence[str],
     *,
     thin: int = 4,
@@ -233,12 +233,12 @@ def fit_segments(
     hopeless: float = math.inf,
     outlook: int = 0,
 ) -> FitResult:
-    """Fit the named parameters over given windows in one stage.
+    """Fit the named parameters over given segments in one stage.
 
     Parameters
     ----------
     model : block
-    records, windows : sequences
+    records, segments : sequences
         Records and the parts of each that count.
     names : sequence of str
         Parameters to move; an empty one fits the initial states alone.
@@ -255,7 +255,7 @@ def fit_segments(
     error_filter : NoiseModel or None
         The `second_difference_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
-        How windows begin: `initial_states.FITTED`, `CONTINUED` or `MEASURED`.
+        How segments begin: `initial_states.FITTED`, `CONTINUED` or `MEASURED`.
     hopeless : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
@@ -267,7 +267,7 @@ def fit_segments(
     Candidate
     """
     problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
-    problem.stage(list(windows), thin, starts)
+    problem.stage(list(segments), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)
     if not errors or problem.slopes is None or not names:
@@ -282,7 +282,7 @@ def _cut(records, lengths) -> list[Segments]:
 
 
 def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
-    """Return the lengths of windows of the stages before the last, shortest first.
+    """Return the lengths of segments of the stages before the last, shortest first.
 
     Over half a stroke an error of a parameter has not grown beyond what its slope tells. An elastic joint
     rings faster than the drive turns: there a few periods of it come first, then more of them.
@@ -348,6 +348,6 @@ def _outcome(problem: Problem, theta, covariance, null) -> FitResult:
         null=null,
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
         starts=problem.nuisance,
-        windows=problem.windows,
+        segments=problem.segments,
         linear=problem.sensitivity if problem.slopes is not None and problem.names else None,
     )

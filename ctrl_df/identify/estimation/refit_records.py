@@ -1,4 +1,4 @@
-"""A refit to records: short windows first, restarted where the cost is rough, then those that blur least."""
+"""A refit to records: short segments first, then those that blur least, restarted where minima are many."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
 from .fit import FitResult, fit_records, fit_segments
-from .multistart import restarted, rough
+from .multistart import nonsmooth_names, restarted
 from .segmented import short_segment
 from .simulator import Simulator
 from .variables import step_of_sensor
@@ -20,7 +20,7 @@ from .variables import step_of_sensor
 def refit_records(
     model, records, names, start, *, whole, mode, window, robust, budget
 ) -> tuple[FitResult, FitResult]:
-    """Return the fit, and the one whose windows and initial states the comparison is to show.
+    """Return the fit, and the one whose segments and initial states the comparison is to show.
 
     Parameters
     ----------
@@ -45,29 +45,29 @@ def refit_records(
         if brief is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
             settings["window"] = brief
-            # from the start again: longer windows may have left the right valley (of a ripple, say)
+            # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=40, **settings)
-    if rough(found):
-        better = restarted(found, _Beside(records, found.windows), rough(found))
+    if nonsmooth_names(found):
+        better = restarted(found, _Beside(records, found.segments), nonsmooth_names(found))
         if better is not found:
             found = fit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
             )
     found = _with_step(found, records, names, whole)
-    # a model that errs over brief windows of its own fit would look better than it is
+    # a model that errs over brief segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
 
 
 class _Beside:
-    """Fits over the windows of a refit, at the full rate."""
+    """Fits over the segments of a refit, at the full rate."""
 
-    def __init__(self, records, windows):
-        self.records, self.windows = records, windows
+    def __init__(self, records, segments):
+        self.records, self.segments = records, segments
 
     def __call__(self, model, names, *, starts, iterations, hopeless) -> FitResult:
         return fit_segments(
-            model, self.records, self.windows, names, thin=1, starts=starts, iterations=iterations,
+            model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
             hopeless=hopeless,
         )  # fmt: skip
 

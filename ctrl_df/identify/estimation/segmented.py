@@ -1,4 +1,4 @@
-"""The data of a diagnosis, made ready for many fits: windows to learn from, windows to be judged by."""
+"""The data of a diagnosis, made ready for many fits: segments to fit, segments to validate on."""
 
 from __future__ import annotations
 
@@ -50,38 +50,38 @@ class Scales:
 
 @dataclass(frozen=True)
 class SegmentedRecords:
-    """Records and the windows of each that count."""
+    """Records and the segments of each that count."""
 
     records: tuple[Measurement, ...]
-    windows: tuple[Segments, ...]
+    segments: tuple[Segments, ...]
 
     def shorter(self, factor: int) -> SegmentedRecords:
-        """Return up to `factor` times as many windows over the same samples, none too short."""
-        pairs = zip(self.records, self.windows, strict=True)
+        """Return up to `factor` times as many segments over the same samples, none too short."""
+        pairs = zip(self.records, self.segments, strict=True)
         return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
 
     def every(self, step: int) -> SegmentedRecords:
-        """Return every `step`-th window."""
+        """Return every `step`-th segment."""
         return SegmentedRecords(
-            self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.windows)
+            self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.segments)
         )
 
     @property
     def outputs(self) -> list[np.ndarray]:
-        """Measured outputs within the windows."""
-        return [r.y[w.samples] for r, w in zip(self.records, self.windows, strict=True)]
+        """Measured outputs within the segments."""
+        return [r.y[w.samples] for r, w in zip(self.records, self.segments, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
 class CandidateFit:
-    """A model fitted to the windows to learn from, and (once judged) run over those to be judged by."""
+    """A model fitted to the segments fitted, and (once validated) run over those held out."""
 
     key: str
     train: FitResult
     validation: FitResult | None = None
     extra: int = 0  # parameters beyond the baseline's
     evidence: float = 0.0
-    evidence_validation: float = 0.0  # of the windows to be judged by alone
+    evidence_validation: float = 0.0  # of the segments held out alone
     confirmed: bool = False
 
     @property
@@ -91,18 +91,18 @@ class CandidateFit:
 
     @property
     def validation_rmse(self) -> float:
-        """Error over the windows to be judged by; NaN before it was run over them."""
+        """Error over the segments to validate on; NaN before it was run over them."""
         return self.validation.rmse if self.validation is not None else math.nan
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """Of all windows, as evidence takes them."""
+        """Of all segments, as evidence takes them."""
         validation = self.validation.residual_pieces if self.validation is not None else ()
         return [*self.train.residual_pieces, *validation]
 
     @property
     def outputs(self) -> list[np.ndarray]:
-        """Simulated, of all windows, as evidence takes them."""
+        """Simulated, of all segments, as evidence takes them."""
         validation = self.validation.simulated_pieces if self.validation is not None else ()
         return [*self.train.simulated_pieces, *validation]
 
@@ -114,7 +114,7 @@ class CandidateFit:
 
 @dataclass(frozen=True, eq=False)
 class SegmentedData:
-    """Everything the fits of one diagnosis share: windows of one length, and those of others."""
+    """Everything the fits of one diagnosis share: segments of one length, and those of others."""
 
     train: SegmentedRecords
     validation: SegmentedRecords
@@ -125,10 +125,10 @@ class SegmentedData:
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
-    begins: str = FREE  # how windows begin
+    begins: str = FREE  # how segments begin
 
     def level(self, factor: int) -> SegmentedData:
-        """Return the same data in windows `factor` times as many as the longest."""
+        """Return the same data in segments `factor` times as many as the longest."""
         train, validation = self.whole or (self.train, self.validation)
         return replace(
             self,
@@ -139,12 +139,12 @@ class SegmentedData:
 
     @property
     def noise(self) -> float:
-        """Noise floor of the records to learn from."""
+        """Noise floor of the records fitted."""
         return math.sqrt(float(np.mean([facts(r).noise ** 2 for r in self.train.records])))
 
     @property
     def segmentations(self) -> list[SegmentedData]:
-        """The same in windows of three lengths, the shortest first."""
+        """The same in segments of three lengths, the shortest first."""
         return [self.level(f) for f in LEVELS]
 
     @property
@@ -154,16 +154,16 @@ class SegmentedData:
 
     @property
     def disturbed(self) -> bool:
-        """Whether forces that no model has (friction that wanders) outweigh the noise."""
+        """Whether disturbance forces (friction that drifts) outweigh the noise."""
         return self.error_filter is not None
 
     @property
     def with_process_noise(self) -> SegmentedData:
-        """The same for a machine whose own forces wander.
+        """The same for a machine with disturbance forces.
 
         The slow error that such forces leave would drown all else: what counts are the forces, averaged.
         """
-        length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.windows])))
+        length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.segments])))
         thin = max(self.thin // 2, 1)
         return replace(
             self,
@@ -174,22 +174,22 @@ class SegmentedData:
 
     @property
     def short_segments(self) -> SegmentedData:
-        """The same by position over windows so short that slow forces move nothing far: for parameters alone.
+        """The same by position over segments in which slow forces move nothing far: for parameters alone.
 
-        Wandering forces blur parameters least there. What hides in a joint or in bristles is not told: their
-        states, fitted anew in every window, pass for it. No limits: models of any rung of a ladder
+        Disturbance forces blur parameters least there. What hides in a joint or in bristles is not told:
+        their states, fitted anew in every segment, pass for it. No limits: models of any rung of a ladder
         begin near.
         """
         return replace(self.level(BRIEF), error_filter=None, begins=FREE, limits={})
 
     @property
     def continued(self) -> SegmentedData:
-        """The same with hidden states that go on from window to window."""
+        """The same with hidden states that go on from segment to segment."""
         return replace(self, begins=CONTINUED)
 
     @property
     def sampled(self) -> SegmentedData:
-        """The same with every second window to learn from, for a first look."""
+        """The same with every second segment to fit, for a first look."""
         return replace(self, train=self.train.every(2))
 
     @property
@@ -203,7 +203,7 @@ class SegmentedData:
         return Simulator(block, record, thin=self.thin, begins=self.begins, **keywords)
 
     def carries(self, block) -> bool:
-        """Whether the block has hidden states that go on from window to window."""
+        """Whether the block has hidden states that go on from segment to segment."""
         return any(self.simulator(block, r).continued for r in self.train.records)
 
     def fit(
@@ -218,10 +218,10 @@ class SegmentedData:
         hopeless=math.inf,
         outlook=0,
     ) -> FitResult:
-        """Fit the named parameters over the windows to learn from (or those of `view`)."""
+        """Fit the named parameters over the segments fitted (or those of `view`)."""
         view = view or self.train
         return fit_segments(
-            block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
+            block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
             error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
         )  # fmt: skip
@@ -235,10 +235,10 @@ class SegmentedData:
         return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
     def moved(self, found: FitResult, iterations=6, tolerance=5e-3, hopeless=math.inf) -> FitResult:
-        """Fit a model found over other windows to these; those that begin at one sample share states."""
-        starts = same_begins(found, self.train.windows)
-        if sum(map(len, self.train.windows)) > sum(map(len, found.windows)):
-            # The initial states of new windows first: parameters would bend to make up for them.
+        """Fit a model found over other segments to these; those that begin at one sample share states."""
+        starts = same_begins(found, self.train.segments)
+        if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
+            # The initial states of new segments first: parameters would bend to make up for them.
             states = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2, hopeless=hopeless)
             starts = states.starts
         return self.fit(
@@ -247,15 +247,15 @@ class SegmentedData:
         )  # fmt: skip
 
     def validate(self, tried: CandidateFit) -> CandidateFit:
-        """Run a fitted model over the windows to be judged by, from initial states of their own."""
+        """Run a fitted model over the segments to validate on, from initial states of their own."""
         return replace(tried, validation=self._ran(tried.block, "validation"))
 
     def errors(self, model) -> tuple[float, float]:
-        """Return nrmse of a model as it is, over the windows to learn from and over those to be judged by."""
+        """Return nrmse of a model as it is, over the segments fitted and those held out."""
         return self._ran(model, "train").nrmse, self._ran(model, "validation").nrmse
 
     def _ran(self, model, name) -> FitResult:
-        """Fit the initial states alone: short windows first, found without fail; the others begin there."""
+        """Fit the initial states alone: short segments first, found without fail; the others begin there."""
         rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
         short = getattr(self.level(SHORTEST), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
@@ -264,12 +264,12 @@ class SegmentedData:
                 near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
             )
             model = near.model
-        near = rough.fit(model, (), view=view, starts=same_begins(near, view.windows), iterations=3)
+        near = rough.fit(model, (), view=view, starts=same_begins(near, view.segments), iterations=3)
         return self.fit(model, (), view=view, starts=near.starts, iterations=1)
 
 
 def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
-    """Cut records into windows; without records held out, every third ninth of each is."""
+    """Cut records into segments; without records held out, every third ninth of each is."""
     records = tuple(records)
     if validation:
         learn = SegmentedRecords(records, tuple(cut(r, _count(r)) for r in records))
@@ -315,7 +315,7 @@ def _rough(record, thin: int) -> bool:
 
 
 def _count(record) -> int:
-    """Return the number of windows: two to-and-fro motions and a half each, 60 samples at least."""
+    """Return the number of segments: two to-and-fro motions and a half each, 60 samples at least."""
     known, n = facts(record), len(record)
     return int(min(max(round(record.duration / max(2.5 * known.swing, 60 * record.duration / n)), 4), 40))
 
@@ -329,7 +329,7 @@ def _scales(block, records) -> Scales:
 
 
 def short_segment(model, records: Sequence[Measurement]) -> float | None:
-    """Return the length [s] of `SegmentedData.brief` where forces wander beyond a fitted model; or None.
+    """Return the length [s] of `SegmentedData.short_segments` where disturbance forces prevail; or None.
 
     Not for models of which something is hidden, nor for records too short to tell.
     """
@@ -342,15 +342,15 @@ def short_segment(model, records: Sequence[Measurement]) -> float | None:
     )
     if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
         return None
-    windows = disturbed.short_segments.train.windows
-    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, windows, strict=True)]
+    segments = disturbed.short_segments.train.segments
+    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]
     return float(np.median(np.concatenate(spans)))
 
 
-def same_begins(found: FitResult, windows) -> list[np.ndarray]:
-    """Return initial states from a fit over other windows: theirs where both begin at one sample, else 0."""
+def same_begins(found: FitResult, segments) -> list[np.ndarray]:
+    """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
     starts = []
-    for old, new, states in zip(found.windows, windows, found.starts, strict=True):
+    for old, new, states in zip(found.segments, segments, found.starts, strict=True):
         at = np.searchsorted(old.begins, new.begins)
         same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
         rows = np.zeros((len(new), states.shape[1]))
@@ -359,11 +359,11 @@ def same_begins(found: FitResult, windows) -> list[np.ndarray]:
     return starts
 
 
-def carried(simulator: Simulator, windows: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
+def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
     """Return one model's initial states as those of another: what the first lacks begins as usual."""
     given = dict(zip(before.nuisances, starts.T, strict=True))
     columns = []
     for name in simulator.nuisances:
-        usual = np.where(windows.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(windows))
+        usual = np.where(segments.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(segments))
         columns.append(given.get(name, usual))
-    return np.array(columns).T.reshape(len(windows), len(columns))
+    return np.array(columns).T.reshape(len(segments), len(columns))

@@ -67,27 +67,27 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
             ]
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
-    windows, record = sensitivity.pieces, data.train.records[0]
+    segments, record = sensitivity.pieces, data.train.records[0]
     units = {"x": record.output_unit, "f": record.input_unit}
     if data.disturbed:
         # the residual is of forces here, as the fits see it
-        noise = noise_model([residual[w] for w in windows], max_order=12)
-    found = [_regressed(k, m, s, residual, noise, windows, units) for k, m, s in tables]
+        noise = noise_model([residual[w] for w in segments], max_order=12)
+    found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = noise_model([left[w] for w in windows], max_order=12)
-        found = [_regressed(k, m, s, residual, noise, windows, units) for k, m, s in tables]
+        noise = noise_model([left[w] for w in segments], max_order=12)
+        found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
         best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
     return list(best.values())
 
 
-def _regressed(kind, matrix, spans, residual, noise, windows, units) -> tuple[MissingForce, np.ndarray]:
+def _regressed(kind, matrix, spans, residual, noise, segments, units) -> tuple[MissingForce, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain."""
-    white, filtered = noise.filtered(residual, windows), noise.filtered(matrix, windows)
+    white, filtered = noise.filtered(residual, segments), noise.filtered(matrix, segments)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
     left = white - filtered @ weights
     # a frequency is found by looking at many
@@ -120,15 +120,15 @@ class _Scene:
         self.size = TEST_FORCE * data.scales.force
         self.motion = [
             _motion(r, w, y)
-            for r, w, y in zip(self.view.records, self.view.windows, tried.train.simulated, strict=True)
+            for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
         ]
 
     def response(self, shape) -> list[np.ndarray]:
         """Return the change of output by a force: `shape(motion)` (n,) of one record, of order one."""
         changes = []
-        for record, windows, start, y, motion in zip(
+        for record, segments, start, y, motion in zip(
             self.view.records,
-            self.view.windows,
+            self.view.segments,
             self.fit.starts,
             self.fit.simulated,
             self.motion,
@@ -136,7 +136,7 @@ class _Scene:
         ):
             force = record.u + self.size * shape(motion)
             simulator = self.data.simulator(self.fit.model, record, force=force)
-            changes.append((simulator.run(windows, None, start) - y) / self.size)
+            changes.append((simulator.run(segments, None, start) - y) / self.size)
         return changes
 
     def kinds(self):
@@ -177,8 +177,8 @@ class _Scene:
         return float(np.argmax(ratio)) / (4 * len(e) * dt)
 
 
-def _motion(record, windows, y):
-    inside = windows.samples
+def _motion(record, segments, y):
+    inside = segments.samples
     x = np.array(record.y, dtype=float)
     x[inside] = y
     v = np.gradient(_smooth(x), record.t)

@@ -288,7 +288,7 @@ def _bands(t, r, signals) -> list[Region]:
         widths = sum(bands[j][1] - bands[j][0] for j in near)
         # An excited line of the input shows in every residual: it must also stand out beside the signals.
         ratio = min(values[i] / _background(values, near) for values in (density, *relative))
-        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann window halves the independent lines
+        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann segment halves the independent lines
         share = float(power[a:b].sum()) / total
         span = (float(f[a]), float(f[b - 1]))
         expected = min(share, _background(density, near) * (b - a) / total)

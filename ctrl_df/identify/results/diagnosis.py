@@ -93,7 +93,7 @@ class Diagnosis:
     noise, structure : float
         Of the best candidate's residual: rms of noise and of what the model still misses [unit of `measure`].
     measure : {'output', 'acceleration', 'N'}
-        What all errors are of: the output, or (where forces that no model has, such as friction that wanders,
+        What all errors are of: the output, or (where disturbance forces, such as friction that drifts,
         outweigh the noise of the sensor) its acceleration, averaged over some samples.
     remains : str
         Of 'unknown' over time: how much the library does not explain, and where, in sentences.

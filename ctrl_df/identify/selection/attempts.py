@@ -38,7 +38,7 @@ class Attempt:
     names : tuple of str
         Parameters that it moves.
     data : SegmentedData
-        The windows it is in.
+        The segments it is in.
     steps, tolerance : int, float
         Iterations left in these, and when to end them.
     extra : int
@@ -70,7 +70,7 @@ class Attempt:
 
     @property
     def multimodal(self) -> bool:
-        """Whether fits of its effect begin in short windows."""
+        """Whether fits of its effect begin in short segments."""
         return self.block.effects[-1].multimodal
 
     @property
@@ -83,14 +83,14 @@ class Attempt:
 def tried(
     classes, screen: Screen, shortest: SegmentedData, free, nominal, executor=None
 ) -> list[CandidateFit]:
-    """Return every effect that can be added, fitted over the windows of the screen.
+    """Return every effect that can be added, fitted over the segments of the screen.
 
     Parameters
     ----------
     classes : sequence of effect classes
     screen : Screen
     shortest : SegmentedData
-        In short windows, where fits of effects with many valleys begin.
+        In short segments, where fits of effects with many minima begin.
     free : tuple of str
         Parameters of the baseline that are refitted.
     nominal : mapping
@@ -118,7 +118,7 @@ def tried(
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
     kept = _best(begun, KEPT)
-    # few steps from where the user begins tell little: the baseline may have ended in another valley
+    # few steps from where the user begins tell little: the baseline may have ended in another minimum
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
     ahead = _best(begun, 1)[:2]
@@ -188,7 +188,7 @@ def _from(start: Start, screen: Screen, shortest: SegmentedData, free) -> Attemp
     added = own_names(block)
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
     if start.effect.multimodal:
-        # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
+        # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
         bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
         steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
         return Attempt(key, block, names, shortest, steps, tolerance, len(added))
@@ -212,7 +212,7 @@ def _on(attempt: Attempt, steps, hopeless) -> Attempt:
 
 
 def _finish(job) -> CandidateFit:
-    """Take the steps that are left, then those over the windows of the screen.
+    """Take the steps that are left, then those over the segments of the screen.
 
     Where they would not lead to an error below `hopeless` at the pace of the last ones they are left out.
     """

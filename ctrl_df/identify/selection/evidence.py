@@ -27,7 +27,7 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     judged = []
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
-        # hardly more than starts was fitted to the windows to be judged by: their gain also stands alone
+        # hardly more than starts was fitted to the segments to validate on: their gain also stands alone
         price = 0.5 * t.extra * math.log(sum(n for _, n in before))
         judged.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
     return sorted(judged, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
@@ -45,13 +45,13 @@ def _step(tried: CandidateFit) -> float:
 
 
 def _powers(tried: CandidateFit, noise: NoiseModel):
-    """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
+    """Return power and number of whitened residuals of the segments fitted, and of those held out."""
     validation = tried.validation.residual_pieces if tried.validation is not None else []
     return whitened_power(tried.train.residual_pieces, noise), whitened_power(validation, noise)
 
 
 def _gains(before, after) -> tuple[float, float]:
-    """Return the log likelihood ratio of all windows, and of those to be judged by."""
+    """Return the log likelihood ratio of all segments, and of those held out."""
     (fitted, n), (validation, n_held) = before
     (fitted_t, _), (held_t, _) = after
     gain_held = 0.5 * n_held * math.log(validation / held_t) if n_held else 0.0

@@ -21,8 +21,8 @@ def remainder(
 ) -> Remainder:
     """Return what the best model leaves.
 
-    Structure shows on the windows fitted by what free forces explain, and on those held out by an error
-    beyond the noise: that of the fitted windows, times what the records' own noise floors say of the two.
+    Structure shows on the segments fitted by what free forces explain, and on those held out by an error
+    beyond the noise: that of the fitted segments, times what the records' own noise floors say of the two.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def remainder(
     telling = bool(missed) and missed[0].evidence > significant
     structure = missed[0].rms if telling else 0.0
     if not rounded and not data.disturbed:
-        # what the right model misses over long windows it misses over short ones
+        # what the right model misses over long segments it misses over short ones
         structure = max(structure, math.sqrt(max(best.train.rmse**2 - (GROWN * floor) ** 2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, 1e-300))
@@ -97,15 +97,15 @@ def _sentences(left: Remainder, missed: list[MissingForce], where, measure: str)
 def find_regions(tried, view):
     """Return the regions of error of a fitted candidate on its longest record."""
     i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
-    record, inside, residual = view.records[i], view.windows[i].samples, np.asarray(tried.train.residual[i])
+    record, inside, residual = view.records[i], view.segments[i].samples, np.asarray(tried.train.residual[i])
     if not np.all(np.isfinite(residual)):
         return None
     error_filter = tried.train.error_filter
     if error_filter is not None:
-        windows = view.windows[i].slices
+        segments = view.segments[i].slices
         inside, residual = (
-            inside[error_filter.rows(windows)],
-            error_filter.filtered(residual, windows) / tried.train.unit,
+            inside[error_filter.rows(segments)],
+            error_filter.filtered(residual, segments) / tried.train.unit,
         )
     return error_regions(
         record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],

@@ -51,7 +51,7 @@ class StructureSearch(Search):
     block : Mechanism
         The model as it stands.
     records, held : sequences of Measurement
-        To learn from; to be judged by (may be empty).
+        To fit; to validate on (may be empty).
     free : tuple of str
         Parameters of the model that may be refitted.
     """
@@ -67,7 +67,7 @@ class StructureSearch(Search):
         self._look_at(data, 1)
         self.base = self._baseline(block)
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
-        # friction that wanders drowns all else over longer windows
+        # a disturbance force drowns all else over longer segments
         near = self.segmentations[0].moved(self.base.train)
         if near.rmse > PROCESS_NOISE * data.noise and not data.noise_free:
             self._look_at(self.segmentations[0].with_process_noise, 0)
@@ -112,7 +112,7 @@ class StructureSearch(Search):
         base, found = self._look(classes, executor, self.data.sampled)
         there = base.rmse if self.data.disturbed else longest.moved(base).rmse
         if there > GROWTH * base.rmse:
-            # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
+            # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
             moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
@@ -122,9 +122,9 @@ class StructureSearch(Search):
         return found
 
     def _over_long_windows(self, here, there, found) -> list[CandidateFit] | None:
-        """Return the best by error moved to the longest windows; None where they explain enough there.
+        """Return the best by error moved to the longest segments; None where they explain enough there.
 
-        `here`, `there`: error of the baseline where the trials were fitted, and over the longest windows.
+        `here`, `there`: error of the baseline where the trials were fitted, and over the longest segments.
         """
         if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
             return None
@@ -135,7 +135,7 @@ class StructureSearch(Search):
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
     def _look(self, classes, executor, data: SegmentedData):
-        """Fit every effect over one set of windows; return the baseline there and the effects, best first."""
+        """Fit every effect over one set of segments; return baseline and effects there, best first."""
         base = data.moved(self.base.train, 3)
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
@@ -156,22 +156,22 @@ class StructureSearch(Search):
     def confirm(self, found) -> list[CandidateFit]:
         """Refit baseline and best candidates at the full rate; return these candidates, best first.
 
-        The windows are of the length that suits these data (`_longest_coherent`).
+        The segments are of the length that suits these data (`_longest_coherent`).
         """
-        # Wandering forces let the first look tell little.
+        # Disturbance forces let the first look tell little.
         found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.disturbed else _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         self.floor = floor
         levels, at = list(self.segmentations), _longest_coherent(stages)
         if at == 0 and not self.data.disturbed:
-            # Longer windows show what no candidate explains: hidden states, fitted anew in many short ones,
+            # Longer segments show what no candidate explains: hidden states, fitted anew in many short ones,
             # would pass for it.
             levels[0] = levels[0].continued
             short = levels[0]
             stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
             at = _longest_coherent(stages)
         if found and rounds(found[0]) and not self.data.disturbed:
-            # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
+            # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
             at = len(stages) - 1
         self.data = levels[at]
         fine = self.data.fine
@@ -185,7 +185,7 @@ class StructureSearch(Search):
         if not chosen:
             return []
         chosen = self._again(chosen, chosen[:1])
-        # Near equals are told apart by fits that have come to an end, and in the right valley.
+        # Near equals are told apart by fits that have come to an end, and in the right minimum.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
         least = min(t.train.rmse for t in chosen)
         close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
@@ -198,11 +198,11 @@ class StructureSearch(Search):
         return chosen
 
     def _stages(self, fits):
-        """Return the fits in windows of every length that may judge, the shortest first, and their floor.
+        """Return the fits in segments of every length that may judge, the shortest first, and their floor.
 
-        The floor is the error that a fit can come down to at best: over short windows nearly every model
-        follows. Where forces wander, the shortest windows alone may judge. None stands for fits without a
-        chance.
+        The floor is the error that a fit can come down to at best: over short segments nearly every model
+        follows. Where disturbance forces prevail the shortest segments alone may judge. None stands for fits
+        without a chance.
         """
         shortest, middle, longest = self.segmentations
         short = side_by_side(shortest.moved, fits)
@@ -213,9 +213,9 @@ class StructureSearch(Search):
         return [short, near, self._stage(longest, near, near, floor)], floor
 
     def _stage(self, data: SegmentedData, fits, before, floor) -> list[FitResult | None]:
-        """Move the baseline and the best candidate to other windows, then those with a chance against them.
+        """Move the baseline and the best candidate to other segments, then those with a chance against them.
 
-        `before`: the fits in windows that these are made of: no fit over longer ones can err less than that
+        `before`: the fits in segments that these are made of: no fit over longer ones can err less than that
         over the parts of them.
         """
         errors = [math.inf if f is None else f.rmse for f in before]
@@ -234,7 +234,7 @@ class StructureSearch(Search):
         return found
 
     def _ended(self, tried: CandidateFit, exactly: bool, floor: float, least: float) -> CandidateFit:
-        """Return a candidate in its best valley, unless nothing better is possible.
+        """Return a candidate in its best minimum, unless nothing better is possible.
 
         `exactly`: iterated to the end first. `least`: error of the best of all [m].
         """
@@ -276,7 +276,7 @@ class StructureSearch(Search):
     # --- what it comes to -----------------------------------------------------------------------------
 
     def errors(self, judged):
-        """Return nrmse over the windows fitted, and over those held out."""
+        """Return nrmse over the segments fitted, and over those held out."""
         return judged.train.nrmse, judged.validation.nrmse if judged.validation is not None else math.nan
 
     def standard_errors(self, judged):
@@ -299,7 +299,7 @@ class StructureSearch(Search):
         )  # fmt: skip
 
     def fitted(self, block, names, iterations):
-        """Return a block with these parameters fitted, and run over the windows held out."""
+        """Return a block with these parameters fitted, and run over the segments held out."""
         found = self.data.fit(block, names, iterations=iterations)
         return self.data.validate(
             CandidateFit(block.newest if block.effects else "", found, extra=len(names))
@@ -310,9 +310,9 @@ class StructureSearch(Search):
         return ranked(base, judged)[0]
 
     def final(self, models, kept):
-        """Return the models with their errors at the full rate, over the windows that the last one bears.
+        """Return the models with their errors at the full rate, over the segments that the last one bears.
 
-        Where disturbance forces blur parameters they are fitted over shorter windows first.
+        Where disturbance forces blur parameters they are fitted over shorter segments first.
         """
         common = self.data.fine
         if common.disturbed:
@@ -351,11 +351,11 @@ def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
 
 
 def _longest_coherent(stages) -> int:
-    """Return the level to judge at: the longest windows over which the best model's error does not grow.
+    """Return the level to judge at: the longest segments over which the best model's error does not grow.
 
-    `stages`: fits per level, short windows first, the baseline's and then the candidates'. Where the
+    `stages`: fits per level, short segments first, the baseline's and then the candidates'. Where the
     best grows with the length (motion that is sensitive to its start, force noise in a real machine, an
-    effect outside the library) short windows are clearer, provided that they show what is missing as well
+    effect outside the library) short segments are clearer, provided that they show what is missing as well
     as long ones do.
     """
     errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]

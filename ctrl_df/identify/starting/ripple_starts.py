@@ -55,8 +55,8 @@ def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, floa
     view, _ = screen.data.whole or (screen.view, None)
     if not all(r.regular for r in view.records):
         return
-    search = RippleSpectrum(view.records, view.windows, [2 * math.pi / length for length in known])
-    # where friction wanders the fit over windows knows the mass better than whitened forces do
+    search = RippleSpectrum(view.records, view.segments, [2 * math.pi / length for length in known])
+    # where friction drifts the fit over segments knows the mass better than whitened forces do
     plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
     for wave in search.best(3):
         weights = (wave.mass, wave.coulomb, wave.viscous)

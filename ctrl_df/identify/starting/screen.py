@@ -33,10 +33,10 @@ class Screen:
     Parameters
     ----------
     base : FitResult
-        The baseline fitted to windows that are short: there even a strong effect changes the output nearly
+        The baseline fitted to segments that are short: there even a strong effect changes the output nearly
         linearly.
     data : SegmentedData
-        In those windows.
+        In those segments.
     """
 
     def __init__(self, base: FitResult, data: SegmentedData):
@@ -93,18 +93,18 @@ class Screen:
         return [
             carried(self.data.simulator(block, r), w, old, start)
             for r, w, old, start in zip(
-                self.view.records, self.view.windows, self.simulators, self.base.starts, strict=True
+                self.view.records, self.view.segments, self.simulators, self.base.starts, strict=True
             )
         ]
 
     def change(self, block) -> list[np.ndarray] | None:
         """Return the change of output from the baseline to `block`; None if it cannot be simulated."""
         change = []
-        for record, windows, start, y in zip(
-            self.view.records, self.view.windows, self.starts(block), self.base.simulated, strict=True
+        for record, segments, start, y in zip(
+            self.view.records, self.view.segments, self.starts(block), self.base.simulated, strict=True
         ):
             simulator = self.data.simulator(block, record)
-            change.append(simulator.run(windows, None, start, rounded=True) - y)
+            change.append(simulator.run(segments, None, start, rounded=True) - y)
         return change if all(np.all(np.isfinite(c)) for c in change) else None
 
 
