@@ -65,8 +65,8 @@ def effect_classes(candidates: Any) -> list[Any]:
     if not given:
         raise ValueError("candidates needs one effect id at least; got none. Leave it out for the library.")
     return [
-        c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c)  # pyright:
-        ignore[reportArgumentType] for c in given
+        c if isinstance(c, type) and issubclass(c, Effect) else effect_class(c)  # pyright: ignore[reportArgumentType]
+        for c in given
     ]
 
 
