@@ -327,14 +327,14 @@ class Measurement:
             for k in ("y", "velocity")
             if getattr(self, k) is not None
         }
-        channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type:
-        ignore[union-attr] held = self.input_hold == "zoh"
+        channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
+        held = self.input_hold == "zoh"
         u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
         return self._with(t=self.t[::factor], u=u, channels=MappingProxyType(channels), **thin)
 
     def _part(self, where, name):
-        channels = MappingProxyType({k: v[where] for k, v in self.channels.items()})  # type:
-        ignore[union-attr] velocity = None if self.velocity is None else self.velocity[where]
+        channels = MappingProxyType({k: v[where] for k, v in self.channels.items()})  # type: ignore[union-attr]
+        velocity = None if self.velocity is None else self.velocity[where]
         return self._with(
             t=self.t[where], u=self.u[where], y=self.y[where], velocity=velocity, channels=channels, name=name
         )

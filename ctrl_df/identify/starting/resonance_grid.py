@@ -1,7 +1,8 @@
 """Where an elastic joint may resonate: stiffness and share of load tried over the plane, starts fitted.
 
 A joint is no small change of the model, and over short segments its free states follow anything: descents
-that begin a factor away from the resonance end in other minima. Its frequency is what the cost knows most about.
+that begin a factor away from the resonance end in other minima. Its frequency is what the cost knows most
+about.
 """
 
 from __future__ import annotations
