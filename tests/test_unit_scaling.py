@@ -40,8 +40,7 @@ CASES = [(e, s) for e in rigs.ORDER for s in SCALES if e not in OTHERS]
 
 
 @pytest.mark.parametrize(
-    ("hidden", "scale"),
-    [pytest.param(e, s, marks=() if e in FAST and s != SCALES[0] else pytest.mark.slow) for e, s in CASES],
+    ("hidden", "scale"), [pytest.param(e, s, marks=() if e in FAST else pytest.mark.slow) for e, s in CASES]
 )
 def test_other_units_alter_nothing(hidden, scale):
     before, after = diagnosed(hidden), diagnosed(hidden, *scale)
