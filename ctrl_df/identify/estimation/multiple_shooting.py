@@ -365,7 +365,9 @@ class Problem:
                 ss[:, i, i] += precision
                 ss[:, i, i] *= 1 + damping
                 right[:, :, -1] -= precision * (nuisance[k] - means[k])
-                solved = np.linalg.solve(ss, right)
+                # of one size, whatever the units: pivots are then chosen alike
+                size = np.sqrt(ss[:, i, i])[:, :, None]
+                solved = np.linalg.solve(ss / (size * size.transpose(0, 2, 1)), right / size) / size
                 h -= np.einsum("wsi,wsj->ij", right[:, :, :p], solved[:, :, :p])
                 g -= np.einsum("wsi,ws->i", right[:, :, :p], solved[:, :, p])
                 pieces.append((k, solved))

@@ -14,7 +14,7 @@ class OutputSensitivity:
     ----------
     parameters, states : list of (n, p) and (n, ns) arrays
         Per record, derivatives of the output at the samples within the segments.
-    segments : list of Windows
+    segments : list of Segments
     ridge : list of (nw, ns) arrays
         Precision of what is known of the initial states beforehand, in units of one sample.
     error_filter : NoiseModel or None
@@ -38,7 +38,10 @@ class OutputSensitivity:
         for w, where in enumerate(self.segments[k].slices):
             s = self.states[k][where]
             if s.shape[1]:
-                out[where] -= s @ np.linalg.solve(s.T @ s + np.diag(self.ridge[k][w]), s.T @ out[where])
+                normal = s.T @ s + np.diag(self.ridge[k][w])
+                size = np.sqrt(np.diag(normal))
+                weights = np.linalg.solve(normal / np.outer(size, size), (s.T @ out[where]) / size[:, None])
+                out[where] -= s @ (weights / size[:, None])
         return out
 
     @property
