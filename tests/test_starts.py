@@ -7,14 +7,15 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation import initial_states
-from ctrl_df.identify.estimation.segments import make_windows
+from ctrl_df.identify.estimation.segmented import prepare
+from ctrl_df.identify.estimation.segments import make_segments
 from ctrl_df.identify.estimation.simulator import Simulator, free_run
-from ctrl_df.identify.estimation.trial import prepare
 from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.selection.rounding import rounding_evidence
-from ctrl_df.identify.starting.attach import applicable
-from ctrl_df.identify.starting.resonance_grid import SHARES, resonant
+from ctrl_df.identify.starting.extend import applicable
+from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
+from ctrl_df.identify.thresholds import LOAD_SHARES
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
 BLOCKS = {
@@ -39,7 +40,7 @@ def test_initial_states_and_their_corrections_are_one_map(name):
     for _ in range(50):
         usual = rng.normal(size=3) * (0.1, 0.5, 5.0)
         given = {k: 0.3 * rng.normal() for k in initial_states.names(core)}
-        given |= {"slack": rng.uniform(), "bristle": 0.0}
+        given |= {"slack": rng.uniform(), "deflection": 0.0}
         states = np.zeros(6)
         initial_states.fill(states[None], core, given, usual, 0.5)
         back = initial_states.corrections(states, core, usual, 0.5)
@@ -51,7 +52,7 @@ def test_initial_states_and_their_corrections_are_one_map(name):
 def test_windows_that_go_on_from_one_another_are_one_run(name):
     block = BLOCKS[name]
     data = record(block)
-    simulator, windows = Simulator(block, data), make_windows(data, 0.5)
+    simulator, windows = Simulator(block, data), make_segments(data, 0.5)
     starts = simulator.at_rest(windows, None)
     if name == "gap":
         starts[:, 2] = 0.5
@@ -85,7 +86,7 @@ def test_rounding_is_told_from_noise_of_the_same_size():
 def test_a_joint_is_found_by_its_resonance():
     data = prepare(PLAIN, [record(BLOCKS["joint"], n=6000)]).level(4)
     screen = Screen(data.fit(PLAIN, default_free(PLAIN)), data)
-    found = [f for share in SHARES for f in resonant(screen, share, 1)]
+    found = [f for share in LOAD_SHARES for f in resonating(cdf.Compliance, screen, share, 1)]
     joint = min(found, key=lambda f: f.rmse).model.effects[-1]
 
     def frequency(effect, mass):

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .effect import Effect
-from .effects import Backlash, Bristle, Compliance, HardStop
 from .primitives import Delay, Lag, Play, Primitive, RateLimiter
 
 RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
@@ -39,8 +38,8 @@ class Core:
     restitution: float = 0.0
     stiffness: float = 0.0
     damping: float = 0.0
-    stop: HardStop | None = None
-    bristle: Bristle | None = None
+    stop: Any = None
+    bristle: Any = None
     bristle_state: int = -1
     input_channel: tuple[tuple[Primitive, int], ...] = ()
     output_channel: tuple[tuple[Primitive, int], ...] = ()
@@ -59,6 +58,11 @@ class Core:
         return ("x", "v", "x_motor", "v_motor")[: 2 * self.bodies]
 
     @property
+    def position_dependent(self) -> bool:
+        """Whether a law depends on the place, or may do so: where a run begins then matters."""
+        return self.stop is not None or any(not term.effect.place_free for term in self.forces)
+
+    @property
     def driven(self) -> int:
         """Index of the body the force acts on."""
         return self.bodies - 1
@@ -66,8 +70,8 @@ class Core:
 
 def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effect], measured: str) -> Core:
     """Lay out states and sort effects by role; `masses` is (mass,) or (load, motor)."""
-    backlash = _only(effects, Backlash)
-    compliance = _only(effects, Compliance)
+    backlash = _only(e for e in effects if e.role == "contact" and e.divides)
+    compliance = _only(e for e in effects if e.role == "coupling")
     joint: str | None = None
     if compliance is not None:
         joint = ELASTIC
@@ -90,10 +94,10 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
             names += [f"{effect.id}_{i}" for i in range(effect.states)]
         elif effect.role == "friction":
             friction[body].append(effect)
-    bristle, bristle_state = _only(effects, Bristle), -1
+    bristle, bristle_state = _only(e for e in effects if e.role == "presliding"), -1
     if bristle is not None:
         bristle_state = len(names)
-        names.append("bristle")
+        names.append(bristle.id)
     channels: dict[str, list[tuple[Primitive, int]]] = {"input": [], "output": []}
     for effect in effects:
         if effect.role in channels:
@@ -111,7 +115,7 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         restitution=backlash.restitution if backlash else 0.0,
         stiffness=compliance.stiffness if compliance else 0.0,
         damping=compliance.damping if compliance else 0.0,
-        stop=_only(effects, HardStop),
+        stop=_only(e for e in effects if e.role == "contact" and not e.divides),
         bristle=bristle,
         bristle_state=bristle_state,
         input_channel=tuple(channels["input"]),
@@ -140,11 +144,12 @@ def kinetic_level(effects: Sequence[Effect]) -> float:
     return level([e for e in effects if is_kinetic(e)], 1.0, 1.0, 0.0)
 
 
-def _only(effects, cls) -> Any:
-    found = [e for e in effects if isinstance(e, cls)]
+def _only(kind) -> Any:
+    found = list(kind)
     if len(found) > 1:
+        names = " and ".join(dict.fromkeys(type(e).__name__ for e in found))
         raise ValueError(
-            f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters."
+            f"a block takes one {names} at most; got {len(found)}. Change it with with_parameters."
         )
     return found[0] if found else None
 

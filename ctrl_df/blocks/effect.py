@@ -12,9 +12,10 @@ role          what the class provides
               z, whose rates the law writes into dz
 ``friction``  ``law(moving, direction, speed, base, p) -> level`` [N]: the dry friction level given the
               level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static
-``contact``   known to the engine: `HardStop`, `Backlash`
-``coupling``  known to the engine: `Compliance`
-``presliding`` known to the engine: `Bristle`
+``contact``   the engine's law of impact: fields ``gap``, ``restitution``, ``load_fraction`` of one that
+              `divides` the mass (`Backlash`); else ``restitution`` and a property ``span`` (`HardStop`)
+``coupling``  the engine's elastic joint: fields ``stiffness``, ``damping``, ``load_fraction`` (`Compliance`)
+``presliding`` the engine's bristles: fields ``stiffness``, ``damping``, ``level`` (`Bristle`)
 ``input``     ``channel() -> tuple of primitives`` that the applied force passes through
 ``output``    ``channel() -> tuple of primitives`` that the measured position passes through
 ============  ==================================================================================
@@ -23,9 +24,10 @@ role          what the class provides
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -73,6 +75,12 @@ class Effect:
         ones.
     repeatable : bool
         Whether a block may hold several; a second of any other is the first one again.
+    divides : bool
+        Whether a contact is a joint, which divides a single mass in motor and load.
+    costly : bool
+        Whether a point of a table N(A, omega) takes many times as long with it as with others.
+    table_starts : int
+        Starts on a table from which it is fitted.
 
     Examples
     --------
@@ -96,6 +104,9 @@ class Effect:
     nonsmooth: ClassVar[bool] = False
     multimodal: ClassVar[bool] = False
     repeatable: ClassVar[bool] = False
+    divides: ClassVar[bool] = False
+    costly: ClassVar[bool] = False
+    table_starts: ClassVar[int] = 3
     law: ClassVar[Callable | None] = None
 
     def __init_subclass__(cls, **kwargs):
@@ -119,6 +130,47 @@ class Effect:
         """Return the primitives of an input or output effect, in the order the signal passes them."""
         raise NotImplementedError(f"{type(self).__name__} has role {self.role!r}, which is no channel.")
 
+    # --- what a diagnosis should know of it ------------------------------------------------------------
+
+    @classmethod
+    def applicable(cls, block) -> bool:
+        """Return whether adding one to the block can change anything that is measured."""
+        return True
+
+    @classmethod
+    def suggest(cls, screen) -> Iterable[Effect] | None:
+        """Return effects with which fits may begin, read off a `Screen`; None: sizes from small to large."""
+        return None
+
+    @classmethod
+    def regress(cls, screen) -> Iterable[tuple[Effect, Mapping[str, float]]]:
+        """Return effects fitted to the force of a `Screen`, with values of the model's parameters beside."""
+        return ()
+
+    @classmethod
+    def suggest_on_plane(cls, plane) -> Iterable[tuple[Effect, float]] | None:
+        """Return effects with which fits to a table N(A, omega) may begin; None: sizes of all kinds.
+
+        Each comes with the share of the model's own Coulomb friction that stays beside it. `plane`: the
+        `Plane` of the table.
+        """
+        return None
+
+    def bounds(self, seen) -> dict[str, tuple[float, float]]:
+        """Return ranges of parameters beyond which the records prove them wrong; `seen`: their `Seen`."""
+        return {}
+
+    def ranges(self, seen) -> dict[str, tuple[float, float]]:
+        """Return ranges of parameters beyond which the records show nothing of the effect itself."""
+        return {}
+
+    def genuine(self, stroke: float, at_bound) -> bool:
+        """Return whether it is what its name says over a stroke [m], and no stand-in for another effect.
+
+        `at_bound`: names of its parameters that a fit has left at a bound.
+        """
+        return True
+
     @property
     def parameters(self) -> dict[str, Parameter]:
         """Its parameters by field name."""
@@ -136,6 +188,13 @@ class Effect:
     def replace(self, **changes: Any) -> Effect:
         """Return the same effect with other parameter values."""
         return dataclasses.replace(self, **changes)
+
+
+@functools.cache
+def static_levels(cls: type[Effect]) -> tuple[str, ...]:
+    """Return the parameters of an effect class that are static levels, none below the kinetic one."""
+    stated = {f.name: f.metadata.get("parameter", {}) for f in dataclasses.fields(cls)}
+    return tuple(name for name, spec in stated.items() if spec.get("threshold"))
 
 
 def register_effect(cls: _EffectClass) -> _EffectClass:

@@ -1,8 +1,8 @@
-"""Initial states of a window: what the data say of them, corrected by what a fit finds, and back.
+"""Initial states of a segment: what the data say of them, corrected by what a fit finds, and back.
 
 Position and speed of the body that is measured are estimated from the record; the corrections of these, and
 all that is hidden (where the other body stands in a gap, how far a joint or the bristles are bent), are
-nuisance parameters of each window.
+nuisance parameters of each segment.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ...blocks.core import ELASTIC, IMPACT, level
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
 
-SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "bristle"})
+SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "deflection"})
 """Names of those hidden that come to be what the motion makes them, wherever they began."""
 
-FITTED, CHAINED, MEASURED = "fitted", "chained", "measured"
-"""How windows begin: every state is fitted, window by window; all but those that settle are, which go on from
-one window into the next; none is: windows begin as the record says, and what is hidden goes on.
+FREE, CONTINUED, MEASURED = "fitted", "chained", "measured"
+"""How segments begin: every state is fitted, segment by segment; all but those that settle are, which go on
+from one segment into the next; none is: segments begin as the record says, and what is hidden goes on.
 """
 
 
@@ -35,35 +35,35 @@ def names(core) -> tuple[str, ...]:
     elif core.joint == ELASTIC:
         found += ["stretch", "stretch_rate"]
     if core.bristle is not None:
-        found.append("bristle")
+        found.append("deflection")
     return tuple(found)
 
 
 def fitted_names(core, begins: str) -> tuple[str, ...]:
-    """Return the names of those that are fitted where windows begin so."""
+    """Return the names of those that are fitted where segments begin so."""
     if begins == MEASURED:
         return ()
-    return tuple(n for n in names(core) if begins == FITTED or n not in SETTLING)
+    return tuple(n for n in names(core) if begins == FREE or n not in SETTLING)
 
 
 def carried_names(core, begins: str) -> tuple[str, ...]:
-    """Return the names of those that go on from one window into the next."""
+    """Return the names of those that go on from one segment into the next."""
     fitted = fitted_names(core, begins)
     return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
 
 
-def reach(which, core, known, windows) -> np.ndarray:
+def reach(which, core, known, segments) -> np.ndarray:
     """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
 
     `known`: `windows.facts` of the record.
     """
-    one = np.ones(len(windows))
+    one = np.ones(len(segments))
     table = {
-        "x": 5 * windows.x_error + 0.02 * known.spread,
-        "v": 2 * windows.v_error + 0.01 * known.speed,
+        "x": 5 * segments.x_error + 0.02 * known.spread,
+        "v": 2 * segments.v_error + 0.01 * known.speed,
         "slack": one,
         "slack_rate": 0.7 * known.speed * one,
-        "bristle": 0.5 * one,
+        "deflection": 0.5 * one,
     }
     if core.joint == ELASTIC:
         bend = known.force / max(core.stiffness, 1e-300)
@@ -74,7 +74,7 @@ def reach(which, core, known, windows) -> np.ndarray:
 
 
 def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
-    """Write the states (nw, nx) of a mechanism at the begin of windows.
+    """Write the states (nw, nx) of a mechanism at the begin of segments.
 
     `usual`: positions, speeds and accelerations (nw,) of the body measured; `given`: corrections by name,
     each (nw,) or one number; `speed` [m/s] is typical of the record.
@@ -102,7 +102,7 @@ def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
         states[:, 0] += beyond
     if core.bristle is not None:
         slip, full = np.array([_bristles(row, core) for row in states]).T
-        share = np.tanh(3 * slip / speed) + given.get("bristle", 0.0)
+        share = np.tanh(3 * slip / speed) + given.get("deflection", 0.0)
         states[:, core.bristle_state] = np.clip(share, -1.0, 1.0) * full
 
 
@@ -118,7 +118,7 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     if core.bristle is not None:
         slip, full = _bristles(states, core)
         share = states[core.bristle_state] / full if full > 0 else 0.0
-        found["bristle"] = share - math.tanh(3 * slip / speed)
+        found["deflection"] = share - math.tanh(3 * slip / speed)
     return found
 
 

@@ -1,7 +1,7 @@
-"""Laws with events make the cost rough: a fit is begun again from either side of where it ended.
+"""Laws with events make the cost nonsmooth: a fit is begun again from either side of where it ended.
 
 An impact more or less, a mass that sticks or breaks away: each changes the output by a jump, so that the
-cost over a gap, a restitution or a static level has many valleys side by side. The next ones are a hop
+cost over a gap, a restitution or a static level has many minima side by side. The next ones are a step
 away.
 """
 
@@ -15,97 +15,94 @@ from dataclasses import replace
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from .candidate import Candidate
+from ..thresholds import (
+    BETTER,
+    HOPELESS,
+    OPEN_RANGE,
+    RESTART_FACTORS,
+    RESTARTED_AGAIN,
+    RESTARTS_KEPT,
+    SAME,
+    STATIC_FACTORS,
+    STILL_POSSIBLE,
+)
+from .common_friction import dry_level
+from .fit import FitResult
+from .segmented import CandidateFit, SegmentedData
 from .simulator import feasible
-from .trial import Data, Trial
-
-# friction of which the sum with the motor's shows best
-_SHARED = "load_friction.level"
-
-_HOPS = (0.6, 0.8, 1.25, 1.6)
-_SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
-HOPELESS = 3.0
-"""Error over the best candidate's beyond which another try is not worth it."""
-
-NEAR = 1.5
-"""Error over the best candidate's up to which another may yet turn out to be the right one."""
-
-_AGAIN = 2  # times that a parameter that found a better valley is moved once more
-_TRIED = 3  # of the hops along one parameter: those that begin best
-_WORTH = 0.99  # error over the one before that counts as a better valley
-_SAME = 1.001  # error over the least that counts as the same floor
-_REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a threshold that floor is sought
 
 
-def rough(found: Candidate) -> list[str]:
-    """Return the free parameters over which the cost has many valleys."""
+def nonsmooth_names(found: FitResult) -> list[str]:
+    """Return the free parameters over which the cost has many minima."""
     effects = found.model.named_effects
     return [n for n in found.names if "." in n and effects[n.partition(".")[0]].nonsmooth]
 
 
-def own(found: Candidate) -> list[str]:
-    """Return the rough parameters of the last effect of a model."""
+def own(found: FitResult) -> list[str]:
+    """Return those parameters of the last effect of a model."""
     last = found.model.newest + "."
-    return [name for name in rough(found) if name.startswith(last)]
+    return [name for name in nonsmooth_names(found) if name.startswith(last)]
 
 
-def hopped(
-    found: Candidate, fit: Callable[..., Candidate], names: list[str], hopeless: float = math.inf
-) -> Candidate:
-    """Return the best of the fits that begin beside `found`, one rough parameter moved at a time; or itself.
+def restarted(
+    found: FitResult, fit: Callable[..., FitResult], names: list[str], hopeless: float = math.inf
+) -> FitResult:
+    """Return the best of the fits that begin beside `found`, one such parameter moved at a time; or itself.
 
     Parameters
     ----------
-    found : Candidate
+    found : FitResult
     fit : callable
-        ``fit(model, names, starts=, iterations=, hopeless=)`` over the windows of `found`.
+        ``fit(model, names, starts=, iterations=, hopeless=)`` over the segments of `found`.
     names : list of str
         Parameters to move.
     hopeless : float
-        Error above which a valley is of no use.
+        Error above which a minimum is of no use.
     """
     queue = [(name, 0) for name in names]
     for name, times in queue:
         at, best = found.parameters[name], found
         moved = [
             _moved(found.model, name, _within(found, name, factor * at))
-            for factor in (_SMALL if found.model.parameters[name].threshold else _HOPS)
+            for factor in (STATIC_FACTORS if found.model.parameters[name].threshold else RESTART_FACTORS)
         ]
         starts_only = functools.partial(fit, names=(), starts=found.starts, iterations=2, hopeless=hopeless)
-        begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:_TRIED]
+        begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
         on = functools.partial(_on, fit=fit, hopeless=hopeless, names=found.names)
         for tried in side_by_side(on, begun):
-            if tried.rmse < _WORTH * best.rmse:
+            if tried.rmse < BETTER * best.rmse:
                 best = tried
-        if best is not found and times < _AGAIN:
+        if best is not found and times < RESTARTED_AGAIN:
             queue.append((name, times + 1))
         found = best
     return found
 
 
-def beyond(found: Candidate, least: float) -> float:
-    """Return the error above which other valleys of a fit are of no use; `least`: that of the best fit.
+def beyond(found: FitResult, least: float) -> float:
+    """Return the error above which other minima of a fit are of no use; `least`: that of the best fit.
 
     The best one itself tries all of them to their end.
     """
-    return NEAR * least if found.rmse > least else math.inf
+    return STILL_POSSIBLE * least if found.rmse > least else math.inf
 
 
-def _on(begun: Candidate, fit, names, hopeless) -> Candidate:
+def _on(begun: FitResult, fit, names, hopeless) -> FitResult:
     return fit(begun.model, names, starts=begun.starts, iterations=4, hopeless=hopeless)
 
 
-def all_hopped(fits, data: Data, floor: float) -> list:
-    """Return fits in their best valleys: those that are neither at the floor nor far behind the best.
+def all_restarted(fits, data: SegmentedData, floor: float) -> list:
+    """Return fits in their best minima: those that are neither at the floor nor far behind the best.
 
-    The first is the baseline. If it was in its best valley, so are the others in what they share with it.
+    The first is the baseline. If it was in its best minimum, so are the others in what they share with it.
     """
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
     lost = [floor < f.rmse < HOPELESS * least for f in fits]
-    base = hopped(fits[0], data.fit, rough(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
-    values = {k: base.parameters[k] for k in rough(base)} if base is not fits[0] else {}
+    base = (
+        restarted(fits[0], data.fit, nonsmooth_names(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
+    )
+    values = {k: base.parameters[k] for k in nonsmooth_names(base)} if base is not fits[0] else {}
     others = side_by_side(
         lambda pair: _other(pair[0], data, values, beyond(pair[0], least)) if pair[1] else pair[0],
         zip(fits[1:], lost[1:], strict=True),
@@ -113,8 +110,8 @@ def all_hopped(fits, data: Data, floor: float) -> list:
     return [base, *others]
 
 
-def _other(found: Candidate, data: Data, values, hopeless: float) -> Candidate:
-    """Return a fit in its best valley; `values`: of what it shares with the baseline, if that has hopped."""
+def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> FitResult:
+    """Return a fit in its best minimum; `values`: of what it shares with a baseline that was restarted."""
     table = found.model.parameters
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
@@ -122,14 +119,14 @@ def _other(found: Candidate, data: Data, values, hopeless: float) -> Candidate:
         near = data.fit(model, (), starts=found.starts, iterations=4, hopeless=hopeless)
         again = data.fit(model, found.names, starts=near.starts, iterations=6, hopeless=hopeless)
         found = min(found, again, key=lambda f: f.rmse)
-    return hopped(found, data.fit, own(found), hopeless)
+    return restarted(found, data.fit, own(found), hopeless)
 
 
-def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
+def cross_started(tried: CandidateFit, best: CandidateFit, data: SegmentedData) -> CandidateFit | None:
     """Fit a candidate again from where the best one ended, of which it may be a limit.
 
-    Stiction is that of a narrow Stribeck bump. The cost of stick and slip is rough: of two fits of one law
-    each may end in its own valley.
+    Stiction is that of a narrow Stribeck bump. The cost of stick and slip is nonsmooth: of two fits of one
+    law each may end in its own minimum.
     """
     table, mine, its = tried.block.parameters, tried.block.newest, best.block.newest
     values = {}
@@ -145,19 +142,19 @@ def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
     if near.rmse > HOPELESS * best.train.rmse:
         return None
     fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
-    return settled(data.judged(replace(tried, train=fitted)), data)
+    return thresholds_refined(data.validate(replace(tried, train=fitted)), data)
 
 
-def settled(tried: Trial, data: Data) -> Trial:
-    """Choose thresholds by the windows to be judged by, within what the windows fitted leave open."""
+def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
+    """Choose thresholds by the segments to validate on, within what the segments fitted leave open."""
     table = tried.block.parameters
     for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = _open_range(tried.train, data.fit, name)
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, 7)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
-            i = min(range(len(runs)), key=lambda k: runs[k].held_rmse)
-            if runs[i].held_rmse < tried.held_rmse:
+            i = min(range(len(runs)), key=lambda k: runs[k].validation_rmse)
+            if runs[i].validation_rmse < tried.validation_rmse:
                 tried = runs[i]
             low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
         tried = replace(
@@ -166,20 +163,20 @@ def settled(tried: Trial, data: Data) -> Trial:
     return tried
 
 
-def _with_level(tried: Trial, name, value, data: Data) -> Trial:
+def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> CandidateFit:
     block = _moved(tried.block, name, value)
-    return data.judged(replace(tried, train=replace(tried.train, model=block)))
+    return data.validate(replace(tried, train=replace(tried.train, model=block)))
 
 
-def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> tuple[float, float]:
-    """Return the least and the largest value of a threshold for which the windows fitted are the same."""
+def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> tuple[float, float]:
+    """Return the least and the largest value of a threshold for which the segments fitted are the same."""
     at, edges = found.parameters[name], []
     for sign in (-1, 1):
         edge = at
-        for reach in _REACH:
+        for reach in OPEN_RANGE:
             value = (1 + sign * reach) * at
             moved = _moved(found.model, name, value)
-            if fit(moved, (), starts=found.starts, iterations=2).rmse > _SAME * found.rmse:
+            if fit(moved, (), starts=found.starts, iterations=2).rmse > SAME * found.rmse:
                 break
             edge = value
         edges.append(edge)
@@ -187,12 +184,12 @@ def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> t
 
 
 def _moved(model, name, value):
-    values = {name: value}
-    if name == _SHARED and "coulomb.level" in model.parameters:
-        # what the load gains the motor loses
-        table = model.parameters
-        motor, more = table["coulomb.level"].value, value - table[_SHARED].value
-        values["coulomb.level"] = max(motor - more, 0.05 * motor)
+    values, table, shared = {name: value}, model.parameters, dry_level(model)
+    effect = model.named_effects.get(name.partition(".")[0])
+    if shared is not None and effect is not None and effect.role == "friction" and effect.side == "load":
+        # the sum of both shows best: what the load gains the motor loses
+        motor, more = table[shared].value, value - table[name].value
+        values[shared] = max(motor - more, 0.05 * motor)
     return model.with_parameters(feasible(model, values))
 
 

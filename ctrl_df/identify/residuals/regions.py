@@ -96,7 +96,9 @@ class Regions(tuple[Region, ...]):
         return "\n".join(lines)
 
 
-def error_regions(t, residual, *, position=None, velocity=None, force=None, bins=8) -> Regions:
+def error_regions(
+    t, residual, *, position=None, velocity=None, force=None, bins=8, units=("m", "N")
+) -> Regions:
     """Return every region's share of the squared error, worst first.
 
     Parameters
@@ -110,6 +112,8 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
         Signals that divide the record; those missing leave their regions out.
     bins : int
         Parts of the record in time and in position.
+    units : (str, str)
+        Of position and of force.
 
     Returns
     -------
@@ -130,7 +134,7 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
     if total == 0:
         return Regions()
     null = _Null(r)
-    found = [null.region(*part) for part in _parts(t, bins, **signals)]
+    found = [null.region(*part) for part in _parts(t, bins, units, **signals)]
     found += _bands(t, r, signals.values())
     found.sort(key=lambda region: region.p_value)
     count, worst, worst_bias = len(found), 0.0, 0.0
@@ -146,33 +150,33 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
 # --- dividing the record --------------------------------------------------------------------------
 
 
-def _parts(t, bins, position=None, velocity=None, force=None) -> Iterator[tuple]:
+def _parts(t, bins, units, position=None, velocity=None, force=None) -> Iterator[tuple]:
     """Yield (kind, label, mask, span) of every region of samples."""
     edges = np.linspace(t[0], t[-1], bins + 1)
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         yield "time", f"{a:.3g} to {b:.3g} s", (t >= a) & ((t < b) | (b == edges[-1])), (a, b)
     if velocity is not None:
-        yield from _by_velocity(t, velocity, position)
+        yield from _by_velocity(t, velocity, position, units[0])
     if position is not None:
-        yield from _quantiles("position", "m", position, bins)
+        yield from _quantiles("position", units[0], position, bins)
     if force is not None:
-        yield from _quantiles("load", "N", np.abs(force), 4, "|F| ")
+        yield from _quantiles("load", units[1], np.abs(force), 4, "|F| ")
 
 
-def _by_velocity(t, velocity, position):
+def _by_velocity(t, velocity, position, unit):
     fast = float(np.quantile(np.abs(velocity), 0.95))
     low = 0.1 * fast
     yield "direction", "v > 0", velocity > low, (low, math.inf)
     yield "direction", "v < 0", velocity < -low, (-math.inf, -low)
     speed = np.abs(velocity)
-    yield "low_speed", f"|v| < {low:.2g} m/s", speed < low, (0.0, low)
+    yield "low_speed", f"|v| < {low:.2g} {unit}/s", speed < low, (0.0, low)
     yield (
         "low_speed",
-        f"{low:.2g} < |v| < {0.6 * fast:.2g} m/s",
+        f"{low:.2g} < |v| < {0.6 * fast:.2g} {unit}/s",
         (speed >= low) & (speed < 0.6 * fast),
         (low, 0.6 * fast),
     )
-    yield "low_speed", f"|v| > {0.6 * fast:.2g} m/s", speed >= 0.6 * fast, (0.6 * fast, math.inf)
+    yield "low_speed", f"|v| > {0.6 * fast:.2g} {unit}/s", speed >= 0.6 * fast, (0.6 * fast, math.inf)
     turns = reversals(velocity, low)
     if len(turns) < 3:
         return
@@ -189,7 +193,7 @@ def _by_velocity(t, velocity, position):
     )
     yield "after_reversal", f"later than {middle:.2g} s", since >= middle, (middle, math.inf)
     if position is not None:
-        yield from _quantiles("amplitude", "m", swing(position, turns), 3)
+        yield from _quantiles("amplitude", unit, swing(position, turns), 3)
 
 
 def _quantiles(kind, unit, values, count, prefix=""):
@@ -242,11 +246,11 @@ class _Null:
         # sharper, where enough independent samples remain to know the two means.
         mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
         rest = self.r - np.where(mask, mean_in, mean_out)
-        colour, power = self._colour(rest), float(np.mean(rest * rest))
-        means = [_independent(pairs, np.maximum(colour, 0)) for pairs in (inside, outside)]
+        error_filter, power = self._colour(rest), float(np.mean(rest * rest))
+        means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
         if min(means) < 60:
-            colour, power = self.rho, self.power
-            means = [_independent(pairs, np.maximum(colour, 0)) for pairs in (inside, outside)]
+            error_filter, power = self.rho, self.power
+            means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
         z = mean_in / math.sqrt(max(power, 1e-30 * self.power) / means[0])
         bias_p = float(2 * t_distribution.sf(abs(z), max(means[0] - 1, 1)))
         if share > expected:  # more error than its part: by its spread, or by its mean
@@ -284,7 +288,7 @@ def _bands(t, r, signals) -> list[Region]:
         widths = sum(bands[j][1] - bands[j][0] for j in near)
         # An excited line of the input shows in every residual: it must also stand out beside the signals.
         ratio = min(values[i] / _background(values, near) for values in (density, *relative))
-        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann window halves the independent lines
+        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann segment halves the independent lines
         share = float(power[a:b].sum()) / total
         span = (float(f[a]), float(f[b - 1]))
         expected = min(share, _background(density, near) * (b - a) / total)

@@ -7,14 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...blocks.effect import Effect
-from ...drawing import draw
+from ...drawing import draw, go_on
 from ..data.measurement import Measurement
+from ..thresholds import RULED_OUT
 
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
-
-
-# Evidence [nats] behind the first up to which a candidate is not ruled out.
-_NEAR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +80,7 @@ class CandidateEffect:
 def rivals(ranking) -> list[CandidateEffect]:
     """Return the confirmed candidates that the data hardly tell from the first."""
     first = ranking[0]
-    return [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < _NEAR]
+    return [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < RULED_OUT]
 
 
 def certainty(ranking) -> float:
@@ -108,7 +105,7 @@ class Diagnosis:
     noise, structure : float
         Of the best candidate's residual: rms of noise and of what the model still misses [unit of `measure`].
     measure : {'output', 'acceleration', 'N'}
-        What all errors are of: the output, or (where forces that no model has, such as friction that wanders,
+        What all errors are of: the output, or (where disturbance forces, such as friction that drifts,
         outweigh the noise of the sensor) its acceleration, averaged over some samples.
     remains : str
         Of 'unknown' over time: how much the library does not explain, and where, in sentences.
@@ -159,9 +156,7 @@ class Diagnosis:
     @property
     def next_experiment(self):
         """The input that would separate the candidates that remain; see `ctrl_df.identify.experiment`."""
-        from ..experiment import next_experiment
-
-        return next_experiment(self)
+        return go_on("next experiment", self)
 
     def table(self, rows: int = 8) -> str:
         """Return the ranking as text."""

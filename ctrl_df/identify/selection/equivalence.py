@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from ..estimation.noise_model import NoiseModel, whitened_power
+from ..thresholds import TOLD_APART
 
 
-def indistinguishable(first, second, noise: NoiseModel, *, nats: float = 6.0) -> bool:
+def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_APART) -> bool:
     """Whether two candidates' outputs differ by no more than the noise lets one see.
 
     Parameters
     ----------
     first, second : sequence of arrays
-        Simulated outputs, as evidence takes them (`Trial.outputs`).
+        Simulated outputs, as evidence takes them (`CandidateFit.outputs`).
     noise : NoiseModel
         Of the better one's residual.
     nats : float

@@ -7,34 +7,43 @@ is the screening evidence, and the values that explain most are where the refit 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ..estimation.candidate import Candidate
-from ..estimation.trial import Data, Scales, carried
-from .attach import attach
+from ...blocks.core import kinetic_level
+from ..estimation.fit import FitResult
+from ..estimation.segmented import Scales, SegmentedData, carried
+from .extend import extended
 from .proposals import proposals
-from .regression import Start, motion_of, regressed
+from .regression import ForceFit, Start, force_fit, motion_of, regressed
+from .ripple_spectrum import Wave
+from .ripple_starts import long_waves, waves
+from .value_grid import value_grid
 
 
 class Screen:
     """The refitted baseline as a linear map: its residual, what refitting could change projected out.
 
+    What `Effect.suggest` and `Effect.regress` may ask of it: `block`, `bodies`, `friction`, `scales`
+    (``force``, ``position``, ``speed``, ``mass``, ``of(unit)``), `motion` (``u``, ``x``, ``v``, ``a``),
+    `force_fit`, `step`, `long_waves`, `waves`.
+
     Parameters
     ----------
-    base : Candidate
-        The baseline fitted to windows that are short: there even a strong effect changes the output nearly
+    base : FitResult
+        The baseline fitted to segments that are short: there even a strong effect changes the output nearly
         linearly.
-    data : Data
-        In those windows.
+    data : SegmentedData
+        In those segments.
     """
 
-    def __init__(self, base: Candidate, data: Data):
+    def __init__(self, base: FitResult, data: SegmentedData):
         self.base, self.data = base, data
         self.view = data.train
         self.motion = motion_of(data.train, data.thin)
-        self.tangent = base.tangent
+        self.sensitivity = base.sensitivity
         self.residual = self.project(base.residual)
         self.simulators = [data.simulator(base.model, r) for r in self.view.records]
 
@@ -48,27 +57,54 @@ class Screen:
         """The refitted baseline."""
         return self.base.model
 
+    @property
+    def friction(self) -> float:
+        """Its dry friction while it moves [N]."""
+        return kinetic_level(self.block.effects)
+
+    @property
+    def bodies(self) -> int:
+        """Its bodies, 1 or 2."""
+        return self.block.core.bodies
+
+    def step(self) -> float:
+        """Return the step of the grid to which measured values keep [m]; 0 where there is none."""
+        noise = math.sqrt(float(self.residual @ self.residual) / len(self.residual))
+        return value_grid(np.concatenate(self.data.train.outputs), noise)
+
+    def force_fit(self, columns) -> ForceFit:
+        """Regress the force on the motion, by the model's own laws and further columns over `motion`."""
+        return force_fit(self.motion, self.scales, self.block, columns)
+
+    def long_waves(self, make: Callable) -> list[tuple[float, float, float]]:
+        """Return amplitude [N], wavelength [m] and phase of the long ripples that explain most."""
+        return long_waves(self, make)
+
+    def waves(self, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
+        """Yield ripples of any length that explain most, with values of the model's parameters beside."""
+        return waves(self, known)
+
     def project(self, signals) -> np.ndarray:
         """Remove what the baseline's parameters and initial states can explain."""
-        return self.tangent.project(signals) if self.tangent is not None else np.concatenate(signals)
+        return self.sensitivity.project(signals) if self.sensitivity is not None else np.concatenate(signals)
 
     def starts(self, block) -> list[np.ndarray]:
         """Return the baseline's initial states as those of a block with an effect more."""
         return [
             carried(self.data.simulator(block, r), w, old, start)
             for r, w, old, start in zip(
-                self.view.records, self.view.windows, self.simulators, self.base.starts, strict=True
+                self.view.records, self.view.segments, self.simulators, self.base.starts, strict=True
             )
         ]
 
     def change(self, block) -> list[np.ndarray] | None:
         """Return the change of output from the baseline to `block`; None if it cannot be simulated."""
         change = []
-        for record, windows, start, y in zip(
-            self.view.records, self.view.windows, self.starts(block), self.base.simulated, strict=True
+        for record, segments, start, y in zip(
+            self.view.records, self.view.segments, self.starts(block), self.base.simulated, strict=True
         ):
             simulator = self.data.simulator(block, record)
-            change.append(simulator.run(windows, None, start, rounded=True) - y)
+            change.append(simulator.run(segments, None, start, rounded=True) - y)
         return change if all(np.all(np.isfinite(c)) for c in change) else None
 
 
@@ -90,7 +126,7 @@ def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
 
 
 def _judged(effect, screen, total) -> Iterator[Start]:
-    block = attach(screen.block, effect)
+    block = extended(screen.block, effect)
     change = None if block is None else screen.change(block)
     if block is None or change is None or total == 0:
         return
@@ -105,7 +141,7 @@ def _judged(effect, screen, total) -> Iterator[Start]:
         factor = float(change @ screen.residual) / power
         scaled = _scaled(effect, factor)
         if scaled is not None and not 0.8 < factor < 1.25:
-            again = attach(screen.block, scaled)
+            again = extended(screen.block, scaled)
             moved = None if again is None else screen.change(again)
             if again is not None and moved is not None:
                 left = screen.residual - screen.project(moved)

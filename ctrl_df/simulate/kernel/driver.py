@@ -34,9 +34,9 @@ from ..program.layout import (
 )
 from . import history
 from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
-from .exponential import Bend, bend_memory, forget
+from .exponential import Bend, bend_memory
 from .flow import rates
-from .glide import Glide, glide, glide_memory
+from .glide import Glide, forget_run, glide, glide_memory
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
@@ -205,9 +205,9 @@ def advance(
     for i in range(ng):
         g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
-        forget(store, bend)
+        forget_run(store, tracks)
         for j in range(n):
-            size[j] = abs(x[j])
+            size[j], grain[j] = abs(x[j]), 0.0
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
         tick(prog, drive, segment, t, x, mode, work, dx)
@@ -274,6 +274,7 @@ def advance(
                 if curved:
                     skip = wait = min(2 * wait + 1, WAIT)
         if jumped or not known:
+            renewed(prog, mode, scale, -1)  # a jump may have made a speed of a margin that was a force
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
             if locate and (has_tracked or watch >= 0):
                 reach = REACH * (h if h > 0.0 else _first_step(x, k[0], limit - t, hmax))
@@ -341,7 +342,9 @@ def advance(
                 for i in range(ng):
                     lowest[i] = g0[i]
                 if stale == 0:
-                    grains(prog, drive, segment, t, x, mode, work, k[0], size, x1, dx, g, grain)
+                    grains(
+                        prog, drive, segment, t, length, x, mode, work, k[0], size, x1, dx, g, grain
+                    )  # fmt: skip
                     stale = GRAINS
                 stale -= 1
                 # samples much denser than the motion: a cheaper pair does

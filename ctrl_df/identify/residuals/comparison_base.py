@@ -7,7 +7,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparisonBase:
     """A model beside records, each by itself in `records`.
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several.
@@ -33,6 +33,19 @@ class Compared:
     @property
     def nrmse(self) -> float:
         """Relative error of all records together."""
+        raise NotImplementedError
+
+    @property
+    def where(self) -> Any:
+        """Regions ranked by their share of the error."""
+        raise NotImplementedError
+
+    def report(self) -> str:
+        """Return the comparison as text."""
+        raise NotImplementedError
+
+    def plot(self, record=None, **keywords) -> Any:
+        """Draw the comparison; returns a ``ct.ControlPlot``."""
         raise NotImplementedError
 
     @property

@@ -1,0 +1,30 @@
+"""Adding an effect to a block: whether it can change anything, and what the block then is."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from ...blocks.core import kinetic_level
+from ...blocks.effect import static_levels
+
+
+def applicable(cls, block) -> bool:
+    """Whether adding an effect of this class to the block can change anything."""
+    if cls.id in [e.id for e in block.effects] and not cls.repeatable:
+        return False
+    if cls.side == "load" and block.core.bodies == 1:
+        return False  # on a rigid block it is one of the motor
+    return cls.applicable(block)
+
+
+def extended(block, effect):
+    """Return the block with the effect added, or None where the two contradict each other.
+
+    Static levels of the effect below the block's kinetic one are raised to it.
+    """
+    kinetic = kinetic_level(block.effects)
+    low = {k: kinetic for k in static_levels(type(effect)) if getattr(effect, k) < kinetic}
+    try:
+        return block.with_effect(dataclasses.replace(effect, **low) if low else effect)
+    except (ValueError, TypeError):
+        return None
