@@ -1,0 +1,74 @@
+"""A PID whose gains are free: its share of the loop, gain by gain, and the loop at given gains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks.pid import pid
+from ..df.dispatch import translated
+from ..limit_cycles.predicted.linear import LinearPart
+from ..simulate.loop import closed_loop
+
+GAINS = ("kp", "ki", "kd")
+UNITS = {"kp": "N/m", "ki": "N/(m s)", "kd": "N s/m"}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """``P(s) (kp + ki/s + kd s/(tf s + 1))`` around a block, the gains left open.
+
+    Attributes
+    ----------
+    block : block
+        As handed in.
+    tf : float
+        Time constant of the derivative filter [s].
+    plant : LTI system or None
+        P; None: 1.
+    output : str or None
+        Output of the block that is fed back; None: the first.
+    """
+
+    block: Any
+    tf: float = 0.0
+    plant: Any = None
+    output: str | None = None
+
+    def terms(self, omega) -> np.ndarray:
+        """What each gain is multiplied by in the controller at a frequency, shape (3, *omega.shape)."""
+        s = 1j * np.asarray(omega, dtype=float)
+        return np.stack([np.ones_like(s), 1 / s, s / (self.tf * s + 1)])
+
+    def beside(self, omega) -> np.ndarray:
+        """P(j omega)."""
+        omega = np.asarray(omega, dtype=float)
+        if self.plant is None:
+            return np.ones(omega.shape, dtype=complex)
+        return LinearPart(self.plant)(omega)
+
+    def controller(self, gains: Mapping[str, float]) -> Any:
+        """Return P times the PID."""
+        C: Any = pid(gains["kp"], gains["ki"], gains["kd"], self.tf)
+        return C if self.plant is None else _product(C, self.plant)
+
+    def loop(self, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
+        """Return the closed loop with these gains."""
+        return closed_loop(self.controller(gains), translated(self.block), output=self.output)
+
+    def unstable_poles(self) -> int:
+        """Poles of P in the right half plane."""
+        if self.plant is None or isinstance(self.plant, ct.FrequencyResponseData):
+            return 0
+        poles = self.plant.poles()
+        return int((poles.real > 1e-9 * np.abs(poles).max(initial=0.0)).sum())
+
+
+def _product(C, P):
+    """PID times plant as one fraction: a state space could not hold the derivative of an ideal PID."""
+    P = ct.tf(P)
+    return ct.tf(np.polymul(C.num[0][0], P.num[0][0]), np.polymul(C.den[0][0], P.den[0][0]))
