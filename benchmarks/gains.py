@@ -60,14 +60,18 @@ def simulated(gains_map, gains, rng):
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     for name, default in (("seed", 1), ("loops", 10), ("gains", 10), ("checks", 50)):
         options.add_argument(f"--{name}", type=int, default=default)
     options.add_argument("--told", action="store_true", help="print where the map is wrong")
     options = options.parse_args()
     rng = np.random.default_rng(options.seed)
     warnings.simplefilter("ignore")
-    print("| loops | gains | map right | describing function right | seconds a map, predicted | with checks |")
+    print(
+        "| loops | gains | map right | describing function right | seconds a map, predicted | with checks |"
+    )
     print("|---|---|---|---|---|---|")
     for draw in (friction, backlash):
         tally = defaultdict(list)

@@ -58,7 +58,7 @@ _LAZY = {
     "Orbit": "limit_cycles.exact.orbit",
     "verify": "limit_cycles.verify",
     "limit_cycle_map": "gains.limit_cycle_map",
-    "LimitCycleMap": "gains.limit_cycle_map",
+    "LimitCycleMap": "gains.map",
     "tune_pid": "gains.tune",
     "TunedPID": "gains.tune",
     "explore": "plot.explore",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,53 @@ from ..units import over
 from .controller import GAINS
 
 
-def free_gains(owner: str, given: dict[str, Any], points: int) -> tuple[tuple[str, str], dict, tuple]:
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Two gains over ranges, the third fixed.
+
+    Attributes
+    ----------
+    free : (str, str)
+        Names of the two gains.
+    fixed : dict
+        Name and value of the third.
+    axes : (ndarray, ndarray)
+        Values of the two, ascending.
+    """
+
+    free: tuple[str, str]
+    fixed: dict[str, float]
+    axes: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(low, high) of both."""
+        x, y = self.axes
+        return (float(x[0]), float(x[-1])), (float(y[0]), float(y[-1]))
+
+    def every(self, x, y) -> dict[str, Any]:
+        """All three gains, by name, where the free ones are x and y."""
+        given = {**self.fixed, self.free[0]: x, self.free[1]: y}
+        return {name: given[name] for name in GAINS}
+
+    def to_unit(self, x, y) -> np.ndarray:
+        """Place in the unit square, shape (..., 2)."""
+        scaled = ((v - low) / (high - low) for v, (low, high) in zip((x, y), self.ranges, strict=True))
+        return np.stack(np.broadcast_arrays(*scaled), axis=-1)
+
+    def from_unit(self, unit) -> tuple[np.ndarray, np.ndarray]:
+        """Free gains at places of the unit square (..., 2)."""
+        (x0, x1), (y0, y1) = self.ranges
+        return x0 + unit[..., 0] * (x1 - x0), y0 + unit[..., 1] * (y1 - y0)
+
+    def corners(self) -> list[dict[str, float]]:
+        """All gains at the corners of the box, in the middles of its sides and in its middle."""
+        steps = np.array([0.0, 0.5, 1.0])
+        places = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        return [self.every(float(x), float(y)) for x, y in zip(*self.from_unit(places), strict=True)]
+
+
+def box_of(owner: str, given: dict[str, Any], points: int) -> Box:
     """Tell the two free gains from the fixed one.
 
     Parameters
@@ -24,12 +71,6 @@ def free_gains(owner: str, given: dict[str, Any], points: int) -> tuple[tuple[st
         kp, ki, kd: a number, a range (low, high), or an array of values.
     points : int
         Values of a range.
-
-    Returns
-    -------
-    free : (str, str)
-    fixed : dict
-    axes : (ndarray, ndarray)
     """
     fixed = {name: number(owner, name, v) for name, v in given.items() if is_number(v)}
     free = tuple(name for name in GAINS if name not in fixed)
@@ -38,7 +79,8 @@ def free_gains(owner: str, given: dict[str, Any], points: int) -> tuple[tuple[st
             f"{owner} needs two of kp, ki, kd as ranges (low, high) or arrays and the third as a number; got "
             f"{len(free)} ranges: {', '.join(f'{k}={shown(v)}' for k, v in given.items())}."
         )
-    return free, fixed, tuple(_axis(owner, name, given[name], points) for name in free)
+    first, second = (_axis(owner, name, given[name], points) for name in free)
+    return Box(free, fixed, (first, second))
 
 
 def _axis(owner, name, value, points) -> np.ndarray:

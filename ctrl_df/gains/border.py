@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, label
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 from scipy.stats import qmc
 
-# An edge is cut by its length times this: between different answers, between different predictions, between none.
+# An edge is cut by its length times this: between different answers, across what may be a border, between none.
 # At the ends of the range an edge of 0.2 that nothing is known against waits for borders of 0.025 to be resolved.
 _WORTH = (1.0, 0.35, 0.125)
 _ROUND = 8  # rounds of cutting
@@ -40,37 +40,57 @@ def deep_points(predicted) -> np.ndarray:
 class Border:
     """Answers at points of the unit square, and what they say between.
 
+    A line across which everything may change is known beforehand: the sides of it never speak for each other.
+
     Parameters
     ----------
     points : ndarray, shape (n, 2)
     answers : ndarray, shape (n, k)
         Booleans; the first column is the one whose border is sought.
+    side : ndarray of bool, shape (n,)
+        On which side of the line a point lies.
     """
 
-    def __init__(self, points, answers):
+    def __init__(self, points, answers, side):
         self.points, self.answers = np.asarray(points, float), np.asarray(answers, float)
+        self.side = np.asarray(side, bool)
         self.mesh = Delaunay(self.points, qhull_options="QJ")
 
-    def __call__(self, places) -> np.ndarray:
-        """Return the answers at places (m, 2), as booleans (m, k): linear between the corners of triangles."""
+    def __call__(self, places, side) -> np.ndarray:
+        """Return the answers at places (m, 2) on their sides (m,), as booleans (m, k).
+
+        Linear between those corners of the triangle around a place that lie on its side; where none does, the
+        answers of the nearest point that does, or of the nearest of all.
+        """
         places = np.clip(np.atleast_2d(places), 0.0, 1.0)
         simplex = self.mesh.find_simplex(places, tol=1e-9)
         lost = simplex < 0  # on the rim, by rounding
         if lost.any():
             simplex[lost] = self.mesh.find_simplex(0.5 + (places[lost] - 0.5) * (1 - 1e-6), tol=1e-6)
-        turn = self.mesh.transform[simplex]
+        turn, corners = self.mesh.transform[simplex], self.mesh.simplices[simplex]
         share = np.einsum("nij,nj->ni", turn[:, :2], places - turn[:, 2])
         share = np.column_stack([share, 1 - share.sum(axis=1)])
-        return np.einsum("nc,nck->nk", share, self.answers[self.mesh.simplices[simplex]]) > 0.5
+        share = np.where(self.side[corners] == side[:, None], np.maximum(share, 1e-12), 0.0)
+        weight = share.sum(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            out = np.einsum("nc,nck->nk", share, self.answers[corners]) / weight[:, None] > 0.5
+        for here in (False, True):
+            mine = np.flatnonzero((weight == 0) & (side == here))
+            known = np.flatnonzero(self.side == here)
+            known = known if known.size else np.arange(self.side.size)
+            if mine.size:
+                out[mine] = self.answers[known[cKDTree(self.points[known]).query(places[mine])[1]]] > 0.5
+        return out
 
     def worst_edges(self, count: int, predicted) -> np.ndarray:
         """Middles of the edges most worth a further question, far from each other, (<= count, 2)."""
         tri = self.mesh.simplices
-        edges = np.unique(np.sort(np.concatenate([tri[:, [0, 1]], tri[:, [1, 2]], tri[:, [2, 0]]]), axis=1), axis=0)
-        one, other = edges.T
+        edges = np.concatenate([tri[:, [0, 1]], tri[:, [1, 2]], tri[:, [2, 0]]])
+        one, other = np.unique(np.sort(edges, axis=1), axis=0).T
         length = np.linalg.norm(self.points[one] - self.points[other], axis=1)
-        differ = self.answers[one, 0] != self.answers[other, 0]
-        doubted = predicted[one] != predicted[other]
+        across = self.side[one] != self.side[other]
+        differ = (self.answers[one, 0] != self.answers[other, 0]) & ~across
+        doubted = (predicted[one] != predicted[other]) | across
         worth = length * np.where(differ, _WORTH[0], np.where(doubted, _WORTH[1], _WORTH[2]))
         chosen: list[np.ndarray] = []
         for k in np.argsort(-worth):
@@ -87,6 +107,7 @@ def refined(
     budget: int,
     ask: Callable[[np.ndarray], np.ndarray],
     predict: Callable[[np.ndarray], np.ndarray],
+    side: Callable[[np.ndarray], np.ndarray],
 ) -> Border:
     """Ask at given points, then where the answers leave the border most open.
 
@@ -97,15 +118,15 @@ def refined(
         Questions in all.
     ask : callable
         Answers (m, k) at points (m, 2).
-    predict : callable
-        Predictions (m,) at points.
+    predict, side : callable
+        Predictions (m,) and sides (m,) at points.
     """
-    border = Border(first, ask(first))
+    border = Border(first, ask(first), side(first))
     part = max(1, -(-(budget - len(first)) // _ROUND))
     while len(border.points) < budget:
         new = border.worst_edges(min(part, budget - len(border.points)), predict(border.points))
         if not len(new):
             break
         answers = np.concatenate([border.answers > 0.5, ask(new)])
-        border = Border(np.concatenate([border.points, new]), answers)
+        border = Border(np.concatenate([border.points, new]), answers, np.append(border.side, side(new)))
     return border

@@ -15,7 +15,6 @@ from ..limit_cycles.predicted.linear import LinearPart
 from ..simulate.loop import closed_loop
 
 GAINS = ("kp", "ki", "kd")
-UNITS = {"kp": "N/m", "ki": "N/(m s)", "kd": "N s/m"}
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,12 @@ class Structure:
     def loop(self, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
         """Return the closed loop with these gains."""
         return closed_loop(self.controller(gains), translated(self.block), output=self.output)
+
+    def loop_gain(self, gains: Mapping[str, Any], omega) -> np.ndarray:
+        """P C at a frequency each (NaN where that is): at a cycle -1/N, from input to output amplitude."""
+        known = np.where(np.isfinite(omega), omega, 1.0)
+        C = sum(gains[name] * term for name, term in zip(GAINS, self.terms(known), strict=True))
+        return np.where(np.isfinite(omega), C * self.beside(known), np.nan)
 
     def unstable_poles(self) -> int:
         """Poles of P in the right half plane."""

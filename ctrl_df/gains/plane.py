@@ -87,9 +87,13 @@ class Plane:
         missing = ~np.isfinite(self.Z)
         filled = self.Z
         if missing.any():
-            filled = self.Z[tuple(distance_transform_edt(missing, return_distances=False, return_indices=True))]
+            filled = self.Z[
+                tuple(distance_transform_edt(missing, return_distances=False, return_indices=True))
+            ]
         phase = np.unwrap(np.unwrap(np.angle(filled), axis=1), axis=0)
-        size, phase = (RectBivariateSpline(self.log_a, self.log_w, v) for v in (np.log(np.abs(filled)), phase))
+        size, phase = (
+            RectBivariateSpline(self.log_a, self.log_w, v) for v in (np.log(np.abs(filled)), phase)
+        )
         known = RegularGridInterpolator(
             (self.log_a, self.log_w), (~missing).astype(float), bounds_error=False, fill_value=0.0
         )
