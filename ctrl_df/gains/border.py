@@ -12,6 +12,7 @@ from scipy.stats import qmc
 # An edge is cut by its length times this: between different answers, across what may be a border, between none.
 # At the ends of the range an edge of 0.2 that nothing is known against waits for borders of 0.025 to be resolved.
 _WORTH = (1.0, 0.35, 0.125)
+_COARSE = 0.1  # length up to which an edge across the line is cut like one with different answers
 _ROUND = 8  # rounds of cutting
 
 
@@ -59,8 +60,8 @@ class Border:
     def __call__(self, places, side) -> np.ndarray:
         """Return the answers at places (m, 2) on their sides (m,), as booleans (m, k).
 
-        Linear between those corners of the triangle around a place that lie on its side; where none does, the
-        answers of the nearest point that does, or of the nearest of all.
+        Where the corners of the triangle around a place disagree, linear between those on its side; where none
+        is, the answers of the nearest point that lies there, or of the nearest of all.
         """
         places = np.clip(np.atleast_2d(places), 0.0, 1.0)
         simplex = self.mesh.find_simplex(places, tol=1e-9)
@@ -70,7 +71,9 @@ class Border:
         turn, corners = self.mesh.transform[simplex], self.mesh.simplices[simplex]
         share = np.einsum("nij,nj->ni", turn[:, :2], places - turn[:, 2])
         share = np.column_stack([share, 1 - share.sum(axis=1)])
-        share = np.where(self.side[corners] == side[:, None], np.maximum(share, 1e-12), 0.0)
+        own = self.side[corners] == side[:, None]
+        alike = (self.answers[corners] == self.answers[corners][:, :1]).all(axis=(1, 2))
+        share = np.where(own | alike[:, None], np.maximum(share, 1e-12), 0.0)
         weight = share.sum(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             out = np.einsum("nc,nck->nk", share, self.answers[corners]) / weight[:, None] > 0.5
@@ -89,7 +92,8 @@ class Border:
         one, other = np.unique(np.sort(edges, axis=1), axis=0).T
         length = np.linalg.norm(self.points[one] - self.points[other], axis=1)
         across = self.side[one] != self.side[other]
-        differ = (self.answers[one, 0] != self.answers[other, 0]) & ~across
+        # across a line known beforehand it is asked whether the answers change there, not where
+        differ = (self.answers[one, 0] != self.answers[other, 0]) & (~across | (length > _COARSE))
         doubted = (predicted[one] != predicted[other]) | across
         worth = length * np.where(differ, _WORTH[0], np.where(doubted, _WORTH[1], _WORTH[2]))
         chosen: list[np.ndarray] = []

@@ -50,9 +50,13 @@ class Structure:
             return np.ones(omega.shape, dtype=complex)
         return LinearPart(self.plant)(omega)
 
+    def pid(self, gains: Mapping[str, float]) -> Any:
+        """Return the PID."""
+        return pid(gains["kp"], gains["ki"], gains["kd"], self.tf)
+
     def controller(self, gains: Mapping[str, float]) -> Any:
         """Return P times the PID."""
-        C: Any = pid(gains["kp"], gains["ki"], gains["kd"], self.tf)
+        C = self.pid(gains)
         return C if self.plant is None else _product(C, self.plant)
 
     def loop(self, gains: Mapping[str, float]) -> ct.InterconnectedSystem:

@@ -32,6 +32,12 @@ def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
     return np.maximum(poles, 0).astype(int).reshape(shape)
 
 
+def far_loop(plane: Plane, gains, q) -> np.ndarray:
+    """Open loop for large amplitudes at frequencies exp(q)."""
+    C = sum(gains[name] * t for name, t in zip(GAINS, plane.structure.terms(np.exp(q)), strict=True))
+    return -C / _interpolated(plane, q)
+
+
 def _count(L, q):
     """m/2 - phase/pi for open loops L sampled over ln omega, m taken from the slope at the lowest frequency."""
     with np.errstate(all="ignore"):
