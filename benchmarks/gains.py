@@ -1,10 +1,10 @@
-"""How right a map over gains is: its border of "no cycle" against simulations from twelve starts at random gains.
+"""How right a map over gains is: its border of "no cycle" against simulations at random gains.
 
-``python benchmarks/gains.py [--seed 1] [--loops 10] [--gains 10] [--checks 50]`` draws friction masses (with and
-without a static level above the kinetic one) and two masses with a gap, over decades of mass, friction, gap and
-speed; maps two of the three gains of each; draws gains at random within each map, simulates the loop there from
-twelve starts of random size, and prints for how many the map, and the describing function alone, are right about
-whether the loop cycles. The starts are none of those that the map was made with.
+``python benchmarks/gains.py [--seed 1] [--loops 10] [--gains 10] [--checks 50]`` draws friction masses (with
+and without a static level above the kinetic one) and two masses with a gap, over decades of mass, friction,
+gap and speed; maps two of the three gains of each; draws gains at random within each map, simulates the loop
+there from twelve starts of random size, and prints for how many the map, and the describing function alone,
+are right about whether the loop cycles. The starts are none of those that the map was made with.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def backlash(rng):
 
 
 def ranges(mass, pace, rng):
-    """Two gains as ranges around what suits the mass at a pace, the third a number, as in the paper's loops."""
+    """Two gains as ranges around what suits the mass at a pace, the third a number."""
     size = {"kp": mass * pace**2, "ki": mass * pace**3, "kd": mass * pace}
     fixed = rng.choice(["kp", "ki", "kd"])
     box = {"kp": (0.2, 2.0), "ki": (0.0, 2.0), "kd": (0.2, 2.0)}

@@ -103,8 +103,8 @@ def bounds(owner: str, name: str, value, unit: str) -> tuple[float, float] | Non
     values = real_array(owner, name, value, unit)
     if values.shape != (2,) or not 0 < values[0] < values[1]:
         raise ValueError(
-            f"{owner} needs {name} as (low, high) with 0 < low < high [{unit or 1}]; got {shown(value)}. Leave it "
-            "out to have it chosen."
+            f"{owner} needs {name} as (low, high) with 0 < low < high [{unit or 1}]; got {shown(value)}. "
+            "Leave it out to have it chosen."
         )
     return float(values[0]), float(values[1])
 

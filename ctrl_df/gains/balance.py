@@ -1,8 +1,8 @@
 """Where a loop with given gains balances: its predicted cycles, for many pairs of gains at once.
 
-With one of two free gains held, what the other would have to be, R = (Z - the rest) / its term, is a function of
-(ln a, ln omega); it is a gain where it is real. So the line Im R = 0 holds the cycles of a whole row of gains,
-each where Re R is the gain.
+With one of two free gains held, what the other would have to be, R = (Z - the rest) / its term, is a function
+of (ln a, ln omega); it is a gain where it is real. So the line Im R = 0 holds the cycles of a whole row of
+gains, each where Re R is the gain.
 """
 
 from __future__ import annotations
@@ -65,14 +65,15 @@ def segments(plane: Plane, R) -> Segments:
     tri = np.concatenate(found, axis=1)
     up = above[tri]
     lone = np.where(up[0] == up[1], 2, np.where(up[0] == up[2], 1, 0))
-    column = np.arange(tri.shape[1])
-    apex, sides = tri[lone, column], (tri[(lone + 1) % 3, column], tri[(lone + 2) % 3, column])
+    which = np.arange(tri.shape[1])
+    apex, sides = tri[lone, which], (tri[(lone + 1) % 3, which], tri[(lone + 2) % 3, which])
     P, Q = plane.log_a[tri // nw], plane.log_w[tri % nw]
+    row, column = np.divmod(np.arange(na * nw), nw)
+    fields = plane.log_a[row], plane.log_w[column], flat.real
     ends: list = [[], [], [], []]
     for side in sides:
         share = flat[apex].imag / (flat[apex].imag - flat[side].imag)
-        for out, values in zip(ends, (plane.log_a[np.arange(na * nw) // nw], plane.log_w[np.arange(na * nw) % nw],
-                                      flat.real), strict=False):  # fmt: skip
+        for out, values in zip(ends, fields, strict=False):
             out.append(values[apex] + share * (values[side] - values[apex]))
         ends[3].append(np.minimum(apex, side) * (na * nw) + np.maximum(apex, side))
     p, q, gain, edge = (np.stack(e, axis=1) for e in ends)
@@ -90,7 +91,7 @@ def _sine(P, Q, R):
 
 
 def cycles_along(plane: Plane, gains, sought: str, values) -> Cycles:
-    """Predicted cycles where the gain `sought` takes each of `values` (ascending), the others being as given."""
+    """Find the predicted cycles where the gain `sought` takes each of `values` (ascending)."""
     found = segments(plane, excess(plane, gains, sought))
     low, high = found.gain.min(axis=1), found.gain.max(axis=1)
     # a value on the end of a piece belongs to the piece that begins there

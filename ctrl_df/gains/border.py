@@ -1,4 +1,4 @@
-"""Where a yes turns into a no over a plane, from few answers: triangles between them, cut where they disagree."""
+"""Where a yes turns into a no over a plane, from few answers: triangles between them, cut on the border."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import Delaunay, cKDTree
 from scipy.stats import qmc
 
-# An edge is cut by its length times this: between different answers, across what may be a border, between none.
-# At the ends of the range an edge of 0.2 that nothing is known against waits for borders of 0.025 to be resolved.
+# An edge is cut by its length times this: between different answers, across what may be a border, between
+# none. At the ends of the range an edge of 0.2 that nothing is known against waits for borders of 0.025 to be
+# resolved.
 _WORTH = (1.0, 0.35, 0.125)
 _COARSE = 0.1  # length up to which an edge across the line is cut like one with different answers
 _ROUND = 8  # rounds of cutting
@@ -24,7 +25,7 @@ def spread_points(count: int, seed: int) -> np.ndarray:
 
 
 def deep_points(predicted) -> np.ndarray:
-    """The point farthest from all others of every connected region of a map of predictions, in the unit square."""
+    """Return the innermost point of every connected region of a map of predictions, in the unit square."""
     predicted = np.asarray(predicted)
     found = []
     for value in np.unique(predicted):
@@ -60,8 +61,8 @@ class Border:
     def __call__(self, places, side) -> np.ndarray:
         """Return the answers at places (m, 2) on their sides (m,), as booleans (m, k).
 
-        Where the corners of the triangle around a place disagree, linear between those on its side; where none
-        is, the answers of the nearest point that lies there, or of the nearest of all.
+        Where the corners of the triangle around a place disagree, linear between those on its side; where
+        none is, the answers of the nearest point that lies there, or of the nearest of all.
         """
         places = np.clip(np.atleast_2d(places), 0.0, 1.0)
         simplex = self.mesh.find_simplex(places, tol=1e-9)

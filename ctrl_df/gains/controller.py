@@ -39,12 +39,12 @@ class Structure:
     output: str | None = None
 
     def terms(self, omega) -> np.ndarray:
-        """What each gain is multiplied by in the controller at a frequency, shape (3, *omega.shape)."""
+        """Return what the controller multiplies each gain by at a frequency, shape (3, *omega.shape)."""
         s = 1j * np.asarray(omega, dtype=float)
         return np.stack([np.ones_like(s), 1 / s, s / (self.tf * s + 1)])
 
     def beside(self, omega) -> np.ndarray:
-        """P(j omega)."""
+        """Return P(j omega)."""
         omega = np.asarray(omega, dtype=float)
         if self.plant is None:
             return np.ones(omega.shape, dtype=complex)
@@ -64,13 +64,13 @@ class Structure:
         return closed_loop(self.controller(gains), translated(self.block), output=self.output)
 
     def loop_gain(self, gains: Mapping[str, Any], omega) -> np.ndarray:
-        """P C at a frequency each (NaN where that is): at a cycle -1/N, from input to output amplitude."""
+        """Return P C at a frequency each (NaN where that is): -1/N at a cycle."""
         known = np.where(np.isfinite(omega), omega, 1.0)
         C = sum(gains[name] * term for name, term in zip(GAINS, self.terms(known), strict=True))
         return np.where(np.isfinite(omega), C * self.beside(known), np.nan)
 
     def unstable_poles(self) -> int:
-        """Poles of P in the right half plane."""
+        """Count the poles of P in the right half plane."""
         if self.plant is None or isinstance(self.plant, ct.FrequencyResponseData):
             return 0
         poles = self.plant.poles()

@@ -1,7 +1,8 @@
 """Folds: gains at which two predicted cycles meet and vanish, followed by their arclength.
 
-On a fold 1 + N P C = 0 has a double solution: the derivatives by amplitude and by frequency point the same way.
-These are three equations for (ln a, ln omega) and the two free gains, so a fold is a curve in the plane of gains.
+On a fold 1 + N P C = 0 has a double solution: the derivatives by amplitude and by frequency point the same
+way. These are three equations for (ln a, ln omega) and the two free gains, so a fold is a curve in the plane
+of gains.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def folds(plane: Plane, free, fixed, axes) -> list[np.ndarray]:
 
 
 def _starts(plane, free, fixed, axes, box):
-    """Yield (ln a, ln omega, gains in the box) where a gain has an extreme along the line that the other fixes."""
+    """Yield (ln a, ln omega, gains in the box) where one gain has an extreme while the other is held."""
     for held in (0, 1):
         sought = free[1 - held]
         for value in axes[held]:

@@ -45,13 +45,13 @@ def limit_cycle_map(
 ) -> LimitCycleMap:
     """Map what a PID loop around a block does over two of its gains: whether it rests, cycles or diverges.
 
-    One family of describing functions N(a, omega) serves all gains: a cycle of amplitude a and frequency omega needs
-    ``P C = -1/N``, which are two equations for two gains. Folds, where cycles appear in pairs, and the border of
-    linear stability are followed as curves.
+    One family of describing functions N(a, omega) serves all gains: a cycle of amplitude a and frequency
+    omega needs ``P C = -1/N``, which are two equations for two gains. Folds, where cycles appear in pairs,
+    and the border of linear stability are followed as curves.
 
-    A share of the gains is simulated from twelve starts each, half of them spread evenly, the others where what
-    the loop does changes: so the map is right also where the describing function is not (friction whose static level
-    lies above the kinetic one hunts where it predicts nothing).
+    A share of the gains is simulated from twelve starts each, half of them spread evenly, the others where
+    what the loop does changes: so the map is right also where the describing function is not (friction whose
+    static level lies above the kinetic one hunts where it predicts nothing).
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def limit_cycle_map(
     n : int
         Values of each range.
     amplitude, omega : (low, high), optional
-        Amplitudes at the block's input and frequencies [rad/s] at which cycles are looked for; chosen from the block
-        and the gains if left out.
+        Amplitudes at the block's input and frequencies [rad/s] at which cycles are looked for; chosen from
+        the block and the gains if left out.
     exact_check : int
         Points simulated, 0 or at least 8.
     marks : mapping, optional
@@ -87,7 +87,8 @@ def limit_cycle_map(
     Raises
     ------
     TypeError, ValueError
-        Gains that are not two ranges and a number; a plant that is discrete or measured; what `closed_loop` refuses.
+        Gains that are not two ranges and a number; a plant that is discrete or measured; what `closed_loop`
+        refuses.
 
     Examples
     --------
@@ -129,13 +130,24 @@ def limit_cycle_map(
         unit = box.to_unit(x, y).reshape(-1, 2)
         verdict = corrected(border, unit, (poles > 0).ravel()).reshape(poles.shape)
     curves = folds(plane, box.free, box.fixed, box.axes)
+    output_amplitude = predicted.amplitude / np.abs(structure.loop_gain(gains, predicted.omega))
     return LimitCycleMap(
-        structure, box, verdict, predicted.words, predicted.amplitude,
-        predicted.amplitude / np.abs(structure.loop_gain(gains, predicted.omega)), predicted.omega, predicted.number,
+        structure,
+        box,
+        verdict,
+        predicted.words,
+        predicted.amplitude,
+        output_amplitude,
+        predicted.omega,
+        predicted.number,
         linear_border(plane, box.free, box.fixed, box.ranges),
         [np.column_stack([c[:, :2], np.exp(c[:, 2:])]) for c in curves],
-        tuple(found), agreement, {k: dict(v) for k, v in (marks or {}).items()}, plane, border,
-    )  # fmt: skip
+        tuple(found),
+        agreement,
+        {k: dict(v) for k, v in (marks or {}).items()},
+        plane,
+        border,
+    )
 
 
 def _checked(plane, box, predicted, budget, seed, progress):

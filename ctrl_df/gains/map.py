@@ -78,8 +78,8 @@ class LimitCycleMap:
     x, y : ndarray, shapes (nx,), (ny,)
         Values of the two gains.
     verdict : ndarray of str, shape (nx, ny)
-        ``rests``, ``cycles``, ``diverges``, or several joined by "or": as simulated where the map was checked,
-        else as predicted.
+        ``rests``, ``cycles``, ``diverges``, or several joined by "or": as simulated where the map was
+        checked, else as predicted.
     predicted : ndarray of str, shape (nx, ny)
         The same by the describing function alone.
     amplitude, output_amplitude, omega : ndarray, shape (nx, ny)
@@ -95,8 +95,8 @@ class LimitCycleMap:
     checks : tuple of Simulated
         The loop itself at some gains, simulated from twelve starts, cycles closed exactly.
     agreement : float
-        Share of the evenly spread ones of these at which the describing function is right about whether there is
-        a stable cycle; NaN without checks.
+        Share of the evenly spread ones of these at which the describing function is right about whether there
+        is a stable cycle; NaN without checks.
     marks : dict
         Gains to be marked in the picture, by name.
     """
@@ -179,7 +179,7 @@ class LimitCycleMap:
         return GainPoint(every, verdict, predicted, cycles, truth)
 
     def summary(self) -> str:
-        """Return the map in words: shares of the plane, agreement of the predictions with what was simulated."""
+        """Return the map in words: shares of the plane, agreement of prediction and simulation."""
         box = ", ".join(
             f"{name} {axis[0]:.6g} to {axis[-1]:.6g}"
             for name, axis in zip(self.free, (self.x, self.y), strict=True)
@@ -187,13 +187,13 @@ class LimitCycleMap:
         third = ", ".join(f"{name}={value:.6g}" for name, value in self.fixed.items())
         lines = [f"{box} at {third}:"]
         names, numbers = np.unique(self.verdict, return_counts=True)
-        shares = [f"{name} on {100 * n / self.verdict.size:.3g} %" for name, n in
-                  sorted(zip(names.tolist(), numbers.tolist(), strict=True), key=lambda pair: -pair[1])]  # fmt: skip
+        order = np.argsort(-numbers)
+        shares = [f"{names[k]} on {100 * numbers[k] / self.verdict.size:.3g} %" for k in order]
         lines.append(f"the loop {', '.join(shares)} of the plane.")
         if self.checks:
             lines.append(
-                f"{len(self.checks)} points were simulated from twelve starts each; the describing function is right "
-                f"about a stable cycle at {100 * self.agreement:.3g} % of those spread evenly."
+                f"{len(self.checks)} points were simulated from twelve starts each; the describing function "
+                f"is right about a stable cycle at {100 * self.agreement:.3g} % of those spread evenly."
             )
         else:
             lines.append(
@@ -234,8 +234,8 @@ class LimitCycleMap:
         """Return the gains and how much of the plane cycles."""
         cycling = np.char.find(self.verdict.astype(str), "cycles") >= 0
         return (
-            f"<LimitCycleMap over {self.free[0]} and {self.free[1]}: {self.x.size} x {self.y.size} gains, cycles on "
-            f"{100 * cycling.mean():.3g} %; {len(self.checks)} simulated>"
+            f"<LimitCycleMap over {self.free[0]} and {self.free[1]}: {self.x.size} x {self.y.size} gains, "
+            f"cycles on {100 * cycling.mean():.3g} %; {len(self.checks)} simulated>"
         )
 
     def _repr_html_(self) -> str:
@@ -246,7 +246,7 @@ class LimitCycleMap:
         return self.at(**{name: gains[name] for name in self.free}).predicted
 
     def fine(self, n: int = 120) -> Fine:
-        """Return the map on a finer grid of n x n gains, for pictures: between the simulated points, or predicted."""
+        """Return the map on n x n gains, for pictures: between the simulated points, or predicted."""
         unit = np.linspace(0.0, 1.0, n)
         x, y = self.box.from_unit(np.stack([unit, unit], axis=-1))
         gains = self.box.every(x[:, None], y[None, :])
@@ -269,6 +269,6 @@ class LimitCycleMap:
 
 
 def corrected(border: Border, unit, grows) -> np.ndarray:
-    """Words at points of the unit square; whether motions grow without bound in the large is known exactly."""
+    """Return words at points of the unit square, given whether motions there grow without bound."""
     cycles, rests = border(unit, grows).T
     return np.array([worded(r or not (c or g), c, g) for r, c, g in zip(rests, cycles, grows, strict=True)])

@@ -1,8 +1,8 @@
 """N on the plane of amplitude and frequency, and the balance of a loop with free gains on it.
 
 A cycle stands where 1 + N P C = 0, that is where the controller C(j omega), a sum of gains times known
-functions of frequency, equals what the loop needs there, Z(a, omega) = -1/(N P). Z knows nothing of the gains:
-one family of describing functions serves all of them.
+functions of frequency, equals what the loop needs there, Z(a, omega) = -1/(N P). Z knows nothing of the
+gains: one family of describing functions serves all of them.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Plane:
 
     @cached_property
     def _splines(self):
-        """Logarithm of Z, nearly straight where N is a power of amplitude and frequency, and where it is known."""
+        """Logarithm of Z, nearly straight where N is a power of a and omega, and where Z is known."""
         missing = ~np.isfinite(self.Z)
         filled = self.Z
         if missing.any():
@@ -135,7 +135,7 @@ def plane_of(structure: Structure, corners, amplitude=None, omega=None, progress
 
 
 def _scales(structure, gains) -> tuple[float, float]:
-    """Frequency at which a loop moves [rad/s], and the amplitude at the block's input where the block bends."""
+    """Return the frequency at which a loop moves [rad/s] and the input amplitude at which its block bends."""
     loop: Any = structure.loop(gains)
     kicks = Swings(loop, Engine(loop)).kicks
     if isinstance(loop.parts.block, Mechanism):

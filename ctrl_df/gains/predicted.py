@@ -1,4 +1,4 @@
-"""What the describing function says of gains: cycles at one pair, and words, sizes and numbers over a grid."""
+"""What the describing function says of gains: cycles at one pair, words and sizes over a grid."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def summed_up(cycles: list[Cycles], poles) -> Summary:
 
 
 def fates(stable, poles) -> tuple[bool, bool, bool]:
-    """(rests, cycles, diverges) of cycles by rising amplitude (1 stable, 0 unstable, NaN) and poles in the large."""
+    """Return (rests, cycles, diverges), given cycles by rising amplitude and poles in the large."""
     grows = bool(poles > 0)
     rests = not grows if not len(stable) else bool(stable[0] != 1)
     return rests, bool((np.asarray(stable) == 1).any()), grows

@@ -14,7 +14,8 @@ from ..simulate.crew import require_compiled, side_by_side
 from .controller import Structure
 
 STARTS = tuple(np.geomspace(0.03, 30.0, 12))
-"""Sizes of the starts, of that at which the block's nonlinearity matters; in an order that meets cycles early."""
+"""Sizes of the starts, of that at which the block's nonlinearity matters."""
+# those that meet cycles soonest come first: later starts that end there are not followed to their end
 ORDER = tuple(STARTS[k] for k in (5, 8, 3, 10, 1, 6, 4, 7, 2, 9, 0, 11))
 
 

@@ -1,4 +1,4 @@
-"""The loop in the large, where it is linear: poles to the right at given gains, and the border where they appear."""
+"""The loop in the large, where it is linear: its poles to the right, and the border where they appear."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ _NOWHERE = 1e-9  # determinant, relative, below which two gains are one and the 
 
 
 def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
-    """Number of closed-loop poles in the right half plane for large amplitudes, shape of the gains broadcast.
+    """Count the closed-loop poles in the right half plane for large amplitudes.
 
-    From the phase that 1 + L gains between zero and infinite frequency (Mikhailov): of an open loop with m poles at
-    the origin and n to the right of the axis, ``n + m/2 - phase / pi`` poles of the closed loop lie to the right.
+    From the phase that 1 + L gains between zero and infinite frequency (Mikhailov): of an open loop with m
+    poles at the origin and n to the right of the axis, ``n + m/2 - phase / pi`` poles of the closed loop lie
+    to the right.
     """
     q = np.linspace(plane.log_w[0], plane.log_w[-1], _DENSE)
     far = _interpolated(plane, q)
@@ -39,7 +40,7 @@ def far_loop(plane: Plane, gains, q) -> np.ndarray:
 
 
 def _count(L, q):
-    """m/2 - phase/pi for open loops L sampled over ln omega, m taken from the slope at the lowest frequency."""
+    """m/2 - phase/pi for open loops L over ln omega, m taken from the slope at the lowest frequency."""
     with np.errstate(all="ignore"):
         slope = -(np.log(np.abs(L[:, 1])) - np.log(np.abs(L[:, 0]))) / (q[1] - q[0])
         m = np.maximum(np.round(np.where(np.isfinite(slope), slope, 0)), 0)
@@ -53,9 +54,9 @@ def _count(L, q):
 def linear_border(plane: Plane, free, fixed, ranges, points=4000) -> list[np.ndarray]:
     """Curves in the plane of two gains on which the loop in the large has a pole on the imaginary axis.
 
-    The D-partition: at each frequency Z = C is two equations for two gains. Where the two are one (integral and
-    derivative gain of an ideal PID) they are met at single frequencies, by whole lines of gains; so they are at
-    frequency zero, on ki = 0. Only what parts stable from unstable is returned.
+    The D-partition: at each frequency Z = C is two equations for two gains. Where the two are one (integral
+    and derivative gain of an ideal PID) they are met at single frequencies, by whole lines of gains; so they
+    are at frequency zero, on ki = 0. Only what parts stable from unstable is returned.
 
     Parameters
     ----------

@@ -85,14 +85,16 @@ class TunedPID:
     def summary(self) -> str:
         """Return gains, margins and verdict in words."""
         units = gain_units(self.structure.block, self.structure.output)
-        gains = ", ".join(f"{name} = {value:.5g} {units[name]}".rstrip() for name, value in self.gains.items())
+        gains = ", ".join(
+            f"{name} = {value:.5g} {units[name]}".rstrip() for name, value in self.gains.items()
+        )
         orbit = self.simulated.orbit
         cycle = "" if orbit is None else f" ({orbit.output_amplitude:.4g} at {orbit.omega:.4g} rad/s)"
         met = "" if self.feasible else " Bandwidth and margin asked for are not met together."
         return (
-            f"{gains}: crossover {self.bandwidth:.4g} rad/s, largest sensitivity {self.max_sensitivity:.3g}, phase "
-            f"margin {math.degrees(self.phase_margin):.3g} deg.{met}\n"
-            f"Simulated from {len(self.simulated.fate)} starts the loop {self.verdict}{cycle}; {self.tried} gains were "
+            f"{gains}: crossover {self.bandwidth:.4g} rad/s, largest sensitivity {self.max_sensitivity:.3g}, "
+            f"phase margin {math.degrees(self.phase_margin):.3g} deg.{met}\n"
+            f"From {len(self.simulated.fate)} starts the loop {self.verdict}{cycle}; {self.tried} gains were "
             "simulated."
         )
 
@@ -134,23 +136,24 @@ def tune_pid(
 ) -> TunedPID:
     """Choose the gains of a PID by what the loop really does: no limit cycle, or the smallest one.
 
-    Among the gains whose loop in the large (where friction, gap and the like are negligible) is stable, crosses
-    over within `bandwidth` and keeps its sensitivity below `max_sensitivity`, differential evolution looks for
-    those without a limit cycle and, among these, for the most integral action; where every loop cycles, for the
-    smallest cycle. Each is judged by simulations from twelve starts, not by the describing function, which
-    is blind to the hunting that static friction causes.
+    Among the gains whose loop in the large (where friction, gap and the like are negligible) is stable,
+    crosses over within `bandwidth` and keeps its sensitivity below `max_sensitivity`, differential evolution
+    looks for those without a limit cycle and, among these, for the most integral action; where every loop
+    cycles, for the smallest cycle. Each is judged by simulations from twelve starts, not by the describing
+    function, which is blind to the hunting that static friction causes.
 
     Parameters
     ----------
     block : block
         As in `limit_cycle_map`.
     bandwidth : float or (low, high)
-        Crossover frequency [rad/s], > 0: the least one (up to half as much again is allowed then), or a range.
+        Crossover frequency [rad/s], > 0: the least one (up to half as much again is allowed then), or a
+        range.
     max_sensitivity : float
         Largest |1/(1 + L)|, > 1; 1.7 keeps a gain margin of 2.4 and a phase margin of 34 degrees at least.
     kp, ki, kd : float or (low, high), optional
-        A gain, or bounds of it; left out: chosen from the bandwidth. ``ki=0`` is a PD controller, ``ki=(low, high)``
-        insists on integral action.
+        A gain, or bounds of it; left out: chosen from the bandwidth. ``ki=0`` is a PD controller, ``ki=(low,
+        high)`` insists on integral action.
     tf, plant, output
         As in `limit_cycle_map`.
     seed : int
@@ -165,7 +168,8 @@ def tune_pid(
     Raises
     ------
     TypeError, ValueError
-        A bandwidth or sensitivity out of range, gains that are no number and no range; what `closed_loop` refuses.
+        A bandwidth or sensitivity out of range, gains that are no number and no range; what `closed_loop`
+        refuses.
 
     Examples
     --------
@@ -199,8 +203,9 @@ def tune_pid(
         with progress_bar(None, progress, "simulating gains", "point") as bar:
             search.told = bar.update
             found: OptimizeResult = differential_evolution(
-                search.cost, box, constraints=NonlinearConstraint(search.margins, -np.inf, 0.0), popsize=_MEMBERS,
-                maxiter=_GENERATIONS, seed=seed, polish=False, updating="deferred", init="halton",
+                search.cost, box, constraints=NonlinearConstraint(search.margins, -np.inf, 0.0),
+                popsize=_MEMBERS, maxiter=_GENERATIONS, seed=seed, polish=False, updating="deferred",
+                init="halton",
                 workers=lambda function, items: side_by_side(function, items),
             )  # fmt: skip
         gains = search.gains(found.x)
@@ -238,7 +243,7 @@ class _Search:
         return np.array([poles, low, -high, math.log(sensitivity / self.limit)])
 
     def cost(self, x) -> float:
-        """Rank gains: those that cycle by the size of the cycle, above those that do not, by integral action."""
+        """Rank gains: first those without a cycle, by integral action, then by the size of the cycle."""
         gains = self.gains(x)
         truth = self.known.get(_key(gains))
         if truth is None:
@@ -281,8 +286,15 @@ def _corners(ranges):
 
 
 def _need_in_the_large(structure: Structure, omega) -> np.ndarray:
-    """Controller that balances the block for large amplitudes, at some frequencies."""
-    N = method_for(structure.block, structure.output).harmonics(np.array([_LARGE]), omega, 1)[0][0, :, 1]
+    """Return the controller that balances the block for large amplitudes, at some frequencies."""
+    large = np.array([_LARGE, 10 * _LARGE])
+    N, further = method_for(structure.block, structure.output).harmonics(large, omega, 1)[0][..., 1]
+    if not (np.abs(further) > 0.5 * np.abs(N)).all():
+        raise ValueError(
+            f"{_OWNER} needs a block that keeps its gain for large amplitudes, by which bandwidth and margin are "
+            "judged; that of this one (a relay, a saturation) falls with the amplitude. Map its gains with "
+            "limit_cycle_map."
+        )
     return -1 / (np.broadcast_to(N, omega.shape) * structure.beside(omega))
 
 

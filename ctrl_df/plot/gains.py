@@ -21,9 +21,9 @@ def plot_limit_cycle_map(
 ) -> ct.ControlPlot:
     """Draw a map over gains.
 
-    Shaded where the loop cycles, hatched where large motions grow without bound, white where it comes to rest.
-    Solid contours are frequencies, dashed ones amplitudes of the cycle: exact ones where enough points were
-    simulated, else those of the smallest predicted stable cycle.
+    Shaded where the loop cycles, hatched where large motions grow without bound, white where it comes to
+    rest. Solid contours are frequencies, dashed ones amplitudes of the cycle: exact ones where enough points
+    were simulated, else those of the smallest predicted stable cycle.
 
     Parameters
     ----------
@@ -89,7 +89,8 @@ def plot_limit_cycle_map(
     plain_spines(ax)
     figure.legend(
         handles=handles, loc="outside lower center" if figure.get_layout_engine() else "lower center",
-        ncols=2 if narrow else 3, fontsize=6.5 if narrow else 8, frameon=False, handlelength=2.2, columnspacing=1.2,
+        ncols=2 if narrow else 3, fontsize=6.5 if narrow else 8, frameon=False, handlelength=2.2,
+        columnspacing=1.2,
     )  # fmt: skip
     figure.draw_without_rendering()
     _clear(figure, labels, drawn[3])
@@ -194,7 +195,8 @@ def _marks(ax, gains_map):
         drawn.append(
             ax.annotate(
                 name, (x, y), xytext=(-7 if right else 7, 5), textcoords="offset points",
-                ha="right" if right else "left", color=CROSSING_COLOR, fontsize=9, fontweight="bold", zorder=7,
+                ha="right" if right else "left", color=CROSSING_COLOR, fontsize=9, fontweight="bold",
+                zorder=7,
                 bbox=dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.9),
             )
         )  # fmt: skip
