@@ -9,9 +9,9 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import Delaunay, cKDTree
 from scipy.stats import qmc
 
-# An edge is cut by its length times this: between different answers, across what may be a border, between
-# none. At the ends of the range an edge of 0.2 that nothing is known against waits for borders of 0.025 to be
-# resolved.
+# An edge is cut by its length times this: between answers that differ as no model has it, across what may be
+# a border, between none. At the ends of the range an edge of 0.2 that nothing is known against waits for
+# borders of 0.025 to be resolved.
 _WORTH = (1.0, 0.35, 0.125)
 _COARSE = 0.1  # length up to which an edge across the line is cut like one with different answers
 _ROUND = 8  # rounds of cutting
@@ -51,18 +51,23 @@ class Border:
         Booleans; the first column is the one whose border is sought.
     side : ndarray of bool, shape (n,)
         On which side of the line a point lies.
+    predicted : ndarray of bool, shape (n,)
+        What a model says in the place of the first answer: where it is right all around, it also tells where
+        between the points the answer changes.
     """
 
-    def __init__(self, points, answers, side):
+    def __init__(self, points, answers, side, predicted):
         self.points, self.answers = np.asarray(points, float), np.asarray(answers, float)
-        self.side = np.asarray(side, bool)
+        self.side, self.predicted = np.asarray(side, bool), np.asarray(predicted, bool)
+        self.right = self.predicted == (self.answers[:, 0] > 0.5)
         self.mesh = Delaunay(self.points, qhull_options="QJ")
 
-    def __call__(self, places, side) -> np.ndarray:
-        """Return the answers at places (m, 2) on their sides (m,), as booleans (m, k).
+    def __call__(self, places, side, predicted) -> np.ndarray:
+        """Return the answers at places (m, 2), given their sides and predictions (m,), as booleans (m, k).
 
-        Where the corners of the triangle around a place disagree, linear between those on its side; where
-        none is, the answers of the nearest point that lies there, or of the nearest of all.
+        Where the corners of the triangle around a place disagree, the model's answer if it is right at all of
+        them; else linear between those on the same side; where none is, the answers of the nearest point that
+        lies there, or of the nearest of all.
         """
         places = np.clip(np.atleast_2d(places), 0.0, 1.0)
         simplex = self.mesh.find_simplex(places, tol=1e-9)
@@ -84,9 +89,11 @@ class Border:
             known = known if known.size else np.arange(self.side.size)
             if mine.size:
                 out[mine] = self.answers[known[cKDTree(self.points[known]).query(places[mine])[1]]] > 0.5
+        trusted = self.right[corners].all(axis=1) & np.ptp(self.answers[corners, 0], axis=1).astype(bool)
+        out[trusted, 0] = np.asarray(predicted, bool)[trusted]
         return out
 
-    def worst_edges(self, count: int, predicted) -> np.ndarray:
+    def worst_edges(self, count: int) -> np.ndarray:
         """Middles of the edges most worth a further question, far from each other, (<= count, 2)."""
         tri = self.mesh.simplices
         edges = np.concatenate([tri[:, [0, 1]], tri[:, [1, 2]], tri[:, [2, 0]]])
@@ -95,8 +102,9 @@ class Border:
         across = self.side[one] != self.side[other]
         # across a line known beforehand it is asked whether the answers change there, not where
         differ = (self.answers[one, 0] != self.answers[other, 0]) & (~across | (length > _COARSE))
-        doubted = (predicted[one] != predicted[other]) | across
-        worth = length * np.where(differ, _WORTH[0], np.where(doubted, _WORTH[1], _WORTH[2]))
+        foreseen = differ & self.right[one] & self.right[other]
+        doubted = (self.predicted[one] != self.predicted[other]) | across | foreseen
+        worth = length * np.where(differ & ~foreseen, _WORTH[0], np.where(doubted, _WORTH[1], _WORTH[2]))
         chosen: list[np.ndarray] = []
         for k in np.argsort(-worth):
             middle = 0.5 * (self.points[one[k]] + self.points[other[k]])
@@ -126,12 +134,15 @@ def refined(
     predict, side : callable
         Predictions (m,) and sides (m,) at points.
     """
-    border = Border(first, ask(first), side(first))
+    border = Border(first, ask(first), side(first), predict(first))
     part = max(1, -(-(budget - len(first)) // _ROUND))
     while len(border.points) < budget:
-        new = border.worst_edges(min(part, budget - len(border.points)), predict(border.points))
+        new = border.worst_edges(min(part, budget - len(border.points)))
         if not len(new):
             break
         answers = np.concatenate([border.answers > 0.5, ask(new)])
-        border = Border(np.concatenate([border.points, new]), answers, np.append(border.side, side(new)))
+        sides, predictions = (
+            np.append(a, b) for a, b in ((border.side, side(new)), (border.predicted, predict(new)))
+        )
+        border = Border(np.concatenate([border.points, new]), answers, sides, predictions)
     return border

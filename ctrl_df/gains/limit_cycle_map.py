@@ -15,7 +15,7 @@ from .controller import GAINS, Structure
 from .folds import folds
 from .map import LimitCycleMap, corrected
 from .plane import plane_of, require_linear
-from .predicted import over_grid, summed_up
+from .predicted import at_one, over_grid, summed_up
 from .simulated import Simulated, all_simulated
 from .stability import linear_border, unstable_poles
 
@@ -128,7 +128,7 @@ def limit_cycle_map(
     if checks:
         border, found, agreement = _checked(plane, box, predicted.words, checks, seed, progress)
         unit = box.to_unit(x, y).reshape(-1, 2)
-        verdict = corrected(border, unit, (poles > 0).ravel()).reshape(poles.shape)
+        verdict = corrected(border, unit, (poles > 0).ravel(), verdict.ravel()).reshape(poles.shape)
     curves = folds(plane, box.free, box.fixed, box.axes)
     output_amplitude = predicted.amplitude / np.abs(structure.loop_gain(gains, predicted.omega))
     return LimitCycleMap(
@@ -167,7 +167,8 @@ def _checked(plane, box, predicted, budget, seed, progress):
             return np.array([[s.cycles, s.rests] for s in new])
 
         def predict(unit):
-            return np.char.find(_nearest(predicted, unit), "cycles") >= 0
+            gains = (box.every(float(x), float(y)) for x, y in zip(*box.from_unit(unit), strict=True))
+            return np.array([any(c.stable for c in at_one(plane, g, box.free[1])) for g in gains])
 
         def grows(unit):
             gains = box.every(*box.from_unit(unit))
@@ -176,9 +177,3 @@ def _checked(plane, box, predicted, budget, seed, progress):
         border = refined(first, budget, ask, predict, grows)
     right = predict(even) == np.array([s.cycles for s in found[: len(even)]])
     return border, found, float(right.mean())
-
-
-def _nearest(values, unit):
-    size = np.array(values.shape) - 1
-    i, k = np.round(np.clip(unit, 0, 1) * size).astype(int).T
-    return values[i, k]

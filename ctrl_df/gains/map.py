@@ -175,7 +175,9 @@ class LimitCycleMap:
             verdict = truth.verdict
         elif self.border is not None:
             place = self.box.to_unit(*(every[name] for name in self.free))
-            verdict = str(corrected(self.border, place[None], np.array([poles > 0]))[0])
+            verdict = str(
+                corrected(self.border, place[None], np.array([poles > 0]), np.array([predicted]))[0]
+            )
         return GainPoint(every, verdict, predicted, cycles, truth)
 
     def summary(self) -> str:
@@ -257,7 +259,7 @@ class LimitCycleMap:
         if self.border is None:
             return predicted
         square = np.stack(np.meshgrid(unit, unit, indexing="ij"), axis=-1).reshape(-1, 2)
-        words = corrected(self.border, square, grows.ravel()).reshape(grows.shape)
+        words = corrected(self.border, square, grows.ravel(), found.words.ravel()).reshape(grows.shape)
         known = [c for c in self.checks if c.orbit is not None]
         if len(known) < _ENOUGH:
             return replace(predicted, verdict=words)
@@ -268,7 +270,7 @@ class LimitCycleMap:
         return Fine(x, y, words, between[..., 0], between[..., 1], True)
 
 
-def corrected(border: Border, unit, grows) -> np.ndarray:
-    """Return words at points of the unit square, given whether motions there grow without bound."""
-    cycles, rests = border(unit, grows).T
+def corrected(border: Border, unit, grows, predicted) -> np.ndarray:
+    """Return words at points of the unit square, given predictions and whether motions grow without bound."""
+    cycles, rests = border(unit, grows, np.char.find(predicted, "cycles") >= 0).T
     return np.array([worded(r or not (c or g), c, g) for r, c, g in zip(rests, cycles, grows, strict=True)])

@@ -138,9 +138,9 @@ def tune_pid(
 
     Among the gains whose loop in the large (where friction, gap and the like are negligible) is stable,
     crosses over within `bandwidth` and keeps its sensitivity below `max_sensitivity`, differential evolution
-    looks for those without a limit cycle and, among these, for the most integral action; where every loop
-    cycles, for the smallest cycle. Each is judged by simulations from twelve starts, not by the describing
-    function, which is blind to the hunting that static friction causes.
+    looks for those without a limit cycle and, among these, for the greatest stiffness against slow forces,
+    kp + ki / bandwidth; where every loop cycles, for the smallest cycle. Each is judged by simulations from
+    twelve starts, not by the describing function, which is blind to the hunting that static friction causes.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def tune_pid(
     omega = band[0] / _DECADES, band[1] * _DECADES
     plane = plane_of(structure, _corners(ranges), omega=omega, progress=progress)
     free = [name for name in GAINS if ranges[name][0] < ranges[name][1]]
-    search = _Search(plane, ranges, free, band, limit, band[0] * float(need[0]))
+    search = _Search(plane, ranges, free, band, limit, float(need[0]))
     if free:
         box = [(math.log(ranges[name][0]), math.log(ranges[name][1])) for name in free]
         with progress_bar(None, progress, "simulating gains", "point") as bar:
@@ -223,9 +223,9 @@ def tune_pid(
 class _Search:
     """What the optimiser asks of gains, given by their logarithms."""
 
-    def __init__(self, plane: Plane, ranges, free, band, limit, integral):
+    def __init__(self, plane: Plane, ranges, free, band, limit, need):
         self.plane, self.ranges, self.free = plane, ranges, free
-        self.band, self.limit, self.integral = band, limit, integral
+        self.band, self.limit, self.need = band, limit, need
         self.known: dict[tuple, Simulated] = {}
         self.told: Any = lambda: None
 
@@ -243,7 +243,7 @@ class _Search:
         return np.array([poles, low, -high, math.log(sensitivity / self.limit)])
 
     def cost(self, x) -> float:
-        """Rank gains: first those without a cycle, by integral action, then by the size of the cycle."""
+        """Rank gains: first those without a cycle, by stiffness, then the others by the size of the cycle."""
         gains = self.gains(x)
         truth = self.known.get(_key(gains))
         if truth is None:
@@ -254,7 +254,7 @@ class _Search:
         if truth.cycles and truth.orbit is not None:
             size = truth.orbit.output_amplitude / max(row.size for row in truth.fate)
             return 1.0 + size
-        return 1.0 / (1.0 + gains["ki"] / self.integral)
+        return 1.0 / (1.0 + (gains["kp"] + gains["ki"] / self.band[0]) / self.need)
 
 
 def _key(gains):
@@ -291,9 +291,9 @@ def _need_in_the_large(structure: Structure, omega) -> np.ndarray:
     N, further = method_for(structure.block, structure.output).harmonics(large, omega, 1)[0][..., 1]
     if not (np.abs(further) > 0.5 * np.abs(N)).all():
         raise ValueError(
-            f"{_OWNER} needs a block that keeps its gain for large amplitudes, by which bandwidth and margin are "
-            "judged; that of this one (a relay, a saturation) falls with the amplitude. Map its gains with "
-            "limit_cycle_map."
+            f"{_OWNER} needs a block that keeps its gain for large amplitudes, by which bandwidth and margin "
+            "are judged; that of this one (a relay, a saturation) falls with the amplitude. Map its gains "
+            "with limit_cycle_map."
         )
     return -1 / (np.broadcast_to(N, omega.shape) * structure.beside(omega))
 
