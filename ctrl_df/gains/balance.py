@@ -8,7 +8,7 @@ gains, each where Re R is the gain.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def polished(plane: Plane, gains, p: float, q: float, steps: int = 12) -> tuple[
     return float(x[0]), float(x[1]), float(np.linalg.det(J) / size)
 
 
-def defect(plane: Plane, gains, p, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def defect(plane: Plane, gains, p, q) -> tuple[Any, Any, Any]:
     """(Z - C) / |Z| at pairs, and its derivatives by ln a and ln omega with |Z| held."""
     Z, by_p, by_q = plane.slopes(p, q)
     s, tf = 1j * np.exp(q), plane.structure.tf

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, label
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay, KDTree
 from scipy.stats import qmc
 
 # An edge is cut by its length times this: between answers that differ as no model has it, across what may be
@@ -20,7 +21,8 @@ _ROUND = 8  # rounds of cutting
 def spread_points(count: int, seed: int) -> np.ndarray:
     """Points that fill the unit square evenly, (count, 2); the corners are the first four."""
     corners = np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
-    inner = qmc.Halton(2, seed=seed).random(max(count - 4, 0))
+    generator: Any = qmc.Halton  # seed is called rng from SciPy 1.15 on
+    inner = generator(2, seed=seed).random(max(count - 4, 0))
     return np.concatenate([corners, inner])[:count]
 
 
@@ -32,7 +34,8 @@ def deep_points(predicted) -> np.ndarray:
         regions, count = label(predicted == value)  # pyright: ignore[reportGeneralTypeIssues]
         for k in range(1, count + 1):
             inside = np.pad(regions == k, 1)
-            depth = distance_transform_edt(inside)[1:-1, 1:-1]  # pyright: ignore[reportOptionalSubscript]
+            depth: Any = distance_transform_edt(inside)
+            depth = depth[1:-1, 1:-1]
             found.append((depth.max(), np.unravel_index(np.argmax(depth), depth.shape)))
     found.sort(key=lambda f: -f[0])
     size = np.maximum(np.array(predicted.shape) - 1, 1)
@@ -88,7 +91,7 @@ class Border:
             known = np.flatnonzero(self.side == here)
             known = known if known.size else np.arange(self.side.size)
             if mine.size:
-                out[mine] = self.answers[known[cKDTree(self.points[known]).query(places[mine])[1]]] > 0.5
+                out[mine] = self.answers[known[KDTree(self.points[known]).query(places[mine])[1]]] > 0.5
         trusted = self.right[corners].all(axis=1) & np.ptp(self.answers[corners, 0], axis=1).astype(bool)
         out[trusted, 0] = np.asarray(predicted, bool)[trusted]
         return out

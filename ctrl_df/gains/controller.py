@@ -77,7 +77,7 @@ class Structure:
         return int((poles.real > 1e-9 * np.abs(poles).max(initial=0.0)).sum())
 
 
-def _product(C, P):
+def _product(C: Any, plant) -> Any:
     """PID times plant as one fraction: a state space could not hold the derivative of an ideal PID."""
-    P = ct.tf(P)
+    P: Any = ct.tf(plant)
     return ct.tf(np.polymul(C.num[0][0], P.num[0][0]), np.polymul(C.den[0][0], P.den[0][0]))

@@ -87,9 +87,8 @@ class Plane:
         missing = ~np.isfinite(self.Z)
         filled = self.Z
         if missing.any():
-            filled = self.Z[
-                tuple(distance_transform_edt(missing, return_distances=False, return_indices=True))
-            ]
+            nearest: Any = distance_transform_edt(missing, return_distances=False, return_indices=True)
+            filled = self.Z[tuple(nearest)]
         phase = np.unwrap(np.unwrap(np.angle(filled), axis=1), axis=0)
         size, phase = (
             RectBivariateSpline(self.log_a, self.log_w, v) for v in (np.log(np.abs(filled)), phase)
@@ -121,8 +120,8 @@ def plane_of(structure: Structure, corners, amplitude=None, omega=None, progress
     if omega is None:
         omega = min(paces) / _FASTER, max(paces) * _FASTER
     na, nw = _SIZE[method.quick]
-    w = np.geomspace(*omega, nw)
-    a = _amplitudes(method, np.geomspace(*amplitude, na), w)
+    w = np.geomspace(omega[0], omega[1], nw)
+    a = _amplitudes(method, np.geomspace(amplitude[0], amplitude[1], na), w)
     family = describing_function_family(block, a, w, 1, output=structure.output, progress=progress)
     P = structure.beside(w)
     N = np.broadcast_to(family.N, (a.size, w.size))

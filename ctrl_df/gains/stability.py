@@ -7,6 +7,7 @@ import numpy as np
 from .controller import GAINS
 from .plane import Plane
 
+_LINE = 400  # points of a straight border
 _DENSE = 2000  # frequencies of a phase count
 _ASIDE = 2e-3  # of the box: how far on either side of a curve the poles are counted
 _NOWHERE = 1e-9  # determinant, relative, below which two gains are one and the same at a frequency
@@ -89,12 +90,12 @@ def linear_border(plane: Plane, free, fixed, ranges, points=4000) -> list[np.nda
             share = across[k] / (across[k] - across[k + 1])
             at = np.exp(q[k] + share * (q[k + 1] - q[k]))
             one, other, level = (np.interp(at, w, v.real) for v in (b1 / b1, b2 / b1, need / b1))
-            x = np.linspace(*ranges[0], 400)
+            x = np.linspace(ranges[0][0], ranges[0][1], _LINE)
             curves.append(np.stack([x, (level - one * x) / other], axis=1))
     if "ki" in free and plane.structure.plant is None:
-        line = np.zeros((400, 2))
+        line = np.zeros((_LINE, 2))
         other = 1 - free.index("ki")
-        line[:, other] = np.linspace(*ranges[other], 400)
+        line[:, other] = np.linspace(ranges[other][0], ranges[other][1], _LINE)
         curves.append(line)
     return [piece for curve in curves for piece in _parting(plane, curve, free, fixed, ranges)]
 

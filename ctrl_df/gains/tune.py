@@ -202,11 +202,12 @@ def tune_pid(
         box = [(math.log(ranges[name][0]), math.log(ranges[name][1])) for name in free]
         with progress_bar(None, progress, "simulating gains", "point") as bar:
             search.told = bar.update
-            found: OptimizeResult = differential_evolution(
+            evolve: Any = differential_evolution  # seed is called rng from SciPy 1.15 on
+            found: OptimizeResult = evolve(
                 search.cost, box, constraints=NonlinearConstraint(search.margins, -np.inf, 0.0),
                 popsize=_MEMBERS, maxiter=_GENERATIONS, seed=seed, polish=False, updating="deferred",
                 init="halton",
-                workers=lambda function, items: side_by_side(function, items),
+                workers=side_by_side,
             )  # fmt: skip
         gains = search.gains(found.x)
     else:

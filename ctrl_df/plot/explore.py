@@ -192,7 +192,7 @@ class Explorer:
         )
         self._family = _family_around(plane, centres)
         w = np.exp(plane.log_w)
-        curve = plane.structure.loop_gain(self.gains, w)
+        curve: Any = plane.structure.loop_gain(self.gains, w)
         places = [complex(plane.structure.loop_gain(self.gains, np.array([c.omega]))[0]) for c in self.cycles]
         marked = list(places)
         if orbit is not None:
@@ -213,8 +213,8 @@ class Explorer:
         ax.set_title(self._told(orbit), fontsize=7 if self._narrow else 9, loc="left")
         size = 7 if self._narrow else 9
         ax.tick_params(labelsize=size)
-        ax.xaxis.label.set_size(size)
-        ax.yaxis.label.set_size(size)
+        ax.xaxis.label.set_fontsize(size)
+        ax.yaxis.label.set_fontsize(size)
         _clear(ax, marked, curve)
 
     def _told(self, orbit) -> str:
@@ -265,7 +265,7 @@ def _range(name, value) -> tuple[float, float, float]:
     """(low, start, high) of a slider; three times the same for a fixed gain."""
     given = real_array(_OWNER, name, value).ravel()
     if given.size == 1:
-        return (float(given[0]),) * 3
+        return float(given[0]), float(given[0]), float(given[0])
     if given.size == 2:
         given = np.array([given[0], given.mean(), given[1]])
     low, start, high = given if given.size == 3 else (1.0, 0.0, 0.0)

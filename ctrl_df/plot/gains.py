@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
@@ -68,7 +70,7 @@ def plot_limit_cycle_map(
     drawn[1] = [
         ax.plot(c[:, 0], c[:, 1], color="k", lw=1.2, ls=(0, (5, 2)), zorder=4)[0] for c in gains_map.folds
     ]
-    handles = [Patch(fc=color, ec="0.4", hatch=hatch, label=name) for name, color, hatch in names]
+    handles: list[Any] = [Patch(fc=color, ec="0.4", hatch=hatch, label=name) for name, color, hatch in names]
     if drawn[0]:
         handles.append(Line2D([], [], color="k", lw=1.8, label="linear stability border"))
     if drawn[1]:
@@ -179,7 +181,7 @@ def _checks(ax, gains_map, handles):
         at = [c.gains for c in gains_map.checks if c.cycles == cycles]
         if at:
             x, y = ([g[name_] for g in at] for name_ in gains_map.free)
-            style = dict(ls="none", marker="o", ms=2.8, mfc=fill, mec="0.25", mew=0.6)
+            style: Any = dict(ls="none", marker="o", ms=2.8, mfc=fill, mec="0.25", mew=0.6)
             drawn += ax.plot(x, y, zorder=5, clip_on=False, **style)
             handles.append(Line2D([], [], label=name, **style))
     return drawn
