@@ -99,6 +99,14 @@ class LimitCycleMap:
         is a stable cycle; NaN without checks.
     marks : dict
         Gains to be marked in the picture, by name.
+
+    Examples
+    --------
+    >>> import ctrl_df as cdf
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> gains = cdf.limit_cycle_map(axis, kp=(500, 4000), ki=(0, 80000), kd=130, n=10, exact_check=0)
+    >>> gains.verdict[0, -1], gains.verdict[-1, 0], gains.number.max()
+    (np.str_('diverges'), np.str_('rests'), np.int64(2))
     """
 
     structure: Structure
@@ -156,6 +164,14 @@ class LimitCycleMap:
         ------
         TypeError, ValueError
             Gains that are not the two free ones, or outside the map.
+
+        Examples
+        --------
+        >>> import ctrl_df as cdf
+        >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=5.5)
+        >>> gains = cdf.limit_cycle_map(axis, kp=(500, 4000), ki=(0, 80000), kd=130, n=10, exact_check=0)
+        >>> gains.at(kp=2000, ki=44250, exact=True).simulated.orbit
+        <Orbit: 7.945402 @ 11.62868 rad/s, stable>
         """
         if set(gains) != set(self.free):
             raise TypeError(

@@ -62,6 +62,16 @@ class TunedPID:
         Predictions at these gains against exact orbits; see `ctrl_df.verify`.
     tried : int
         Gains simulated.
+
+    Examples
+    --------
+    >>> import ctrl_df as cdf
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> tuned = cdf.tune_pid(axis, bandwidth=12, kp=1500, ki=3000, kd=130)
+    >>> tuned
+    <TunedPID kp=1500, ki=3000, kd=130: rests>
+    >>> round(tuned.bandwidth, 1), tuned.feasible
+    (16.6, True)
     """
 
     gains: dict[str, float]

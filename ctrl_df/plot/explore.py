@@ -92,7 +92,7 @@ def explore(
     >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=5.5)
     >>> view = cdf.explore(axis, kp=(500, 2000, 4000), ki=(0, 44250, 80000), kd=130)
     >>> view.simulated.orbit
-    <Orbit: 8.461497 @ 11.62868 rad/s, stable>
+    <Orbit: 7.945402 @ 11.62868 rad/s, stable>
     >>> view.set(ki=10000)
     >>> view.gains["ki"]
     10000.0
