@@ -18,7 +18,7 @@ from .kicks import Kicks
 _WORK = 300_000  # integration steps of one simulation
 _FEW = 12  # swings within that work, below which it is no use
 _QUIET = 40  # strides without a passage after which a loop is called at rest, if nothing in it moves on
-_PATIENCE = 4000  # the same while something does: an integral that winds up, a slow mode
+_PATIENCE = 400  # the same while something does: an integral that winds up, a slow mode
 _DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
