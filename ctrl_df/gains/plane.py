@@ -64,9 +64,14 @@ class Plane:
         p, q = np.atleast_1d(p), np.atleast_1d(q)
         if not self.method.quick:
             return self._between(p, q)
-        w = np.exp(q)
-        N, regime, spread = points(self.method, np.exp(p), w if self.method.needs_omega else None)
-        return _needed(N, self.structure.beside(w), noisy(regime, spread))
+        near_p, near_q = (
+            np.clip(np.nan_to_num(v), axis[0] - 1, axis[-1] + 1)
+            for v, axis in ((p, self.log_a), (q, self.log_w))
+        )
+        w = np.exp(near_q)
+        N, regime, spread = points(self.method, np.exp(near_p), w if self.method.needs_omega else None)
+        Z = _needed(N, self.structure.beside(w), noisy(regime, spread))
+        return np.where((near_p == p) & (near_q == q), Z, np.nan)  # a step of Newton's may go astray
 
     def slopes(self, p, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Z and its derivatives by ln a and ln omega, at pairs."""
