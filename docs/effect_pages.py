@@ -32,8 +32,10 @@ SIZES = {"N": 3.0, "m": 0.03, "s": 0.03, "rad": 0.5, "kg": 2.0, "V": 3.0, "A": 3
 SHOWN = {
     "drift": {"rate": 0.02},
     "input_gain": {"gain": 0.8},
+    "load_dependent_friction": {"coefficient": 0.2},
     "position_ripple": {"amplitude": 2.0, "wavelength": 0.1},
     "stribeck": {"level": 3.0, "velocity": 0.1},
+    "torque_constant": {"constant": 2.0, "resistance": 1.0},
 }
 ROLES = {
     "force": "a force that depends on position, speed or time",
@@ -86,7 +88,7 @@ def law_curves(effect):
     """Return the curves of a plain law as (label, abscissa, force), over speed and place; or []."""
     law, p = effect.law, np.array(effect.values)
     v, x = np.linspace(-1, 1, 801), np.linspace(-0.2, 0.2, 801)
-    if law is None or effect.states:
+    if law is None or effect.states or effect.role not in ("force", "friction"):
         return []
     try:
         if effect.role == "friction":
