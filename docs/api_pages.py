@@ -17,7 +17,7 @@ RESULTS = {
     "limit_cycles.exact.fate": ("Fate",),
     "simulate.response": ("EventResponse",),
     "simulate.batch": ("BatchResponse",),
-    "identify.compare": ("Comparison", "RecordComparison"),
+    "identify.results.comparison": ("Comparison", "RecordComparison"),
     "identify.refit": ("Fit", "FittedParameter"),
     "identify.results.diagnosis": ("Diagnosis", "CandidateEffect"),
     "identify.results.ladder": ("Study", "Step"),

@@ -19,7 +19,7 @@ RESULTS = {
     "simulate.batch": ("BatchResponse",),
     "limit_cycles.exact.orbit": ("NoOrbit",),
     "limit_cycles.check": ("Check",),
-    "identify.compare": ("Comparison",),
+    "identify.results.comparison": ("Comparison",),
     "identify.refit": ("Fit",),
     "identify.results.diagnosis": ("Diagnosis", "CandidateEffect"),
     "identify.results.ladder": ("Study",),

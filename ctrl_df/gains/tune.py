@@ -49,7 +49,7 @@ class TunedPID:
     bandwidth : float
         Crossover frequency [rad/s] of the loop in the large, where friction, gap and the like are negligible.
     max_sensitivity : float
-        Its largest |1/(1 + L)|: the modulus margin is the inverse.
+        Its largest ``|1/(1 + L)|``: the modulus margin is the inverse.
     phase_margin : float
         [rad].
     feasible : bool
@@ -160,7 +160,7 @@ def tune_pid(
         Crossover frequency [rad/s], > 0: the least one (up to half as much again is allowed then), or a
         range.
     max_sensitivity : float
-        Largest |1/(1 + L)|, > 1; 1.7 keeps a gain margin of 2.4 and a phase margin of 34 degrees at least.
+        Largest ``|1/(1 + L)|``, > 1; 1.7 keeps a gain margin of 2.4 and a phase margin of 34 degrees.
     kp, ki, kd : float or (low, high), optional
         A gain, or bounds of it; left out: chosen from the bandwidth. ``ki=0`` is a PD controller, ``ki=(low,
         high)`` insists on integral action.
