@@ -122,11 +122,20 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     )
 
 
-def level(effects: Sequence[Effect], moving: float, direction: float, speed: float) -> float:
-    """Dry friction level [N] of a chain of friction effects."""
+def level(
+    effects: Sequence[Effect],
+    moving: float,
+    direction: float,
+    speed: float,
+    place: float = 0.0,
+    drive: float = 0.0,
+    load: float = 0.0,
+) -> float:
+    """Dry friction level [N] of a chain of friction effects; those that ask are told place, drive and load."""
     value = 0.0
     for effect in effects:
-        value = type(effect).law(moving, direction, speed, value, effect.values)  # type: ignore[misc]
+        told = (place, drive, load) if effect.asks else ()
+        value = type(effect).law(moving, direction, speed, value, effect.values, *told)  # type: ignore[misc]
     return value
 
 

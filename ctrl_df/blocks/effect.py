@@ -11,7 +11,8 @@ role          what the class provides
 ``force``     ``law(t, x, v, z, p, dz) -> force`` [N] along +x, smooth; ``states`` internal states
               z, whose rates the law writes into dz
 ``friction``  ``law(moving, direction, speed, base, p) -> level`` [N]: the dry friction level given the
-              level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static
+              level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static. One that
+              `asks` for more is called ``law(moving, direction, speed, base, p, x, drive, load)``
 ``contact``   known to the engine: `HardStop`, `Backlash`
 ``coupling``  known to the engine: `Compliance`
 ``presliding`` known to the engine: `Bristle`
@@ -33,6 +34,7 @@ from ..checks import shown
 from .parameter import Parameter, checked
 from .primitives import Primitive
 
+TOLD = ("x", "drive", "load")
 ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
 
 _LIBRARY: dict[str, type[Effect]] = {}
@@ -53,6 +55,11 @@ class Effect:
         How the effect shows in the residual of a model without it, in plain words.
     source : str
         Where the law comes from.
+    asks : tuple of str
+        What a friction law has to know besides the motion, out of `TOLD`: ``x``, where the body is [m];
+        ``drive`` and ``load`` [N], what drives the body and what else acts on it, but dry friction, taken
+        positive against the drive. A transmission carries the drive where all inertia lies behind it, the
+        load where all lies before it. A law that asks for any of them is told all. Such laws run by adaptive steps.
     rank : int
         Order among friction effects: levels that add (0) before laws that shape them (1).
     side : str
@@ -79,6 +86,7 @@ class Effect:
     role: ClassVar[str] = ""
     shows: ClassVar[str] = ""
     source: ClassVar[str] = ""
+    asks: ClassVar[tuple[str, ...]] = ()
     rank: ClassVar[int] = 0
     side: ClassVar[str] = "motor"
     states: ClassVar[int] = 0
@@ -149,6 +157,11 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
         )
     if cls.role not in ROLES:
         raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
+    if not set(cls.asks) <= set(TOLD) or (cls.asks and cls.role != "friction"):
+        raise ValueError(
+            f"{cls.__name__} may ask for {', '.join(TOLD)}, if its role is friction; got role {cls.role!r}, "
+            f"asks={cls.asks!r}."
+        )
     known = _LIBRARY.get(cls.id)
     if known is not None and _origin(known) != _origin(cls):
         raise ValueError(

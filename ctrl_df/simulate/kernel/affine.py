@@ -238,14 +238,14 @@ def extend(prog, mode, work, g, out):
             if mode[mo + b] != STUCK or at_wall or (joined and b == DIR0):
                 continue
             up, down, force = (
-                dry_level(prog, n, b, 0.0, 1.0, 0.0),
-                dry_level(prog, n, b, 0.0, -1.0, 0.0),
+                dry_level(prog, n, b, 0.0, 1.0, 0.0, f),
+                dry_level(prog, n, b, 0.0, -1.0, 0.0, f),
                 f[b],
             )
             if joined:
                 force = f[0] + f[1]
-                up += dry_level(prog, n, 0, 0.0, 1.0, 0.0)
-                down += dry_level(prog, n, 0, 0.0, -1.0, 0.0)
+                up += dry_level(prog, n, 0, 0.0, 1.0, 0.0, f)
+                down += dry_level(prog, n, 0, 0.0, -1.0, 0.0, f)
             at = prog.nodes[n, G] + (G_BODY1 if b == DIR1 else 0)
             out[at] = up - force
             out[ng + b] = down + force

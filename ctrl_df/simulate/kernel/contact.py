@@ -60,9 +60,9 @@ def tendency(f, up, down, wall):
 @part
 def body_tendency(prog, node, body, f, wall):
     """Tendency of one body by itself."""
-    up = dry_level(prog, node, body, 0.0, 1.0, 0.0)
-    down = dry_level(prog, node, body, 0.0, -1.0, 0.0)
-    return tendency(f, up, down, wall)
+    up = dry_level(prog, node, body, 0.0, 1.0, 0.0, f)
+    down = dry_level(prog, node, body, 0.0, -1.0, 0.0, f)
+    return tendency(f[body], up, down, wall)
 
 
 @part
@@ -95,7 +95,7 @@ def resolve(prog, node, t, x, mode, force, f, dx):
             elif wall == 0 and not has_dry(prog, node, b):
                 mode[mo + b] = FREE
             else:
-                d = body_tendency(prog, node, b, f[b], wall)
+                d = body_tendency(prog, node, b, f, wall)
                 mode[mo + b] = STUCK if d == 0 else _direction(prog, node, b, d)
                 if b == driven and d != 0:
                     mode[mo + WALL] = 0
@@ -140,16 +140,16 @@ def _resolve_joined(prog, node, x, mode, f):
         mode[mo + DIR0] = _direction(prog, node, 0, d)
         mode[mo + DIR1] = _direction(prog, node, 1, d)
         if impact:
-            f0 = f[0] - d * dry_level(prog, node, 0, 1.0, float(d), abs(v))
-            f1 = f[1] - d * dry_level(prog, node, 1, 1.0, float(d), abs(v))
+            f0 = f[0] - d * dry_level(prog, node, 0, 1.0, float(d), abs(v), f)
+            f1 = f[1] - d * dry_level(prog, node, 1, 1.0, float(d), abs(v), f)
             if side * (m0 * (f0 + f1) / (m0 + m1) - f0) < 0.0:
                 mode[mo + JOINT] = 0
         return
-    d0 = body_tendency(prog, node, 0, f[0], 0)
-    d1 = body_tendency(prog, node, 1, f[1], wall)
+    d0 = body_tendency(prog, node, 0, f, 0)
+    d1 = body_tendency(prog, node, 1, f, wall)
     if impact:
-        a0 = 0.0 if d0 == 0 else (f[0] - d0 * dry_level(prog, node, 0, 1.0, float(d0), 0.0)) / m0
-        a1 = 0.0 if d1 == 0 else (f[1] - d1 * dry_level(prog, node, 1, 1.0, float(d1), 0.0)) / m1
+        a0 = 0.0 if d0 == 0 else (f[0] - d0 * dry_level(prog, node, 0, 1.0, float(d0), 0.0, f)) / m0
+        a1 = 0.0 if d1 == 0 else (f[1] - d1 * dry_level(prog, node, 1, 1.0, float(d1), 0.0, f)) / m1
         if side * (a1 - a0) < 0.0:
             mode[mo + JOINT] = 0
             mode[mo + DIR0] = _separate(prog, node, 0, d0, 0)
@@ -157,8 +157,8 @@ def _resolve_joined(prog, node, x, mode, f):
             if d1 != 0:
                 mode[mo + WALL] = 0
             return
-    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0) + dry_level(prog, node, 1, 0.0, 1.0, 0.0)
-    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0) + dry_level(prog, node, 1, 0.0, -1.0, 0.0)
+    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0, f) + dry_level(prog, node, 1, 0.0, 1.0, 0.0, f)
+    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0, f) + dry_level(prog, node, 1, 0.0, -1.0, 0.0, f)
     d = tendency(f[0] + f[1], up, down, wall)
     if d == 0:
         mode[mo + DIR0] = mode[mo + DIR1] = STUCK

@@ -39,7 +39,7 @@ from ..program.layout import (
     X,
 )
 from .flow import input_rates, rates
-from .mechanics import closed, dry_level
+from .mechanics import closed, dry_level_at
 from .stepper import inside
 
 GRAIN = 4.0 * np.finfo(float).eps
@@ -93,8 +93,9 @@ def tolerances(prog, x, mode, scale, gtol):
                 gtol[go + G_JOINT_HIGH] += rounding
             for b in range(prog.ints[prog.nodes[n, AUX] + A_BODIES]):
                 if mode[prog.nodes[n, MODE] + b] == STUCK:
-                    level = dry_level(prog, n, b, 0.0, 1.0, 0.0) + dry_level(prog, n, b, 0.0, -1.0, 0.0)
-                    gtol[go + b] += GRAIN * level
+                    place = x[first + 2 * b]
+                    for side in (1.0, -1.0):
+                        gtol[go + b] += GRAIN * dry_level_at(prog, n, b, 0.0, side, 0.0, place, 0.0, 0.0)
             gtol[go + G_WALL_LOW] += GRAIN * abs(prog.par[po + P_LOW])
             gtol[go + G_WALL_HIGH] += GRAIN * abs(prog.par[po + P_HIGH])
         elif kind == PWA:

@@ -24,6 +24,7 @@ STUCK, FREE = 0, 2  # besides the directions -1 and +1
 # integer layout of a mechanism in the aux table
 A_BODIES, A_JOINT, A_STOP, A_BRISTLE, A_MEASURED, A_NFORCE, A_NFRIC0, A_NFRIC1, A_LAWS = range(9)
 A_INNER = 9  # states of its laws, which follow those of its bodies
+A_ASKING = 10  # whether a friction law asks for more than the motion
 # joint kinds
 J_NONE, J_RIGID, J_IMPACT, J_ELASTIC = range(4)
 
@@ -79,10 +80,11 @@ R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SORT, R_SIZE = range(6)
 # sorts of laws: affine in place and speed while the mode lasts, or not; a friction law is of the sort of its
 # whole chain
 STRAIGHT, CURVED = 1, 2
+ASKING = 4  # added to the sort of a friction law that asks for more than the motion
 
 # forces of a mechanism in the scratch of a run: on its two bodies; those given from outside on either; which
-# sorts of laws are asked
-F_GIVEN, F_ASKED, F_SIZE = 2, 4, 5
+# sorts of laws are asked; what friction laws that ask are told of either body: place, drive, load
+F_GIVEN, F_ASKED, F_TOLD, F_SIZE = 2, 4, 5, 11
 
 # the history of a delay in the work vector: three numbers, then a ring of records: start, length,
 # generation, values; see `ctrl_df.simulate.kernel.history`

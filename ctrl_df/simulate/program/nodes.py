@@ -164,8 +164,8 @@ def core_node(core: Core, x0: int) -> Node:
         par += term.effect.values
     for body, chain in enumerate(core.friction):
         for effect in chain:
-            law = address(type(effect).law, "friction")  # type: ignore[arg-type]
-            laws.append((law, len(par), 0, body, _sort(chain)))
+            law = address(type(effect).law, "asking" if effect.asks else "friction")  # type: ignore[arg-type]
+            laws.append((law, len(par), 0, body, _sort(chain) | (L.ASKING if effect.asks else 0)))
             par += effect.values
     effects = [term.effect for term in core.forces] + [e for chain in core.friction for e in chain]
     chains = [len(c) for c in core.friction] + [0]
@@ -180,6 +180,7 @@ def core_node(core: Core, x0: int) -> Node:
         chains[1],
         0,  # index of its first law, filled when packed
         sum(term.effect.states for term in core.forces) + (bristle is not None),
+        int(any(effect.asks for chain in core.friction for effect in chain)),
     ]
     mode = [L.FREE, L.FREE, 0, 0]
     return Node(
