@@ -55,6 +55,10 @@ _FIELDS = {
     "RESTITUTION", "compliance.stiffness": "JOINT_K", "compliance.damping": "JOINT_C", "input_gain.gain":
     "GAIN", "input_saturation.level": "SATURATION", "input_dead_zone.threshold": "DEAD_ZONE",
     "input_delay.delay": "DELAY", "input_lag.time_constant": "LAG", "sensor_delay.delay": "SENSOR_DELAY",
+    "gravity.torque": "PENDULUM", "gravity.angle0": "PENDULUM_ANGLE",
+    "position_dependent_friction.amplitude": "PLACED", "position_dependent_friction.wavelength":
+    "PLACED_LENGTH", "position_dependent_friction.phase": "PLACED_PHASE",
+    "load_dependent_friction.coefficient": "FORCE_FRICTION",
     "sensor_quantization.step": "SENSOR_STEP", "sensor_offset.offset": "SENSOR_OFFSET", "drift.rate":
     "SENSOR_DRIFT",
 }  # fmt: skip
@@ -68,6 +72,9 @@ def pack(values: dict[str, float]) -> np.ndarray:
             given[_FIELDS[name]] = value
         elif name.startswith("outside."):
             given[name.removeprefix("outside.").upper()] = value
+    if "hysteresis.force" in values:
+        stroke = values["hysteresis.stroke"]
+        given.update(HYSTERESIS_K=values["hysteresis.force"] / stroke, HYSTERESIS_B=1 / stroke)
     if "hard_stop.limit" in values:
         given.update(STOP=1.0, STOP_LOW=-values["hard_stop.limit"])
     joint = (
@@ -105,6 +112,8 @@ class Setup:
         self.w = 2 * math.pi * self.f0
         mass = float(np.exp(rng.uniform(np.log(0.5), np.log(100))))
         self.speed = float(np.exp(rng.uniform(np.log(0.05), np.log(0.5))))
+        if wants.stroke is not None:
+            self.speed = self.w * float(rng.uniform(*wants.stroke))
         self.stroke = self.speed / self.w
         self.inertia = mass * self.speed * self.w  # force that makes this speed at f0
         kinetic = self.inertia * float(rng.uniform(*wants.dry))

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from brute_force import Dry
 
 import ctrl_df as cdf
 from ctrl_df.blocks.effect import Effect, register_effect
@@ -28,57 +28,6 @@ class Rough(Effect):
         return base + p[0] + held + p[1] * x * x + p[2] * abs(0.5 * drive + 0.5 * load)
 
 
-def slid(level, static, others, mass, drive, times):
-    """Position of a mass under dry friction, each sign of speed and each hold a run of its own.
-
-    `level` and `static` of (x, drive, load); `others` of (x, v).
-    """
-    t, x, v, out = 0.0, 0.0, 0.0, np.zeros(len(times))
-    while t < times[-1]:
-
-        def pushed(t, x, v=0.0):
-            return drive(t) + others(x, v)
-
-        way = np.sign(v)
-        if way == 0:
-            place, hold = x, lambda t: static(place, drive(t), -others(place, 0.0)) - abs(pushed(t, place))
-            if hold(t) > 0:
-                grid = np.linspace(t, times[-1], 200_000)
-                broken = np.flatnonzero(np.array([hold(s) for s in grid]) < 0)
-                until = times[-1] if not len(broken) else grid[broken[0]]
-                if len(broken):
-                    low, high = grid[broken[0] - 1], until
-                    for _ in range(60):
-                        mid = 0.5 * (low + high)
-                        low, high = (mid, high) if hold(mid) > 0 else (low, mid)
-                    until = high
-                out[(times >= t) & (times <= until)] = x
-                t = until
-                if t >= times[-1]:
-                    break
-            way = np.sign(pushed(t, x))
-
-        def rates(t, s, way=way):
-            return [s[1], (pushed(t, *s) - way * level(s[0], drive(t), -others(*s))) / mass]
-
-        def turns(t, s):
-            return s[1]
-
-        turns.terminal, turns.direction = True, -way
-        some = times[(times > t) & (times <= times[-1])]
-        run = solve_ivp(
-            rates, (t, times[-1]), [x, v], "DOP853", np.append(some, times[-1])[:-1], events=turns,
-            rtol=1e-11, atol=1e-14,
-        )  # fmt: skip
-        out[np.searchsorted(times, run.t)] = run.y[0]
-        if run.t_events[0].size:
-            t, (x, v) = run.t_events[0][0], run.y_events[0][0]
-            v = 0.0
-        else:
-            break
-    return out
-
-
 T = np.linspace(0, 6, 1201)
 
 
@@ -99,7 +48,7 @@ def shapes(p):
 def test_a_users_law_may_ask_for_place_and_load(stiffness):
     block = cdf.Mass(1.5, [Rough(1.5, 4.0, 0.2), cdf.Viscous(0.8), cdf.LinearSpring(stiffness)])
     level, static = shapes((1.5, 4.0, 0.2))
-    truth = slid(level, static, lambda x, v: -0.8 * v - stiffness * x, 1.5, push, T)
+    truth = Dry(level, static, lambda x, v: -0.8 * v - stiffness * x, 1.5, push).run(T)
     run = cdf.event_response(block, T, lambda t: [push(t)])
     assert np.max(np.abs(run.outputs[0] - truth)) < 1e-8 * np.ptp(truth)  # seen: 2.9e-9
     assert any(e.kind == ("reversal" if stiffness else "stick") for e in run.events)
@@ -109,7 +58,7 @@ def test_a_law_that_does_not_ask_is_called_as_ever_and_so_beside_one_that_does()
     plain = cdf.Mass(1.5, [cdf.Coulomb(2.0), cdf.Viscous(0.8)])
     beside = plain.with_effect(Rough(0.0, 4.0, 0.0))
     level = lambda x, drive, load: 2.0 + 4.0 * x * x  # noqa: E731
-    truth = slid(level, lambda *a: level(*a) + 0.25, lambda x, v: -0.8 * v, 1.5, push, T)
+    truth = Dry(level, lambda *a: level(*a) + 0.25, lambda x, v: -0.8 * v, 1.5, push).run(T)
     run = cdf.event_response(beside, T, lambda t: [push(t)])
     assert np.max(np.abs(run.outputs[0] - truth)) < 1e-8 * np.ptp(truth)
 
@@ -131,7 +80,7 @@ def test_many_runs_and_orbits_of_such_laws():
     w, a, laps = 5.0, 12.0, 40
     t = np.linspace(0, laps * 2 * np.pi / w, laps * 400 + 1)
     level, static = shapes((1.5, 4.0, 0.2))
-    x = slid(level, static, lambda x, v: -0.8 * v - 30.0 * x, 1.5, lambda t: a * np.cos(w * t), t)
+    x = Dry(level, static, lambda x, v: -0.8 * v - 30.0 * x, 1.5, lambda t: a * np.cos(w * t)).run(t)
     brute = 2 / a * np.mean((x * np.exp(-1j * w * t))[-400:])
     assert abs(cdf.describing_function(block, a, w) / brute - 1) < 1e-6
 

@@ -37,18 +37,22 @@ def rates(core: Core, t: float, x, u: float) -> list[float]:
         b, z = term.body, term.state
         z_rate = [0.0] * term.effect.states
         law = type(term.effect).law
-        force[b] += law(t, x[2 * b], x[2 * b + 1], x[z : z + term.effect.states], term.effect.values, z_rate)  # type: ignore[misc]
+        value = law(t, x[2 * b], x[2 * b + 1], x[z : z + term.effect.states], term.effect.values, z_rate)  # type: ignore[misc]
+        force[b] += value
+        if term.effect.role == "input":
+            drive += value
         dx[z : z + term.effect.states] = z_rate
-    pull = _joint(core, x)
+    pull = _joint(core, t, x, dx)
     told = _told(core, x, drive, force, pull)
     if core.bodies == 2:
         force[0] += pull
         force[1] -= pull
     for b in range(core.bodies):
-        carried = core.bristle is not None and b == driven
-        dry = _bristle(core, x, dx, told[b]) if carried else _creep(core.friction[b], x[2 * b + 1], told[b])
-        force[b] += dry
-    _stops(core, x, force)
+        if core.presliding is not None and b == driven:
+            force[b] += _presliding(core, x, dx, told[b])
+        else:
+            force[b] += _creep(core.friction[b], x[2 * b + 1], told[b])
+    _stops(core, t, x, dx, force)
     for b in range(core.bodies):
         dx[2 * b] = x[2 * b + 1]
         dx[2 * b + 1] = force[b] / core.masses[b]
@@ -106,31 +110,46 @@ def _creep(friction, v, told):
     return -direction * (kinetic + (static - kinetic) * math.exp(-abs(v) / vs + 1))
 
 
-def _bristle(core, x, dx, told):
-    bristle, s, v = core.bristle, core.bristle_state, x[2 * core.driven + 1]
-    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v), *told) + bristle.level
-    dx[s] = type(bristle).rate(v, x[s], g, bristle.values)
-    return -(bristle.stiffness * x[s] + bristle.damping * dx[s])
+def _presliding(core, x, dx, told):
+    effect, first, v = core.presliding.effect, core.presliding.state, x[2 * core.driven + 1]
+    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v), *told)
+    inner, rates = slice(first, first + effect.states), [0.0] * effect.states
+    force = type(effect).law(v, g, x[inner], effect.values, rates)
+    dx[inner] = rates
+    return force
 
 
-def _joint(core, x):
+def _called(term, t, depth, rate, x, dx):
+    """Return the force of a law over a deflection."""
+    inner, rates = slice(term.state, term.state + term.effect.states), [0.0] * term.effect.states
+    force = type(term.effect).law(t, depth, rate, x[inner], term.effect.values, rates)
+    dx[inner] = rates
+    return force
+
+
+def _joint(core, t, x, dx):
     """Return the force of the joint on the load."""
     if core.joint not in (IMPACT, ELASTIC):
         return 0.0
     delta, rate = x[2] - x[0], x[3] - x[1]
     bend = delta - min(max(delta, 0.0), core.gap)
     if core.joint == ELASTIC:
-        k, c = core.stiffness, core.damping
-        return k * bend + (c * rate if bend != 0 or core.gap == 0 else 0.0)
+        closed = bend != 0 or core.gap == 0
+        force = _called(core.coupling, t, bend, rate if closed else 0.0, x, dx)
+        return force if closed else 0.0
     return _contact(bend, rate, core.masses[0] * core.masses[1] / sum(core.masses), core.restitution)
 
 
-def _stops(core, x, force):
-    if core.stop is None:
+def _stops(core, t, x, dx, force):
+    if core.stop is None and core.contact is None:
         return
     b = core.driven
-    low, high = core.stop.span
+    low, high = core.wall
     bend = x[2 * b] - min(max(x[2 * b], low), high)
+    if core.contact is not None:
+        side = math.copysign(1.0, bend) if bend != 0.0 else 0.0
+        force[b] -= side * max(_called(core.contact, t, abs(bend), side * x[2 * b + 1], x, dx), 0.0)
+        return
     force[b] -= _contact(bend, x[2 * b + 1], core.masses[b], core.stop.restitution)
 
 

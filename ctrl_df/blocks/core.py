@@ -12,15 +12,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .effect import Effect
-from .effects import Backlash, Bristle, Compliance, HardStop
+from .effects import Backlash, HardStop
 from .primitives import Delay, Lag, Play, Primitive, RateLimiter
 
 RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
+BOTH = -1
 
 
 @dataclass(frozen=True)
 class ForceTerm:
-    """A smooth force on one body, with the offset of its internal states."""
+    """A law with the body it acts on (`BOTH` of a joint) and the offset of its internal states."""
 
     effect: Effect
     body: int
@@ -40,8 +41,11 @@ class Core:
     stiffness: float = 0.0
     damping: float = 0.0
     stop: HardStop | None = None
-    bristle: Bristle | None = None
+    bristle: Any = None
     bristle_state: int = -1
+    presliding: ForceTerm | None = None
+    coupling: ForceTerm | None = None
+    contact: ForceTerm | None = None
     input_channel: tuple[tuple[Primitive, int], ...] = ()
     output_channel: tuple[tuple[Primitive, int], ...] = ()
     measured: int = 0
@@ -59,6 +63,12 @@ class Core:
         return ("x", "v", "x_motor", "v_motor")[: 2 * self.bodies]
 
     @property
+    def wall(self) -> tuple[float, float]:
+        """Where stops stand, rigid or yielding; zeros where there are none."""
+        wall: Any = self.stop if self.contact is None else self.contact.effect
+        return wall.span if wall is not None else (0.0, 0.0)
+
+    @property
     def driven(self) -> int:
         """Index of the body the force acts on."""
         return self.bodies - 1
@@ -67,7 +77,7 @@ class Core:
 def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effect], measured: str) -> Core:
     """Lay out states and sort effects by role; `masses` is (mass,) or (load, motor)."""
     backlash = _only(effects, Backlash)
-    compliance = _only(effects, Compliance)
+    compliance = _one(effects, "coupling")
     joint: str | None = None
     if compliance is not None:
         joint = ELASTIC
@@ -76,7 +86,7 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     elif two_mass:
         joint = RIGID
     if joint is not None and not two_mass:
-        share = (compliance or backlash).load_fraction  # type: ignore[union-attr]
+        share = (compliance or backlash).load_fraction
         masses = (share * masses[0], (1 - share) * masses[0])
     motor = len(masses) - 1
     names = ["x", "v"] + (["x_motor", "v_motor"] if motor else [])
@@ -85,15 +95,25 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     friction: list[list[Effect]] = [[] for _ in masses]
     for effect in effects:
         body = 0 if effect.side == "load" else motor
-        if effect.role == "force":
+        if effect.role == "force" or (effect.role == "input" and effect.law is not None):
             forces.append(ForceTerm(effect, body, len(names)))
             names += [f"{effect.id}_{i}" for i in range(effect.states)]
         elif effect.role == "friction":
             friction[body].append(effect)
-    bristle, bristle_state = _only(effects, Bristle), -1
+    bristle, bristle_state = _one(effects, "presliding"), -1
     if bristle is not None:
         bristle_state = len(names)
-        names.append("bristle")
+    yielding = _only([e for e in effects if e.role == "contact" and e.law is not None], Effect)
+    if yielding is not None and _only(effects, HardStop) is not None:
+        raise ValueError(
+            f"a block takes HardStop or {type(yielding).__name__}, not both. Leave one of them out."
+        )
+    terms = {}
+    for effect, body in ((bristle, motor), (compliance, BOTH), (yielding, motor)):
+        if effect is not None:
+            terms[effect.role] = ForceTerm(effect, body, len(names))
+            many = effect.states > 1
+            names += [f"{effect.id}_{i}" if many else effect.id for i in range(effect.states)]
     channels: dict[str, list[tuple[Primitive, int]]] = {"input": [], "output": []}
     for effect in effects:
         if effect.role in channels:
@@ -109,11 +129,12 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         friction=tuple(tuple(sorted(group, key=lambda e: e.rank)) for group in friction),
         gap=backlash.gap if backlash else 0.0,
         restitution=backlash.restitution if backlash else 0.0,
-        stiffness=compliance.stiffness if compliance else 0.0,
-        damping=compliance.damping if compliance else 0.0,
+        stiffness=getattr(compliance, "stiffness", 0.0),
+        damping=getattr(compliance, "damping", 0.0),
         stop=_only(effects, HardStop),
         bristle=bristle,
         bristle_state=bristle_state,
+        **terms,
         input_channel=tuple(channels["input"]),
         output_channel=tuple(channels["output"]),
         measured=motor if measured == "motor" else 0,
@@ -131,7 +152,7 @@ def level(
     drive: float = 0.0,
     load: float = 0.0,
 ) -> float:
-    """Dry friction level [N] of a chain of friction effects; those that ask are told place, drive and load."""
+    """Dry friction level [N] of a chain of friction effects; laws that ask are told place, drive, load."""
     value = 0.0
     for effect in effects:
         told = (place, drive, load) if effect.asks else ()
@@ -154,6 +175,16 @@ def _only(effects, cls) -> Any:
     if len(found) > 1:
         raise ValueError(
             f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters."
+        )
+    return found[0] if found else None
+
+
+def _one(effects, role) -> Any:
+    found = [e for e in effects if e.role == role]
+    if len(found) > 1:
+        raise ValueError(
+            f"a block takes one {role} effect at most; got {' and '.join(e.id for e in found)}. "
+            "Change it with with_parameters."
         )
     return found[0] if found else None
 

@@ -13,10 +13,15 @@ role          what the class provides
 ``friction``  ``law(moving, direction, speed, base, p) -> level`` [N]: the dry friction level given the
               level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static. One that
               `asks` for more is called ``law(moving, direction, speed, base, p, x, drive, load)``
-``contact``   known to the engine: `HardStop`, `Backlash`
-``coupling``  known to the engine: `Compliance`
-``presliding`` known to the engine: `Bristle`
-``input``     ``channel() -> tuple of primitives`` that the applied force passes through
+``contact``   ``law(t, depth, rate, z, p, dz) -> force`` [N] of stops at ``span`` = (lower, upper) [m] that
+              yield by `depth`: they push, and what the law pulls is left out. Rigid stops and gaps are
+              known to the engine: `HardStop`, `Backlash`
+``coupling``  ``law(t, x, v, z, p, dz) -> force`` [N] on the load, of a joint whose motor side is `x` ahead;
+              beside `Backlash` outside the gap only. A field ``load_fraction`` divides a single mass
+``presliding`` ``law(v, level, z, p, dz) -> force`` [N] of friction that yields before it slides, in the
+              place of sticking; `level` is that of the block's dry friction
+``input``     ``channel() -> tuple of primitives`` that the applied force passes through; may have the
+              ``law`` of a force besides, as the drive's own (back-EMF)
 ``output``    ``channel() -> tuple of primitives`` that the measured position passes through
 ============  ==================================================================================
 """
@@ -59,7 +64,8 @@ class Effect:
         What a friction law has to know besides the motion, out of `TOLD`: ``x``, where the body is [m];
         ``drive`` and ``load`` [N], what drives the body and what else acts on it, but dry friction, taken
         positive against the drive. A transmission carries the drive where all inertia lies behind it, the
-        load where all lies before it. A law that asks for any of them is told all. Such laws run by adaptive steps.
+        load where all lies before it. A law that asks for any of them is told all. Such laws run by
+        adaptive steps.
     rank : int
         Order among friction effects: levels that add (0) before laws that shape them (1).
     side : str
@@ -80,6 +86,10 @@ class Effect:
         ones.
     repeatable : bool
         Whether a block may hold several; a second of any other is the first one again.
+    turns : bool
+        Whether machines that turn alone have it.
+    input_unit : str
+        Unit of what goes in, where an input effect makes a force of something else.
     """
 
     id: ClassVar[str] = ""
@@ -96,6 +106,8 @@ class Effect:
     nonsmooth: ClassVar[bool] = False
     multimodal: ClassVar[bool] = False
     repeatable: ClassVar[bool] = False
+    turns: ClassVar[bool] = False
+    input_unit = ""
     law: ClassVar[Callable | None] = None
 
     def __init_subclass__(cls, **kwargs):
@@ -118,6 +130,15 @@ class Effect:
     def channel(self) -> tuple[Primitive, ...]:
         """Return the primitives of an input or output effect, in the order the signal passes them."""
         raise NotImplementedError(f"{type(self).__name__} has role {self.role!r}, which is no channel.")
+
+    @classmethod
+    def applicable(cls, block) -> bool:
+        """Return whether adding one to the block can change anything that is measured."""
+        return True
+
+    def steady(self, level: float) -> tuple[float, ...]:
+        """Return the internal states that motion along +x comes to, under a dry friction of `level` [N]."""
+        return (0.0,) * self.states
 
     @property
     def parameters(self) -> dict[str, Parameter]:

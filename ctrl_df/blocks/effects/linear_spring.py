@@ -16,12 +16,12 @@ class LinearSpring(Effect):
     Parameters
     ----------
     stiffness : float
-        k [N/m], >= 0.
+        k [N/m]; negative: it pushes away from the center.
     center : float
         Position of zero force [m].
     """
 
-    stiffness: float = parameter("N/m", meaning="spring stiffness")
+    stiffness: float = parameter("N/m", lower=-math.inf, meaning="spring stiffness")
     center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
 
     role: ClassVar[str] = "force"

@@ -400,7 +400,8 @@ def free_run(
 
 def tied(block: Mechanism) -> bool:
     """Whether a law of the block depends on the place, or may do so."""
-    return block.core.stop is not None or any(e.role == "force" and not e.place_free for e in block.effects)
+    placed = (e.role == "force" and not e.place_free or "x" in e.asks for e in block.effects)
+    return block.core.stop is not None or block.core.contact is not None or any(placed)
 
 
 def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:

@@ -14,6 +14,8 @@ def applicable(cls, block) -> bool:
     if cls.id in ids and not cls.repeatable:
         return False
     two = block.core.bodies == 2
+    if not cls.applicable(block):
+        return False
     if cls.id == "load_friction":
         return two  # on a rigid block it is Coulomb friction
     if cls.id == "sensor_offset":

@@ -111,12 +111,11 @@ def _acting(prog) -> np.ndarray:
         return np.zeros(0, np.int64)
     node = next(row for row in prog.nodes if row[KIND] == MECHANISM)
     aux = prog.ints[node[AUX] :]
-    bodies, first = int(aux[A_BODIES]), int(aux[L.A_LAWS])
-    count = int(aux[L.A_NFORCE] + aux[L.A_NFRIC0] + aux[L.A_NFRIC1])
+    bodies, first, count = int(aux[A_BODIES]), int(aux[L.A_LAWS]), int(aux[L.A_COUNT])
     laws = prog.ints[first : first + count * L.R_SIZE].reshape(count, L.R_SIZE)
     pushed = {int(law[L.R_BODY]) for law in laws if law[L.R_SORT] == CURVED}
-    if aux[L.A_BRISTLE] >= 0:
-        pushed.add(bodies - 1)
+    if L.BOTH in pushed:
+        pushed = {0, 1}
     inner = int(node[X]) + 2 * bodies
     return np.array([*sorted(pushed), *range(2 + inner, 2 + inner + int(aux[A_INNER]))], np.int64)
 

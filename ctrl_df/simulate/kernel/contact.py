@@ -8,6 +8,7 @@ from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
     A_BRISTLE,
+    A_CONTACT,
     A_JOINT,
     A_NFRIC0,
     AUX,
@@ -31,6 +32,7 @@ from ..program.layout import (
     P_STOP_REST,
     PAR,
     STUCK,
+    TOUCH,
     WALL,
     X,
 )
@@ -79,8 +81,11 @@ def resolve(prog, node, t, x, mode, force, f, dx):
     driven = bodies - 1
     joint = aux[nodes[node, AUX] + A_JOINT]
     old0, old1, old_joint, old_wall = mode[mo], mode[mo + 1], mode[mo + JOINT], mode[mo + WALL]
+    old_touch = mode[mo + TOUCH]
     if joint == J_ELASTIC:
         _elastic_region(prog, node, x, mode)
+    if aux[nodes[node, AUX] + A_CONTACT] >= 0:
+        _touched(prog, node, x[xo + 2 * driven], mode)
     smooth_forces(prog, node, t, x, mode, force, f, dx)
     if bodies == 2 and closed(prog, node, mode):
         _resolve_joined(prog, node, x, mode, f)
@@ -104,6 +109,7 @@ def resolve(prog, node, t, x, mode, force, f, dx):
         or old1 != mode[mo + 1]
         or old_joint != mode[mo + JOINT]
         or old_wall != mode[mo + WALL]
+        or old_touch != mode[mo + TOUCH]
     )
 
 
@@ -120,6 +126,18 @@ def _elastic_region(prog, node, x, mode):
     elif delta < 0.0:
         mode[at] = -1
     elif 0.0 < delta < gap:
+        mode[at] = 0
+
+
+@part
+def _touched(prog, node, position, mode):
+    """Which yielding wall is touched; at its very face the mode stays."""
+    po, at = prog.nodes[node, PAR], prog.nodes[node, MODE] + TOUCH
+    if position > prog.par[po + P_HIGH]:
+        mode[at] = 1
+    elif position < prog.par[po + P_LOW]:
+        mode[at] = -1
+    elif prog.par[po + P_LOW] < position < prog.par[po + P_HIGH]:
         mode[at] = 0
 
 

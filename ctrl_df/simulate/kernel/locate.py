@@ -11,6 +11,7 @@ import numpy as np
 from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
+    A_CONTACT,
     A_JOINT,
     A_STOP,
     AUX,
@@ -35,6 +36,7 @@ from ..program.layout import (
     PWA,
     RATE,
     STUCK,
+    TOUCH,
     G,
     X,
 )
@@ -178,7 +180,8 @@ def may_touch(prog, x, x1, mode, length):
             gap = prog.par[po + P_GAP]
             if _tangents_meet_below(d0, v0, d1, v1) or _tangents_meet_below(gap - d0, -v0, gap - d1, -v1):
                 return True
-        if prog.ints[ao + A_STOP] == 1:
+        yielding = prog.ints[ao + A_CONTACT] >= 0 and mode[prog.nodes[n, MODE] + TOUCH] == 0
+        if prog.ints[ao + A_STOP] == 1 or yielding:
             at = first + 2 * (bodies - 1)
             low, high = prog.par[po + P_LOW], prog.par[po + P_HIGH]
             v0, v1 = length * x[at + 1], length * x1[at + 1]

@@ -11,16 +11,20 @@ from ..program.layout import (
     A_ASKING,
     A_BODIES,
     A_BRISTLE,
+    A_CONTACT,
+    A_COUPLING,
     A_JOINT,
     A_LAWS,
     A_NFORCE,
     A_NFRIC0,
+    A_PRESLIDING,
     A_STOP,
     ASKING,
     AUX,
     CURVED,
     DIR0,
     DIR1,
+    DRIVING,
     F_ASKED,
     F_GIVEN,
     F_TOLD,
@@ -30,7 +34,6 @@ from ..program.layout import (
     G_JOINT_LOW,
     G_WALL_HIGH,
     G_WALL_LOW,
-    J_ELASTIC,
     J_IMPACT,
     J_NONE,
     J_RIGID,
@@ -38,15 +41,10 @@ from ..program.layout import (
     KIND,
     MECHANISM,
     MODE,
-    P_C,
     P_GAP,
     P_HIGH,
-    P_K,
     P_LOW,
     P_M0,
-    P_SIGMA0,
-    P_SIGMA1,
-    P_SIGMA_LEVEL,
     PAR,
     R_ADDRESS,
     R_BODY,
@@ -54,13 +52,13 @@ from ..program.layout import (
     R_SIZE,
     R_SORT,
     R_STATE,
-    STRAIGHT,
     STUCK,
+    TOUCH,
     WALL,
     G,
     X,
 )
-from ..program.pointers import call_asking, call_force, call_friction
+from ..program.pointers import call_asking, call_force, call_friction, call_presliding
 
 
 @part(inline=True)
@@ -89,49 +87,59 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
     asked = int(f[F_ASKED])
     f[0], f[1] = f[F_GIVEN], f[F_GIVEN + 1]
     f[driven] += force
-    first = aux[ao + A_LAWS]
-    base_p, base_x, base_dx = par.address, x.address, dx.address
+    first, drive = aux[ao + A_LAWS], force
     for i in range(first, first + aux[ao + A_NFORCE] * R_SIZE, R_SIZE):
-        if aux[i + R_SORT] & asked == 0:
-            continue
-        b = aux[i + R_BODY]
-        z = 8 * (xo + aux[i + R_STATE])
-        f[b] += call_force(
-            aux[i + R_ADDRESS],
-            t,
-            x[xo + 2 * b],
-            x[xo + 2 * b + 1],
-            base_x + z,
-            base_p + 8 * aux[i + R_PAR],
-            base_dx + z,
-        )
+        if aux[i + R_SORT] & asked != 0:
+            b = aux[i + R_BODY]
+            value = _force(prog, i, xo, t, x[xo + 2 * b], x[xo + 2 * b + 1], x, dx)
+            f[b] += value
+            if aux[i + R_SORT] & DRIVING != 0:
+                drive += value
+    if aux[ao + A_CONTACT] >= 0:
+        i, side = first + aux[ao + A_CONTACT] * R_SIZE, mode[nodes[node, MODE] + TOUCH]
+        if aux[i + R_SORT] & asked != 0:
+            at, depth = xo + 2 * driven, 0.0
+            if side != 0:
+                # a step may end beyond the release that is yet to be located
+                depth = max(x[at] - par[po + P_HIGH] if side > 0 else par[po + P_LOW] - x[at], 0.0)
+            # away from the wall its states go on
+            f[driven] -= side * max(_force(prog, i, xo, t, depth, side * x[at + 1], x, dx), 0.0)
     pull = 0.0
-    if aux[ao + A_JOINT] == J_ELASTIC and asked & STRAIGHT != 0:
-        region = mode[nodes[node, MODE] + JOINT]
-        if region != 0:
-            bend = x[xo + 2] - x[xo] - (par[po + P_GAP] if region > 0 else 0.0)
-            pull = par[po + P_K] * bend + par[po + P_C] * (x[xo + 3] - x[xo + 1])
+    if aux[ao + A_COUPLING] >= 0:
+        i, region = first + aux[ao + A_COUPLING] * R_SIZE, mode[nodes[node, MODE] + JOINT]
+        if aux[i + R_SORT] & asked != 0:
+            bend = rate = 0.0
+            if region != 0:
+                bend = x[xo + 2] - x[xo] - (par[po + P_GAP] if region > 0 else 0.0)
+                rate = x[xo + 3] - x[xo + 1]
+            pull = _force(prog, i, xo, t, bend, rate, x, dx)
+            if region == 0:
+                pull = 0.0  # in the gap; its states go on
             f[0] += pull
             f[1] -= pull
     if aux[ao + A_ASKING] != 0:
-        _tell(prog, node, x, mode, force, pull, f)
-    if aux[ao + A_BRISTLE] >= 0 and asked & CURVED != 0:
-        z = xo + aux[ao + A_BRISTLE]
+        _tell(prog, node, x, mode, drive, pull, f)
+    if aux[ao + A_PRESLIDING] >= 0 and asked & CURVED != 0:
         v = x[xo + 2 * driven + 1]
         start = friction_start(prog, node, driven)
         told, count = F_TOLD + 3 * driven, aux[ao + A_NFRIC0 + driven]
         sense = 1.0 if v >= 0 else -1.0
         g = level(prog, start, count, 1.0, sense, abs(v), f[told], f[told + 1], f[told + 2])
-        g += par[po + P_SIGMA_LEVEL]
-        rate = v
-        if g > 0:
-            rate -= par[po + P_SIGMA0] * abs(v) * x[z] / g
-        dx[z] = rate
-        f[driven] -= par[po + P_SIGMA0] * x[z] + par[po + P_SIGMA1] * rate
+        i, z = first + aux[ao + A_PRESLIDING] * R_SIZE, 8 * (xo + aux[ao + A_BRISTLE])
+        p = par.address + 8 * aux[i + R_PAR]
+        f[driven] += call_presliding(aux[i + R_ADDRESS], v, g, x.address + z, p, dx.address + z)
+
+
+@part(inline=True)
+def _force(prog, law, first, t, x, v, states, dx):
+    """Call the force law of a record; `first` is where the states of its mechanism begin."""
+    z = 8 * (first + prog.ints[law + R_STATE])
+    p = prog.par.address + 8 * prog.ints[law + R_PAR]
+    return call_force(prog.ints[law + R_ADDRESS], t, x, v, states.address + z, p, dx.address + z)
 
 
 @part
-def _tell(prog, node, x, mode, force, pull, f):
+def _tell(prog, node, x, mode, push, pull, f):
     """Write what friction laws that ask are told: place, drive, and the load against it.
 
     The load's drive is the elastic joint. Bodies that move as one have drive and load in common.
@@ -139,10 +147,10 @@ def _tell(prog, node, x, mode, force, pull, f):
     xo, driven = prog.nodes[node, X], prog.ints[prog.nodes[node, AUX] + A_BODIES] - 1
     joined = driven == 1 and closed(prog, node, mode)
     for b in range(driven + 1):
-        at, drive = F_TOLD + 3 * b, force if b == driven else pull
+        at, drive = F_TOLD + 3 * b, push if b == driven else pull
         f[at], f[at + 1], f[at + 2] = x[xo + 2 * b], drive, drive - f[b]
         if joined:
-            f[at + 1], f[at + 2] = force, force - f[0] - f[1]
+            f[at + 1], f[at + 2] = push, push - f[0] - f[1]
 
 
 @part(inline=True)
@@ -281,6 +289,12 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
         position = x[xo + 2 * driven]
         g[go + G_WALL_LOW] = position - par[po + P_LOW]
         g[go + G_WALL_HIGH] = par[po + P_HIGH] - position
+    if want_g and aux[ao + A_CONTACT] >= 0:
+        position, touched = x[xo + 2 * driven], mode[mo + TOUCH]
+        if touched <= 0:
+            g[go + G_WALL_LOW] = (position - par[po + P_LOW]) * (1.0 if touched == 0 else -1.0)
+        if touched >= 0:
+            g[go + G_WALL_HIGH] = (par[po + P_HIGH] - position) * (1.0 if touched == 0 else -1.0)
 
 
 @part

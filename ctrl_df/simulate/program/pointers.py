@@ -33,6 +33,8 @@ SIGNATURES = {
     "friction": _D(_D, _D, _D, _D, _P),
     # the same, x, drive, load -> level
     "asking": _D(_D, _D, _D, _D, _P, _D, _D, _D),
+    # v, level, z, p, dz -> force
+    "presliding": _D(_D, _D, _P, _P, _P),
     # u, p -> y
     "smooth": _D(_D, _P),
 }
@@ -41,6 +43,7 @@ _CALLBACKS = {
     "force": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_P, _C_P, _C_P),
     "friction": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_D, _C_P),
     "asking": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_D, _C_P, _C_D, _C_D, _C_D),
+    "presliding": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_P, _C_P, _C_P),
     "smooth": ctypes.CFUNCTYPE(_C_D, _C_D, _C_P),
     # t, x, u, dx, y, what: 0 outputs, 1 rates
     "system": ctypes.CFUNCTYPE(None, _C_D, _C_P, _C_P, _C_P, _C_P, ctypes.c_long),
@@ -199,6 +202,17 @@ def call_asking(typingctx, address, moving, direction, speed, base, p, x, drive,
 
     def codegen(context, builder, signature, args):
         return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 0, 0, 1, 0, 0, 0))
+
+    return sig, codegen
+
+
+@intrinsic
+def call_presliding(typingctx, address, v, level, z, p, dz):
+    """Call a presliding law; z, p, dz are addresses."""
+    sig = types.float64(types.int64, _D, _D, types.int64, types.int64, types.int64)
+
+    def codegen(context, builder, signature, args):
+        return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 1, 1, 1))
 
     return sig, codegen
 
