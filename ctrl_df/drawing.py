@@ -1,4 +1,4 @@
-"""The one way up: results draw themselves by name, and the drawing layer is imported only then.
+"""The one way up: results draw themselves and go on by name, and what does it is imported only then.
 
 Every other import of the package runs downwards. A result knows what its picture is called; which function
 draws it stands here, so that no computation depends on matplotlib.
@@ -22,6 +22,13 @@ PICTURES = {
 }
 
 
+STEPS = {
+    "next experiment": "experiment.next_experiment",
+    "report": "report.write_report",
+}
+"""What a result of identification may be asked for besides, and the function of `ctrl_df.identify`."""
+
+
 def draw(picture: str, result, **keywords) -> Any:
     """Draw a result.
 
@@ -40,3 +47,9 @@ def draw(picture: str, result, **keywords) -> Any:
     """
     module, function = PICTURES[picture].split(".")
     return getattr(importlib.import_module(f"ctrl_df.plot.{module}"), function)(result, **keywords)
+
+
+def go_on(step: str, result, *arguments) -> Any:
+    """Ask a result for more: `step`, a key of `STEPS`; `arguments`: further ones of its function."""
+    module, function = STEPS[step].split(".")
+    return getattr(importlib.import_module(f"ctrl_df.identify.{module}"), function)(result, *arguments)

@@ -758,12 +758,10 @@ def test_judging(case):
 
 
 def test_diagnose_takes_the_names_that_refit_takes():
-    from ctrl_df.identify.diagnose import free_names
-    from ctrl_df.identify.refit import free_parameters
+    from ctrl_df.identify.arguments import free_parameters
 
-    assert free_names is free_parameters
-    assert free_names(ONE, ["coulomb"]) == ("coulomb.level",) == free_names(ONE, "coulomb")
-    assert free_names(ONE, ["mass", "coulomb.level", "coulomb"]) == ("mass", "coulomb.level")
+    assert free_parameters(ONE, ["coulomb"]) == ("coulomb.level",) == free_parameters(ONE, "coulomb")
+    assert free_parameters(ONE, ["mass", "coulomb.level", "coulomb"]) == ("mass", "coulomb.level")
 
 
 def test_the_place_of_a_report_is_tried_before_it_is_drawn(tmp_path):

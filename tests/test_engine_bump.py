@@ -63,3 +63,17 @@ def test_long_steps_agree_with_short_ones():
         fine = cdf.event_response(block, t, force, max_step=1e-3, rtol=1e-11).outputs[0]
         # worst of 40 draws 1.2e-7
         np.testing.assert_allclose(coarse, fine, atol=5e-7 * np.abs(fine).max())
+
+
+@pytest.mark.parametrize("before", [1e-6, 3e-8, 1e-10])
+def test_a_breakaway_just_before_a_sample(before):
+    """Forces in balance set a mass free: what it moves by at first are their last digits."""
+    level, ramp, t = 0.5, 0.8, np.arange(0, 1.2, 3e-3)
+    block = cdf.Mass(1.1, [cdf.Coulomb(0.2), cdf.Stribeck(level, 7e-5)])
+    u = ramp * (t - t[200]) + level + ramp * before  # breaks away so long before sample 200
+    found = cdf.event_response(block, t, u)
+    assert found.status.ok and found.events[0].kind == "breakaway"
+    assert found.events[0].time == pytest.approx(t[200] - before, abs=1e-11)
+    shifted = cdf.event_response(block, t, u + ramp * (1.5e-3 - before))  # midway between two samples
+    late = np.interp(t[-1] + before - 1.5e-3, t, np.asarray(shifted.outputs)[1])
+    assert np.asarray(found.outputs)[1, -1] == pytest.approx(late, rel=1e-4)

@@ -12,7 +12,8 @@ import test_frequency as tables
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.experiment import _fastest_gain, next_experiment
+from ctrl_df.identify.experiment import next_experiment
+from ctrl_df.identify.planning.inputs import _fastest_gain
 
 
 def left_open(found):

@@ -105,19 +105,6 @@ def test_units_do_not_matter(name):
         )
 
 
-def test_a_run_does_not_depend_on_those_before_it():
-    """The Jacobian of a stiff law that a run has left is no part of the next one."""
-    block = cdf.friction_mass(2, 5, 0.5).with_effect(cdf.Bristle(1e5, 300.0))
-    t = np.arange(400) * STEP
-    rng = np.random.default_rng(5)
-    u = 20 * np.sin(np.outer(rng.uniform(5, 40, 6), t))
-    whole = cdf.batch_response(block, t, u, np.zeros(3), threads=1)
-    assert np.all(np.asarray(whole.propagated) > 200)
-    for i in (5, 2):
-        single = cdf.event_response(block, t, u[i])
-        np.testing.assert_array_equal(whole.outputs[i], np.atleast_2d(single.outputs))
-
-
 @dataclass(frozen=True)
 class Kinked(cdf.Effect):
     """A spring that becomes stiffer at once at a place, unknown to the engine."""

@@ -166,9 +166,9 @@ def test_presliding_of_two_poles():
 
 
 def test_two_laws_for_one_place_are_refused():
-    with pytest.raises(ValueError, match="one coupling effect"):
+    with pytest.raises(ValueError, match="one Shaft and Compliance"):
         cdf.Mass(1.0, [Shaft(1.0, 1.0, 1.0, 1.0), cdf.Compliance(3.0)])
-    with pytest.raises(ValueError, match="HardStop or Bumper"):
+    with pytest.raises(ValueError, match="one Bumper and HardStop"):
         cdf.Mass(1.0, [Bumper(1.0, 1.0, 1.0), cdf.HardStop(2.0)])
-    with pytest.raises(ValueError, match="one presliding effect"):
+    with pytest.raises(ValueError, match="one Slip and Bristle"):
         cdf.Mass(1.0, [Slip(1.0, 1.0), cdf.Bristle(2.0)])

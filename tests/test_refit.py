@@ -8,8 +8,9 @@ from ctrl_df.blocks.effects import InputGain, QuadraticDrag, SensorQuantization
 from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.identify.data.measurement import Measurement
+from ctrl_df.identify.estimation.candidate import fit_candidate
 from ctrl_df.identify.estimation.simulator import feasible
-from ctrl_df.identify.refit import fit_candidate, refit
+from ctrl_df.identify.refit import refit
 from ctrl_df.simulate.loop import closed_loop
 
 NOISES = ("white", "coloured", "encoder")

@@ -13,8 +13,9 @@ from ctrl_df.identify.estimation.trial import prepare
 from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.selection.rounding import rounding_evidence
 from ctrl_df.identify.starting.attach import applicable
-from ctrl_df.identify.starting.resonance_grid import SHARES, resonant
+from ctrl_df.identify.starting.resonance_grid import resonant
 from ctrl_df.identify.starting.screen import Screen
+from ctrl_df.identify.thresholds import LOAD_SHARES
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
 BLOCKS = {
@@ -85,7 +86,7 @@ def test_rounding_is_told_from_noise_of_the_same_size():
 def test_a_joint_is_found_by_its_resonance():
     data = prepare(PLAIN, [record(BLOCKS["joint"], n=6000)]).level(4)
     screen = Screen(data.fit(PLAIN, default_free(PLAIN)), data)
-    found = [f for share in SHARES for f in resonant(screen, share, 1)]
+    found = [f for share in LOAD_SHARES for f in resonant(cdf.Compliance, screen, share, 1)]
     joint = min(found, key=lambda f: f.rmse).model.effects[-1]
 
     def frequency(effect, mass):

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .effect import Effect
-from .effects import Backlash, HardStop
 from .primitives import Delay, Lag, Play, Primitive, RateLimiter
 
 RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
@@ -40,7 +39,7 @@ class Core:
     restitution: float = 0.0
     stiffness: float = 0.0
     damping: float = 0.0
-    stop: HardStop | None = None
+    stop: Any = None
     bristle: Any = None
     bristle_state: int = -1
     presliding: ForceTerm | None = None
@@ -69,6 +68,13 @@ class Core:
         return wall.span if wall is not None else (0.0, 0.0)
 
     @property
+    def position_dependent(self) -> bool:
+        """Whether a law depends on the place, or may do so: where a run begins then matters."""
+        asked = any("x" in effect.asks for chain in self.friction for effect in chain)
+        stopped = self.stop is not None or self.contact is not None
+        return stopped or asked or any(not term.effect.place_free for term in self.forces)
+
+    @property
     def driven(self) -> int:
         """Index of the body the force acts on."""
         return self.bodies - 1
@@ -76,8 +82,8 @@ class Core:
 
 def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effect], measured: str) -> Core:
     """Lay out states and sort effects by role; `masses` is (mass,) or (load, motor)."""
-    backlash = _only(effects, Backlash)
-    compliance = _one(effects, "coupling")
+    backlash = _only(e for e in effects if e.role == "contact" and e.divides)
+    compliance = _only(e for e in effects if e.role == "coupling")
     joint: str | None = None
     if compliance is not None:
         joint = ELASTIC
@@ -100,14 +106,11 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
             names += [f"{effect.id}_{i}" for i in range(effect.states)]
         elif effect.role == "friction":
             friction[body].append(effect)
-    bristle, bristle_state = _one(effects, "presliding"), -1
+    bristle, bristle_state = _only(e for e in effects if e.role == "presliding"), -1
     if bristle is not None:
         bristle_state = len(names)
-    yielding = _only([e for e in effects if e.role == "contact" and e.law is not None], Effect)
-    if yielding is not None and _only(effects, HardStop) is not None:
-        raise ValueError(
-            f"a block takes HardStop or {type(yielding).__name__}, not both. Leave one of them out."
-        )
+    stop = _only(e for e in effects if e.role == "contact" and not e.divides)
+    yielding = stop if stop is not None and stop.law is not None else None
     terms = {}
     for effect, body in ((bristle, motor), (compliance, BOTH), (yielding, motor)):
         if effect is not None:
@@ -131,7 +134,7 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         restitution=backlash.restitution if backlash else 0.0,
         stiffness=getattr(compliance, "stiffness", 0.0),
         damping=getattr(compliance, "damping", 0.0),
-        stop=_only(effects, HardStop),
+        stop=stop if yielding is None else None,
         bristle=bristle,
         bristle_state=bristle_state,
         **terms,
@@ -170,21 +173,12 @@ def kinetic_level(effects: Sequence[Effect]) -> float:
     return level([e for e in effects if is_kinetic(e)], 1.0, 1.0, 0.0)
 
 
-def _only(effects, cls) -> Any:
-    found = [e for e in effects if isinstance(e, cls)]
+def _only(kind) -> Any:
+    found = list(kind)
     if len(found) > 1:
+        names = " and ".join(dict.fromkeys(type(e).__name__ for e in found))
         raise ValueError(
-            f"a block takes one {cls.__name__} at most; got {len(found)}. Change it with with_parameters."
-        )
-    return found[0] if found else None
-
-
-def _one(effects, role) -> Any:
-    found = [e for e in effects if e.role == role]
-    if len(found) > 1:
-        raise ValueError(
-            f"a block takes one {role} effect at most; got {' and '.join(e.id for e in found)}. "
-            "Change it with with_parameters."
+            f"a block takes one {names} at most; got {len(found)}. Change it with with_parameters."
         )
     return found[0] if found else None
 

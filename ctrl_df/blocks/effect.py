@@ -14,8 +14,9 @@ role          what the class provides
               level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static. One that
               `asks` for more is called ``law(moving, direction, speed, base, p, x, drive, load)``
 ``contact``   ``law(t, depth, rate, z, p, dz) -> force`` [N] of stops at ``span`` = (lower, upper) [m] that
-              yield by `depth`: they push, and what the law pulls is left out. Rigid stops and gaps are
-              known to the engine: `HardStop`, `Backlash`
+              yield by `depth`: they push, and what the law pulls is left out. Without a law the engine's law
+              of impact: fields ``gap``, ``restitution``, ``load_fraction`` of one that `divides` the mass
+              (`Backlash`); else ``restitution`` and ``span`` (`HardStop`)
 ``coupling``  ``law(t, x, v, z, p, dz) -> force`` [N] on the load, of a joint whose motor side is `x` ahead;
               beside `Backlash` outside the gap only. A field ``load_fraction`` divides a single mass
 ``presliding`` ``law(v, level, z, p, dz) -> force`` [N] of friction that yields before it slides, in the
@@ -29,9 +30,10 @@ role          what the class provides
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
@@ -90,6 +92,12 @@ class Effect:
         Whether machines that turn alone have it.
     input_unit : str
         Unit of what goes in, where an input effect makes a force of something else.
+    divides : bool
+        Whether a contact is a joint, which divides a single mass in motor and load.
+    costly : bool
+        Whether a point of a table N(A, omega) takes many times as long with it as with others.
+    table_starts : int
+        Starts on a table from which it is fitted.
     """
 
     id: ClassVar[str] = ""
@@ -108,6 +116,9 @@ class Effect:
     repeatable: ClassVar[bool] = False
     turns: ClassVar[bool] = False
     input_unit = ""
+    divides: ClassVar[bool] = False
+    costly: ClassVar[bool] = False
+    table_starts: ClassVar[int] = 3
     law: ClassVar[Callable | None] = None
 
     def __init_subclass__(cls, **kwargs):
@@ -131,9 +142,45 @@ class Effect:
         """Return the primitives of an input or output effect, in the order the signal passes them."""
         raise NotImplementedError(f"{type(self).__name__} has role {self.role!r}, which is no channel.")
 
+    # --- what a diagnosis should know of it ------------------------------------------------------------
+
     @classmethod
     def applicable(cls, block) -> bool:
         """Return whether adding one to the block can change anything that is measured."""
+        return True
+
+    @classmethod
+    def suggest(cls, screen) -> Iterable[Effect] | None:
+        """Return effects with which fits may begin, read off a `Screen`; None: sizes from small to large."""
+        return None
+
+    @classmethod
+    def regress(cls, screen) -> Iterable[tuple[Effect, Mapping[str, float]]]:
+        """Return effects fitted to the force of a `Screen`, with values of the model's parameters beside."""
+        return ()
+
+    @classmethod
+    def suggest_on_plane(cls, plane) -> Iterable[tuple[Effect, float]] | None:
+        """Return effects with which fits to a table N(A, omega) may begin; None: sizes of all kinds.
+
+        Each comes with the share of the model's own Coulomb friction that stays beside it. `plane`: the
+        `Plane` of the table.
+        """
+        return None
+
+    def bounds(self, seen) -> dict[str, tuple[float, float]]:
+        """Return ranges of parameters beyond which the records prove them wrong; `seen`: their `Seen`."""
+        return {}
+
+    def ranges(self, seen) -> dict[str, tuple[float, float]]:
+        """Return ranges of parameters beyond which the records show nothing of the effect itself."""
+        return {}
+
+    def genuine(self, stroke: float, at_bound) -> bool:
+        """Return whether it is what its name says over a stroke [m], and no stand-in for another effect.
+
+        `at_bound`: names of its parameters that a fit has left at a bound.
+        """
         return True
 
     def steady(self, level: float) -> tuple[float, ...]:
@@ -157,6 +204,13 @@ class Effect:
     def replace(self, **changes: Any) -> Effect:
         """Return the same effect with other parameter values."""
         return dataclasses.replace(self, **changes)
+
+
+@functools.cache
+def static_levels(cls: type[Effect]) -> tuple[str, ...]:
+    """Return the parameters of an effect class that are static levels, none below the kinetic one."""
+    stated = {f.name: f.metadata.get("parameter", {}) for f in dataclasses.fields(cls)}
+    return tuple(name for name, spec in stated.items() if spec.get("threshold"))
 
 
 def register_effect(cls: _EffectClass) -> _EffectClass:

@@ -16,8 +16,8 @@ from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
-from .effect import Effect
-from .effects import Backlash, Coulomb, Stiction, Stribeck, Viscous
+from .effect import Effect, static_levels
+from .effects import Backlash, Coulomb, Stiction, Viscous
 from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
 
@@ -383,9 +383,10 @@ def _effect_keys(effects) -> tuple[str, ...]:
 def _check_levels(effects) -> None:
     kinetic = kinetic_level(effects)
     for effect in effects:
-        if isinstance(effect, Stiction | Stribeck) and effect.level < kinetic:
-            raise ValueError(
-                "a static level must be >= the Coulomb level of the block; "
-                f"got {effect.id} level {effect.level:g} "
-                f"below {kinetic:g}. Without stiction leave it out (static=None)."
-            )
+        for name in static_levels(type(effect)):
+            if getattr(effect, name) < kinetic:
+                raise ValueError(
+                    "a static level must be >= the Coulomb level of the block; "
+                    f"got {effect.id} {name} {getattr(effect, name):g} "
+                    f"below {kinetic:g}. Without stiction leave it out (static=None)."
+                )

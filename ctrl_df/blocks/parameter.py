@@ -32,6 +32,10 @@ class Parameter:
     threshold : bool
         Whether nothing but breaking away shows it: records leave ranges of it open. It is a level that may
         not lie below the kinetic one.
+    per_record : bool
+        Whether it is an angle that every record has anew (an encoder counts from another zero).
+    stepped : bool
+        Whether outputs change in steps with it: no least squares moves it, it is read off the record.
     line_unit : str
         Unit of the same parameter in a machine on a line, `unit` by default; its size follows from that.
     """
@@ -44,6 +48,8 @@ class Parameter:
     free: bool = True
     meaning: str = ""
     threshold: bool = False
+    per_record: bool = False
+    stepped: bool = False
     line_unit: str = ""
 
     def __post_init__(self):
@@ -64,6 +70,8 @@ def parameter(
     default: Any = dataclasses.MISSING,
     meaning="",
     threshold=False,
+    per_record=False,
+    stepped=False,
 ) -> Any:
     """Declare a dataclass field that is a physical parameter (unit, bounds, what it means).
 
@@ -74,8 +82,9 @@ def parameter(
     """
     dimension(unit)
     stated = dict(
-        unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning, threshold=threshold
-    )
+        unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning, threshold=threshold,
+        per_record=per_record, stepped=stepped,
+    )  # fmt: skip
     return dataclasses.field(default=default, metadata={"parameter": stated})
 
 

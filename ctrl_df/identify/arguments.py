@@ -6,12 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..blocks.effect import Effect, effect_class, effect_library
+from ..blocks.mechanism import Mechanism
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
+from ..units import dimension
 from .data.measurement import Measurement
 from .estimation.variables import default_free
+from .thresholds import SEGMENT_SAMPLES
 
 MODES = ("auto", "free", "windows")
-_LEAST = 20  # samples of a window, below which nothing is left once its start is fitted
 
 
 def free_parameters(block, free=None) -> tuple[str, ...]:
@@ -28,6 +30,30 @@ def free_parameters(block, free=None) -> tuple[str, ...]:
             )
         chosen += [k for k in group if k not in chosen]
     return tuple(chosen)
+
+
+def parametric(block):
+    """Return a block whose parameters have names; TypeError for others."""
+    if hasattr(block, "with_parameters") and hasattr(block, "parameters"):
+        return block
+    raise TypeError(
+        f"refit needs a block with named parameters (ctrl_df.Mass, TwoMass, ...); got "
+        f"{type(block).__name__}. Build it from ctrl_df.Mass and effects."
+    )
+
+
+def mechanism_of(model) -> Mechanism:
+    """Return the mechanism of a block or of a closed loop."""
+    if isinstance(model, Mechanism):
+        return model
+    part = getattr(getattr(model, "parts", None), "block", None)
+    if isinstance(part, Mechanism):
+        return part
+    raise TypeError(
+        "diagnose needs a block made of an inertia and effects, or a closed_loop of one; got "
+        f"{type(model).__name__}. "
+        "Effects can only be added to ctrl_df.Mass and ctrl_df.TwoMass."
+    )
 
 
 def effect_classes(candidates: Any) -> list[Any]:
@@ -56,10 +82,10 @@ def check_window(records: Sequence[Measurement], mode, window) -> None:
         "a comparison", "window", window, "s", remedy="Leave it out for one that fits the motion."
     )
     for record in records:
-        if not length >= _LEAST * record.dt * (1 - 1e-9):
+        if not length >= SEGMENT_SAMPLES * record.dt * (1 - 1e-9):
             raise ValueError(
-                f"window needs a length >= {_LEAST * record.dt:g} s ({_LEAST} samples of {record.name!r}); "
-                f"got window={window!r}. Leave it out for one that fits the motion."
+                f"window needs a length >= {SEGMENT_SAMPLES * record.dt:g} s ({SEGMENT_SAMPLES} samples of "
+                f"{record.name!r}); got window={window!r}. Leave it out for one that fits the motion."
             )
 
 
@@ -69,6 +95,36 @@ def check_fit(block, start, robust, budget) -> None:
     count("refit", "budget", budget, meaning="bound on the simulations")
     if start is not None:
         block.with_parameters(mapping("refit", "start", start, "{'coulomb.level': 5.0}"))
+
+
+def check_quantities(model, records) -> None:
+    """Check that records hold what the model takes and gives: a force and a position, or torque and angle.
+
+    A loop may be driven by the reference, in the unit of its position.
+    """
+    closed = getattr(model, "parts", None) is not None
+    block = model.parts.block if closed else model
+    if not isinstance(block, Mechanism):
+        return  # nothing is known of its signals
+    moves = block.coordinates
+    taken = [moves.force_unit, moves.unit] if closed else [moves.force_unit]
+    for record in records:
+        if dimension(record.output_unit) != dimension(moves.unit):
+            raise ValueError(
+                f"this model gives {_article(moves.position)} [{moves.unit}]; the output of {record.name!r} "
+                f"is in {record.output_unit or 'no unit'}. State output_unit= as it was recorded (such as "
+                f"m{moves.unit}), or give the {moves.position} as y and a measured rate as velocity=."
+            )
+        if all(dimension(record.input_unit) != dimension(unit) for unit in taken):
+            raise ValueError(
+                f"this model takes {_article(moves.force)} [{moves.force_unit}]; the input of "
+                f"{record.name!r} is in {record.input_unit or 'no unit'}. State input_unit= as it was "
+                f"recorded, or convert it to {moves.force_unit} (a current by the motor's constant) first."
+            )
+
+
+def _article(word: str) -> str:
+    return f"an {word}" if word[0] in "aeiou" else f"a {word}"
 
 
 def check_limits(limits) -> None:

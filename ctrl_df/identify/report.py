@@ -136,9 +136,10 @@ def _record(record) -> str:
 
 def _known(study):
     """Refit the final model once more for its standard errors; None where that fails."""
+    from .estimation.variables import default_free
     from .refit import refit
 
-    names = [k for k, p in study.model.parameters.items() if p.free and k != "sensor_quantization.step"]
+    names = default_free(study.model)
     try:
         return refit(study.model, list(study.train), names, budget=200)
     except (ValueError, ArithmeticError):

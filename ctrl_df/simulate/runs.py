@@ -81,9 +81,8 @@ def run_many(
 ) -> Runs:
     """Run many systems or one system many times, each from a fresh state, on all cores.
 
-    What is said to be "(runs,)" may be one number for all runs. The numbers are the same whatever the number
-    of threads and whatever other runs are made in the same call: to the last bit where all have the same
-    sample times and the laws are affine, else to rounding.
+    What is said to be "(runs,)" may be one number for all runs. The numbers are the same to the last bit
+    whatever the number of threads and whatever other runs are made in the same call.
 
     Parameters
     ----------

@@ -35,3 +35,10 @@ class AsymmetricCoulomb(Effect):
     def law(moving, direction, speed, base, p):
         """Return the level [N]."""
         return max(base + 0.5 * direction * p[0], 0.0)
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield shares of the friction, of either sign."""
+        size = plane.friction or 0.3 * plane.force.low
+        for f in (0.1, 0.4, 0.8, -0.1, -0.4, -0.8):
+            yield cls(f * size), 1.0

@@ -1,5 +1,6 @@
 """A gap between motor and load."""
 
+import itertools
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -34,6 +35,29 @@ class Backlash(Effect):
     role: ClassVar[str] = "contact"
     nonsmooth: ClassVar[bool] = True
     multimodal: ClassVar[bool] = True
+    divides: ClassVar[bool] = True
+    table_starts: ClassVar[int] = 4
     shows: ClassVar[str] = "error after reversals that lasts as long as the gap is crossed"
     source: ClassVar[str] = "Azenha & Machado (1997), eqs. (9)-(13)"
     remedy: ClassVar[str] = "For a tight joint leave the effect out."
+
+    @classmethod
+    def suggest(cls, screen):
+        """Yield gaps of shares of the stroke."""
+        shares = (0.3, 0.6) if screen.bodies == 1 else (0.5,)
+        for gap, share in itertools.product((0.003, 0.01, 0.03, 0.08, 0.2, 0.5), shares):
+            yield cls(screen.scales.position * gap, 0.2, share)
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield gaps of shares of the swings."""
+        for gap, share in itertools.product(plane.swing.over(8, 0.1, 0.3), (0.3, 0.6)):
+            yield cls(gap, 0.3, share), 1.0
+
+    def ranges(self, seen):
+        """Return what leaves something on either side of the gap."""
+        return {"load_fraction": (0.05, 0.95)}
+
+    def genuine(self, stroke, at_bound):
+        """Return whether there is a load behind it: else it is a dashpot, in the place of other friction."""
+        return "load_fraction" not in at_bound

@@ -33,6 +33,7 @@ class Bristle(Effect):
 
     role: ClassVar[str] = "presliding"
     multimodal: ClassVar[bool] = True
+    table_starts: ClassVar[int] = 2
     states: ClassVar[int] = 1
     shows: ClassVar[str] = (
         "error around every reversal, where the real friction builds up over a small stroke"
@@ -52,3 +53,29 @@ class Bristle(Effect):
     def steady(self, level):
         """Return how far they are bent where they slip [m]."""
         return ((level + self.level) / self.stiffness,)
+
+    @classmethod
+    def applicable(cls, block):
+        """Return whether there is a kinetic level under which they slip: without one they are a spring."""
+        return any(e.role == "friction" and e.side == "motor" and e.rank == 0 for e in block.effects)
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return bristles that the friction bends by shares of the stroke, half damped."""
+        s = screen.scales
+        for bend in (0.001, 0.003, 0.01, 0.03, 0.1, 0.3):
+            k = max(screen.friction, 0.05 * s.force) / (bend * s.position)
+            yield cls(k, 0.5 * math.sqrt(k * s.mass))
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield bristles that the friction bends by shares of the swings."""
+        for bend in plane.swing.over(6, 0.3, 0.3):
+            stiffness = max(plane.friction, 0.02 * plane.force.high) / bend
+            for ratio in (0.1, 0.6):
+                yield cls(stiffness, ratio * math.sqrt(stiffness * plane.mass)), 1.0
+
+    def ranges(self, seen):
+        """Return what does not settle much faster than a sample: that is not seen, and a stiff equation."""
+        stiffness = 2 * seen.force / (seen.speed * seen.dt)
+        return {"stiffness": (0.0, stiffness), "damping": (0.0, 2 * seen.mass / seen.dt)}

@@ -1,5 +1,7 @@
 """An elastic joint between motor and load."""
 
+import itertools
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -34,6 +36,7 @@ class Compliance(Effect):
     role: ClassVar[str] = "coupling"
     multimodal: ClassVar[bool] = True
     affine: ClassVar[bool] = True
+    table_starts: ClassVar[int] = 2
     shows: ClassVar[str] = "a resonance in the error spectrum, ringing after every step of force"
     source: ClassVar[str] = "two-mass drive, e.g. Vukosavic & Stojic (1998)"
     remedy: ClassVar[str] = "For a stiff joint leave the effect out."
@@ -42,3 +45,27 @@ class Compliance(Effect):
     def law(t, x, v, z, p, dz):
         """Return the force on the load [N]; `x` and `v` are those of the motor beyond the load."""
         return p[0] * x + p[1] * v
+
+    @classmethod
+    def suggest(cls, screen):
+        """Yield joints that the force bends by shares of the stroke."""
+        s = screen.scales
+        shares = (0.3, 0.6) if screen.bodies == 1 else (0.5,)
+        for bend, share in itertools.product((0.003, 0.01, 0.03, 0.08, 0.2, 0.5), shares):
+            k = share * s.force / (bend * s.position)
+            yield cls(k, 0.12 * math.sqrt(k * share * (1 - share) * s.mass), share)
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield joints that resonate within the frequencies measured or above them."""
+        for resonance, share in itertools.product(plane.omega.over(5, 1.0, 8.0), (0.3, 0.6)):
+            stiffness = share * (1 - share) * plane.mass * resonance**2
+            yield cls(stiffness, 0.1 * stiffness / resonance, share), 1.0
+
+    def ranges(self, seen):
+        """Return what does not settle much faster than a sample, with something on either side."""
+        return {"damping": (0.0, 0.1 * seen.mass / seen.dt), "load_fraction": (0.05, 0.95)}
+
+    def genuine(self, stroke, at_bound):
+        """Return whether there is a load behind it: else it is a dashpot, in the place of other friction."""
+        return "load_fraction" not in at_bound

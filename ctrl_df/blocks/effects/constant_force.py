@@ -32,3 +32,10 @@ class ConstantForce(Effect):
     def law(t, x, v, z, p, dz):
         """Return the force [N]."""
         return p[0]
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield shares of the friction, of either sign."""
+        size = plane.friction or 0.3 * plane.force.low
+        for f in (0.1, 0.4, 0.8, -0.1, -0.4, -0.8):
+            yield cls(f * size), 1.0

@@ -35,3 +35,8 @@ class Coulomb(Effect):
     def law(moving, direction, speed, base, p):
         """Return the level [N]."""
         return base + p[0]
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return shares of the model's friction, taken from it."""
+        return plane.taken_from_friction(cls)

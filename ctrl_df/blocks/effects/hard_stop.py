@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from ...checks import number
 from ..effect import Effect, register_effect
 from ..parameter import parameter
@@ -52,3 +54,23 @@ class HardStop(Effect):
     def span(self) -> tuple[float, float]:
         """Lower and upper stop [m]."""
         return (-self.limit if self.lower is None else float(self.lower), self.limit)
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return stops at the ends of the stroke, or a little within."""
+        reach = float(np.max(np.abs(screen.motion.x)))
+        return [cls(reach * f, e) for f in (0.999, 0.99, 0.96, 0.9) for e in (0.05, 0.5)]
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield stops near the largest swing.
+
+        A mass that hits both stops swings by 0.8 (to and fro at one speed) to 1.27 of the limit (standing in
+        between).
+        """
+        for f in (0.75, 0.85, 0.95, 1.05, 1.2, 0.4):
+            yield cls(f * plane.swing.high, 0.3), 1.0
+
+    def bounds(self, seen):
+        """Return where the stop can stand: no body has been where it would not let it."""
+        return {"limit": (seen.reach, math.inf)}

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from ..effect import Effect, register_effect
 from ..parameter import parameter
 from ..primitives import Delay, Lag, PiecewiseAffine
@@ -30,6 +32,18 @@ class InputSaturation(Effect):
         s = self.level
         return (PiecewiseAffine.from_corners((-s, s), (0, 1, 0), (-s, 0, s)),)
 
+    @classmethod
+    def suggest(cls, screen):
+        """Return shares of the largest force."""
+        top = float(np.quantile(np.abs(screen.motion.u), 0.999))
+        return [cls(top * f) for f in (0.97, 0.93, 0.87, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)]
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield levels between the least and the largest force."""
+        for f in (0.05, 0.3, 0.6, 0.8, 0.95):
+            yield cls(plane.force.low + f * (plane.force.high - plane.force.low)), 1.0
+
 
 @register_effect
 @dataclass(frozen=True)
@@ -56,6 +70,11 @@ class InputDeadZone(Effect):
         d = self.threshold
         return (PiecewiseAffine.from_corners((-d, d), (1, 0, 1), (d, 0, -d)),)
 
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return shares of the model's friction, taken from it."""
+        return plane.taken_from_friction(cls)
+
 
 @register_effect
 @dataclass(frozen=True)
@@ -77,6 +96,16 @@ class InputGain(Effect):
     def channel(self):
         """Return the straight line."""
         return (PiecewiseAffine.from_corners((), (self.gain,), (0.0,)),)
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return gains about one."""
+        return [cls(g) for g in (0.7, 0.9, 0.97, 1.03, 1.1, 1.3)]
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return gains about one."""
+        return [(cls(g), 1.0) for g in (0.7, 0.9, 1.1, 1.4)]
 
 
 @register_effect
@@ -103,6 +132,15 @@ class InputLag(Effect):
         """Return the lag."""
         return (Lag(self.time_constant),)
 
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return shares of the shortest period."""
+        return plane.in_periods(cls)
+
+    def ranges(self, seen):
+        """Return what settles neither much faster than a sample nor slower than the record."""
+        return {"time_constant": (0.05 * seen.dt, seen.duration)}
+
 
 @register_effect
 @dataclass(frozen=True)
@@ -125,3 +163,8 @@ class InputDelay(Effect):
     def channel(self):
         """Return the delay."""
         return (Delay(self.delay),)
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return shares of the shortest period."""
+        return plane.in_periods(cls)

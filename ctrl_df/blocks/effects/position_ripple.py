@@ -25,11 +25,13 @@ class PositionRipple(Effect):
 
     amplitude: float = parameter("N", meaning="ripple amplitude")
     wavelength: float = parameter("m", strict=True, default=0.01, meaning="period over position")
-    phase: float = parameter("rad", lower=-math.inf, default=0.0, meaning="phase at x = 0")
+    phase: float = parameter("rad", lower=-math.inf, default=0.0, meaning="phase at x = 0", per_record=True)
 
     role: ClassVar[str] = "force"
     multimodal: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
+    costly: ClassVar[bool] = True
+    table_starts: ClassVar[int] = 1
     shows: ClassVar[str] = "error periodic over position, whatever the time and the speed"
     source: ClassVar[str] = "cogging force, first harmonic"
 
@@ -37,3 +39,28 @@ class PositionRipple(Effect):
     def law(t, x, v, z, p, dz):
         """Return the force [N]."""
         return p[0] * math.sin(2.0 * math.pi * x / p[1] + p[2])
+
+    @classmethod
+    def suggest(cls, screen):
+        """Yield the long waves that explain most; `regress` finds the short ones."""
+        for amplitude, wavelength, phase in screen.long_waves(cls):
+            for factor in (1.0, 0.5):
+                yield cls(min(amplitude * factor, 2 * screen.scales.force), wavelength, phase)
+
+    @classmethod
+    def regress(cls, screen):
+        """Yield the waves of any length that explain most of the motion."""
+        known = [e.wavelength for e in screen.block.effects if hasattr(e, "wavelength")]
+        for wave, values in screen.waves(known):
+            yield cls(wave.amplitude, wave.wavelength, wave.phase), values
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield waves as long as the swings."""
+        for wavelength in plane.swing.over(7, 1.0, 5.0):
+            for amplitude in (0.02, 0.1):
+                yield cls(amplitude * plane.force.high, wavelength), 1.0
+
+    def genuine(self, stroke, at_bound):
+        """Return whether the stroke shows a period: of less it is a spring."""
+        return self.wavelength < 0.9 * stroke

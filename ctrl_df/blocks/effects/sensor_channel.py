@@ -31,6 +31,11 @@ class SensorDelay(Effect):
         """Return the delay."""
         return (Delay(self.delay),)
 
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return shares of the shortest period."""
+        return plane.in_periods(cls)
+
 
 @register_effect
 @dataclass(frozen=True)
@@ -43,9 +48,11 @@ class SensorQuantization(Effect):
         [m], > 0.
     """
 
-    step: float = parameter("m", strict=True, meaning="resolution of the sensor")
+    step: float = parameter("m", strict=True, meaning="resolution of the sensor", stepped=True)
 
     role: ClassVar[str] = "output"
+    costly: ClassVar[bool] = True
+    table_starts: ClassVar[int] = 1
     shows: ClassVar[str] = "an error that jumps by one step and never exceeds half of it"
     source: ClassVar[str] = "encoder"
     remedy: ClassVar[str] = "For a fine encoder leave the effect out."
@@ -53,6 +60,17 @@ class SensorQuantization(Effect):
     def channel(self):
         """Return the rounding."""
         return (Quantizer(self.step),)
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return the grid to which the values keep."""
+        step = screen.step()
+        return [cls(step)] if step > 0 else []
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Return steps of shares of the swings."""
+        return [(cls(s), 1.0) for s in plane.swing.over(6, 0.3, 0.3)]
 
 
 @register_effect
@@ -76,6 +94,11 @@ class SensorOffset(Effect):
     def channel(self):
         """Return the shift."""
         return (Ramp(self.offset),)
+
+    @classmethod
+    def applicable(cls, block):
+        """Return whether the place matters: elsewhere an offset is where the record begins."""
+        return block.core.position_dependent
 
 
 @register_effect

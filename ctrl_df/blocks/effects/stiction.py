@@ -1,5 +1,6 @@
 """Static friction above the kinetic level."""
 
+import itertools
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -34,3 +35,19 @@ class Stiction(Effect):
         if moving > 0.5:
             return base
         return max(base, p[0])
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return levels a little above the kinetic one, and shares of the force."""
+        kinetic, force = screen.friction, screen.scales.force
+        near = {kinetic * f for f in (1.03, 1.08, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0)}
+        levels = near if kinetic > 0.01 * force else set()
+        return [cls(x) for x in sorted(levels | {0.1 * force, 0.3 * force, 0.6 * force}) if x > kinetic]
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield levels between the model's friction (or what stood still) and the least moving force."""
+        least = plane.force.low
+        low = max(plane.stuck, min(plane.friction, 0.9 * least))
+        for f, share in itertools.product((0.25, 0.6, 0.95), (1.0, 0.8, 0.6)):
+            yield cls(low + f * (least - low)), share

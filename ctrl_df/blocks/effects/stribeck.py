@@ -1,8 +1,11 @@
 """Stribeck friction."""
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
 
 from ..effect import Effect, register_effect
 from ..parameter import parameter
@@ -38,3 +41,28 @@ class Stribeck(Effect):
         """Return the level [N]."""
         ratio = speed / p[1]
         return base + max(p[0] - base, 0.0) * math.exp(-ratio * ratio)
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return levels above the kinetic one, over speeds that are seen."""
+        low = max(screen.friction, 0.02 * screen.scales.force)
+        grid = itertools.product((1.1, 1.35, 1.8, 2.4), (0.05, 0.12, 0.3, 0.8))
+        return [cls(low * a, screen.scales.speed * b) for a, b in grid]
+
+    @classmethod
+    def regress(cls, screen):
+        """Yield the bump that explains most of the force, over speeds that are seen."""
+        v, found = screen.motion.v, []
+        for speed in screen.scales.speed * np.array([0.04, 0.08, 0.15, 0.3, 0.6]):
+            found.append((screen.force_fit([np.sign(v) * np.exp(-np.square(v / speed))]), speed))
+        best, speed = min(found, key=lambda x: x[0].left)
+        if best.sensible and best.weights[0] > 0:
+            yield cls(best.friction + best.weights[0], speed), best.values
+
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield bumps over speeds of the plane, that take over a part of the model's friction."""
+        shapes = ((1.0, 1.3), (0.9, 1.6), (0.6, 2.5))
+        for velocity in plane.speed.over(5, 0.5, 0.7):
+            for share, over in shapes:
+                yield cls(over * share * plane.friction, velocity), share

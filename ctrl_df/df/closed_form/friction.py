@@ -75,8 +75,8 @@ def friction_family(mass, coulomb, viscous, static, A, omega, orders=9):
         A value out of range; the message gives rule, value, remedy.
     """
     _require("mass", mass, 0.0, strict=True)
-    _require("coulomb", coulomb, 0.0)
-    _require("viscous", viscous, 0.0)
+    for name, value in dict(coulomb=coulomb, viscous=viscous).items():
+        _require(name, value, 0.0)
     static = coulomb if static is None else static
     _require("static", static, coulomb, remedy="Breakaway needs at least the kinetic level.")
     amplitudes, frequencies = positive_axis("A", A, "N"), positive_axis("omega", omega, "rad/s")

@@ -14,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from ..thresholds import GOOD
 from .initial_states import FITTED
 from .noise_model import power
-from .restarts import GOOD, rescue, scan_slack
+from .restarts import rescue, scan_slack
 from .segments import Windows, facts
 from .sensitivity import Tangent
 from .simulator import Simulator, feasible
-from .variables import variables_of
+from .variables import step_of_sensor, variables_of
 
 Signals = list[np.ndarray]
 
@@ -91,7 +92,7 @@ class Problem:
 
     def round(self, theta):
         """Let an encoder of the model round the solution's outputs (fits leave it out: it has no slope)."""
-        if "sensor_quantization" not in getattr(self.block, "named_effects", ()):
+        if step_of_sensor(self.block) is None:
             return
         values = self.values(theta)
         runs = zip(self.simulators, self.windows, self.nuisance, self.measured, strict=True)

@@ -15,26 +15,21 @@ from dataclasses import replace
 import numpy as np
 
 from ...simulate.crew import side_by_side
+from ..thresholds import (
+    BETTER,
+    HOPELESS,
+    OPEN_RANGE,
+    RESTART_FACTORS,
+    RESTARTED_AGAIN,
+    RESTARTS_KEPT,
+    SAME,
+    STATIC_FACTORS,
+    STILL_POSSIBLE,
+)
 from .candidate import Candidate
+from .common_friction import dry_level
 from .simulator import feasible
 from .trial import Data, Trial
-
-# friction of which the sum with the motor's shows best
-_SHARED = "load_friction.level"
-
-_HOPS = (0.6, 0.8, 1.25, 1.6)
-_SMALL = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)  # static levels: single samples pass them
-HOPELESS = 3.0
-"""Error over the best candidate's beyond which another try is not worth it."""
-
-NEAR = 1.5
-"""Error over the best candidate's up to which another may yet turn out to be the right one."""
-
-_AGAIN = 2  # times that a parameter that found a better valley is moved once more
-_TRIED = 3  # of the hops along one parameter: those that begin best
-_WORTH = 0.99  # error over the one before that counts as a better valley
-_SAME = 1.001  # error over the least that counts as the same floor
-_REACH = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # how far about a threshold that floor is sought
 
 
 def rough(found: Candidate) -> list[str]:
@@ -69,15 +64,15 @@ def hopped(
         at, best = found.parameters[name], found
         moved = [
             _moved(found.model, name, _within(found, name, factor * at))
-            for factor in (_SMALL if found.model.parameters[name].threshold else _HOPS)
+            for factor in (STATIC_FACTORS if found.model.parameters[name].threshold else RESTART_FACTORS)
         ]
         starts_only = functools.partial(fit, names=(), starts=found.starts, iterations=2, hopeless=hopeless)
-        begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:_TRIED]
+        begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
         on = functools.partial(_on, fit=fit, hopeless=hopeless, names=found.names)
         for tried in side_by_side(on, begun):
-            if tried.rmse < _WORTH * best.rmse:
+            if tried.rmse < BETTER * best.rmse:
                 best = tried
-        if best is not found and times < _AGAIN:
+        if best is not found and times < RESTARTED_AGAIN:
             queue.append((name, times + 1))
         found = best
     return found
@@ -88,7 +83,7 @@ def beyond(found: Candidate, least: float) -> float:
 
     The best one itself tries all of them to their end.
     """
-    return NEAR * least if found.rmse > least else math.inf
+    return STILL_POSSIBLE * least if found.rmse > least else math.inf
 
 
 def _on(begun: Candidate, fit, names, hopeless) -> Candidate:
@@ -176,10 +171,10 @@ def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> t
     at, edges = found.parameters[name], []
     for sign in (-1, 1):
         edge = at
-        for reach in _REACH:
+        for reach in OPEN_RANGE:
             value = (1 + sign * reach) * at
             moved = _moved(found.model, name, value)
-            if fit(moved, (), starts=found.starts, iterations=2).rmse > _SAME * found.rmse:
+            if fit(moved, (), starts=found.starts, iterations=2).rmse > SAME * found.rmse:
                 break
             edge = value
         edges.append(edge)
@@ -187,12 +182,12 @@ def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> t
 
 
 def _moved(model, name, value):
-    values = {name: value}
-    if name == _SHARED and "coulomb.level" in model.parameters:
-        # what the load gains the motor loses
-        table = model.parameters
-        motor, more = table["coulomb.level"].value, value - table[_SHARED].value
-        values["coulomb.level"] = max(motor - more, 0.05 * motor)
+    values, table, shared = {name: value}, model.parameters, dry_level(model)
+    effect = model.named_effects.get(name.partition(".")[0])
+    if shared is not None and effect is not None and effect.role == "friction" and effect.side == "load":
+        # the sum of both shows best: what the load gains the motor loses
+        motor, more = table[shared].value, value - table[name].value
+        values[shared] = max(motor - more, 0.05 * motor)
     return model.with_parameters(feasible(model, values))
 
 

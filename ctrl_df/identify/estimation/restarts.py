@@ -9,11 +9,7 @@ from typing import Any
 
 import numpy as np
 
-GOOD = 0.25
-"""Share of the windows that are taken to be right when others are compared with them."""
-
-# Speeds to begin a window with, over how far the estimate may be off.
-_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
+from ..thresholds import GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS
 
 
 def rescue(problem, theta) -> bool:
@@ -29,7 +25,7 @@ def rescue(problem, theta) -> bool:
             continue
         column, windows, starts = simulator.nuisances.index("v"), problem.windows[k], problem.nuisance[k]
         rms = np.sqrt(windows.means(problem.last[k] ** 2))
-        bad = (rms > 1.5 * np.quantile(rms, GOOD)) & (rms > 2 * problem.noise)
+        bad = (rms > OUTLYING_SEGMENT * np.quantile(rms, GOOD)) & (rms > OUTLYING_NOISE * problem.noise)
         if not bad.any():
             continue
         some = windows.only(bad)
@@ -42,7 +38,7 @@ def rescue(problem, theta) -> bool:
             (slice(None), before),
             (slice(None), simulator.at_rest(some, values)),
         ]
-        tries += [(column, f * reach) for f in _SPEEDS]
+        tries += [(column, f * reach) for f in RESTART_SPEEDS]
         if "slack" in simulator.nuisances:
             at = simulator.nuisances.index("slack")
             tries += [(slice(at, at + 2), pair) for pair in _slacks(problem, k)]

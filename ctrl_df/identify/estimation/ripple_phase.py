@@ -1,20 +1,15 @@
-"""The phase of a ripple belongs to the record: an encoder's zero is chosen anew at every start."""
+"""Angles that belong to the record, such as a ripple's phase: an encoder begins anew at every start."""
 
 from __future__ import annotations
 
 import math
 
+from ..thresholds import ANGLE_WORTH, ANGLES
 from .candidate import Candidate
-
-TRIED = 6
-"""Phases from which one is sought."""
-
-WORTH = 50.0
-"""Log likelihood ratio [nats, for white noise] that another phase must bring, or the model's own stands."""
 
 
 def rephased(near: Candidate, fit) -> Candidate:
-    """Return a model with the phases of its ripples as a record has them, where that record says so.
+    """Return a model with its angles per record as this record has them, where it says so.
 
     Parameters
     ----------
@@ -24,14 +19,13 @@ def rephased(near: Candidate, fit) -> Candidate:
         ``fit(block, names, starts, iterations)`` over the same windows.
     """
     best = near
-    for key in [k for k in near.model.named_effects if k.startswith("position_ripple")]:
-        name = f"{key}.phase"
+    for name in [k for k, p in near.model.parameters.items() if p.per_record]:
         own, found = best.model.parameters[name].value, best
-        for i in range(1, TRIED):
-            block = best.model.with_parameters({name: own + 2 * math.pi * i / TRIED})
+        for i in range(1, ANGLES):
+            block = best.model.with_parameters({name: own + 2 * math.pi * i / ANGLES})
             tried = fit(block, (), best.starts, 1)
             found = min(found, tried, key=lambda f: f.rmse)
         found = fit(found.model, (name,), found.starts, 5)
-        if found.count * math.log(best.rmse / found.rmse) > WORTH:
+        if found.count * math.log(best.rmse / found.rmse) > ANGLE_WORTH:
             best = found
     return best

@@ -10,12 +10,7 @@ import numpy as np
 
 from ..data import derivatives
 from ..data.measurement import Measurement
-
-CLEAN = 1e-7
-"""Noise over the spread of the output that no sensor is below: such a record was simulated."""
-
-EXACT = 10 * CLEAN
-"""Error over the spread of the output that is no error."""
+from ..thresholds import NOISE_FREE
 
 
 @dataclass(frozen=True)
@@ -48,7 +43,7 @@ def facts(record: Measurement) -> Facts:
         half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
         known = Facts(
             dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
-            max(record.noise_floor(), CLEAN * float(np.std(record.y))), swing, half, velocity,
+            max(record.noise_floor(), NOISE_FREE * float(np.std(record.y))), swing, half, velocity,
         )  # fmt: skip
         _FACTS[record] = known
     return known

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks.core import is_kinetic
+from ...blocks.core import is_kinetic, kinetic_level
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...simulate.crew import require_compiled
@@ -82,7 +82,7 @@ class Simulator:
     @property
     def tied(self) -> bool:
         """Whether the block's laws depend on the place (a spring, a ripple, a stop, or a law not known)."""
-        return self.closed or not self.mechanism or tied(self.block)
+        return self.closed or not self.mechanism or self.block.core.position_dependent
 
     @property
     def anchored(self) -> bool:
@@ -91,12 +91,13 @@ class Simulator:
             return True
         pull, s = 0.0, 2 * self.facts.spread
         for term in self.block.core.forces:
+            if any(p.per_record for p in term.effect.parameters.values()):
+                continue  # what begins anew in every record holds nothing in one place
             law, p = type(term.effect).law, term.effect.values
             z = np.zeros(max(term.effect.states, 1))
             centre = float(np.mean(self.record.y))
             forces = [float(law(0.0, centre + d, 0.0, z, p, z.copy())) for d in (-s, s)]  # type: ignore[misc]
-            if term.effect.id != "position_ripple":
-                pull += forces[0] - forces[1]
+            pull += forces[0] - forces[1]
         return pull > 0.1 * self.facts.force
 
     @property
@@ -398,22 +399,18 @@ def free_run(
     return simulator.run(whole, None, start, rounded=True)
 
 
-def tied(block: Mechanism) -> bool:
-    """Whether a law of the block depends on the place, or may do so."""
-    placed = (e.role == "force" and not e.place_free or "x" in e.asks for e in block.effects)
-    return block.core.stop is not None or block.core.contact is not None or any(placed)
-
-
 def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
     """Return the values with static levels raised to the kinetic one where they fell below it."""
     values = dict(values)
     current = block.parameters
     statics = [name for name, p in current.items() if p.threshold]
     if statics:
-        kinetic = sum(
-            values.get(f"{k}.level", current[f"{k}.level"].value)
-            for k, e in block.named_effects.items()
-            if is_kinetic(e) and f"{k}.level" in current
+        kinetic = kinetic_level(
+            [
+                e.replace(**{n: values[f"{k}.{n}"] for n in e.parameters if f"{k}.{n}" in values})
+                for k, e in block.named_effects.items()
+                if is_kinetic(e)
+            ]
         )
         for name in statics:
             if values.get(name, current[name].value) < kinetic:

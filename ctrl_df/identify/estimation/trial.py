@@ -11,39 +11,26 @@ import numpy as np
 from ...units import size
 from ..data import derivatives
 from ..data.measurement import Measurement
+from ..thresholds import (
+    BRIEF,
+    FILTERED,
+    FULL_SAMPLES,
+    HOLDOUT_PARTS,
+    LEVELS,
+    NOISE_FREE,
+    PARAMETER_RANGE,
+    PROCESS_NOISE,
+    SCREEN_SAMPLES,
+    SEGMENT_LEAST,
+    SHORTEST,
+)
 from .candidate import Candidate, fit_windows
 from .initial_states import CHAINED, FITTED, MEASURED
 from .noise_model import NoiseModel, force_errors
 from .ripple_phase import rephased
-from .segments import CLEAN, Windows, cut, facts, split
+from .segments import Windows, cut, facts, split
 from .simulator import Simulator
-
-SAMPLES = 2500
-"""Steps of the input a record is thinned to while candidates are screened."""
-
-SHORTEST = 16
-"""How many times as many the shortest windows are as the longest."""
-
-LEVELS = (SHORTEST, 4, 1)
-"""How many times as many they are, of the three lengths that are looked at."""
-
-BRIEF = 4 * SHORTEST
-"""The same of windows for the parameters of a machine whose own forces wander."""
-
-FORCED = 50.0
-"""Error over the sensor's noise, in the shortest windows, that only forces make which no model has."""
-
-FAR = 12.0
-"""Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
-
-BLOCKS = 40
-"""Values of the force that the shortest windows show where forces wander."""
-
-LEAST = 50
-"""Samples of the shortest window."""
-
-PARTS = 9
-"""Parts of a record of which every third is held out where no record is."""
+from .variables import Seen
 
 
 @dataclass(frozen=True)
@@ -69,9 +56,9 @@ class View:
     windows: tuple[Windows, ...]
 
     def shorter(self, factor: int) -> View:
-        """Return up to `factor` times as many windows over the same samples, each of `LEAST` or more."""
+        """Return up to `factor` times as many windows over the same samples, none too short."""
         pairs = zip(self.records, self.windows, strict=True)
-        return View(self.records, tuple(split(r, w, factor, LEAST) for r, w in pairs))
+        return View(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
 
     def every(self, step: int) -> View:
         """Return every `step`-th window."""
@@ -132,6 +119,7 @@ class Data:
     thin: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
+    seen: Seen  # of effects
     whole: tuple[View, View] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     colour: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
@@ -155,7 +143,7 @@ class Data:
     @property
     def clean(self) -> bool:
         """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
-        return all(derivatives.grain(r.y) < CLEAN * facts(r).spread for r in self.train.records)
+        return all(derivatives.grain(r.y) < NOISE_FREE * facts(r).spread for r in self.train.records)
 
     @property
     def forced(self) -> bool:
@@ -171,7 +159,7 @@ class Data:
         length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.windows])))
         thin = max(self.thin // 2, 1)
         return replace(
-            self, colour=force_errors(max(thin, round(length / BLOCKS), 2)), thin=thin, begins=MEASURED
+            self, colour=force_errors(max(thin, round(length / FILTERED), 2)), thin=thin, begins=MEASURED
         )
 
     @property
@@ -196,9 +184,9 @@ class Data:
 
     @property
     def fine(self) -> Data:
-        """The same at the records' full rate, or 12,000 steps of a longer one."""
+        """The same at the records' full rate, or as many steps of a longer one as do."""
         longest = max(len(r) for view in (self.train, self.held) for r in view.records)
-        return replace(self, thin=min(max(1, round(longest / 12_000)), self.thin), step=self.thin)
+        return replace(self, thin=min(max(1, round(longest / FULL_SAMPLES)), self.thin), step=self.thin)
 
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
@@ -224,9 +212,17 @@ class Data:
         view = view or self.train
         return fit_windows(
             block, view.records, view.windows, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits, errors=self.step > 0, colour=self.colour,
+            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0, colour=self.colour,
             begins=self.begins, hopeless=hopeless, outlook=outlook,
         )  # fmt: skip
+
+    def limits_of(self, block) -> dict[str, tuple[float, float]]:
+        """Return least and largest values: the model's own, and what the records show of its effects."""
+        limits = {}
+        for key, effect in block.named_effects.items():
+            for name, span in effect.ranges(self.seen).items():
+                limits[f"{key}.{name}"] = span
+        return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
     def moved(self, found: Candidate, iterations=6, tolerance=5e-3, hopeless=math.inf) -> Candidate:
         """Fit a model found over other windows to these; those that begin at one sample share states."""
@@ -267,8 +263,8 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
         learn = View(records, tuple(cut(r, _count(r)) for r in records))
         judge = View(tuple(held), tuple(cut(r, _count(r)) for r in held))
     else:
-        whole = [cut(r, PARTS * max(round(_count(r) / PARTS), 1)) for r in records]
-        third = [(np.arange(len(w)) * PARTS // len(w)) % 3 == 2 for w in whole]
+        whole = [cut(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
+        third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
         if any(not np.any(t) or np.all(t) for t in third):
             raise ValueError(
                 "diagnose needs records of at least 180 samples where none is held out; "
@@ -276,22 +272,26 @@ def prepare(block, records: Sequence[Measurement], held: Sequence[Measurement] =
             )
         learn = View(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
         judge = View(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
-    thin = max(1, round(float(np.mean([len(r) for r in records])) / SAMPLES))
+    thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
     while thin > 1 and any(_rough(r, thin) for r in (*records, *held)):
         thin //= 2
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
-    limits = {k: (v / FAR, v * FAR) for k, v in known.items()}
-    # What settles much faster than a sample is not seen, and a stiff equation.
-    scales, dt = _scales(block, records), min(r.dt for r in records)
-    limits["input_lag.time_constant"] = (0.05 * dt, max(r.duration for r in records))
-    limits["bristle.stiffness"] = (0.0, 2 * scales.force / (scales.speed * dt))
-    limits["bristle.damping"] = (0.0, 2 * scales.mass / dt)
-    limits["compliance.damping"] = (0.0, 0.1 * scales.mass / dt)
-    # A joint with next to nothing behind it is no joint, but a dashpot that stands in for other friction.
-    for name in ("compliance", "backlash"):
-        limits.setdefault(f"{name}.load_fraction", (0.05, 0.95))
-    return Data(learn, judge, thin, scales, limits)
+    limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
+    scales = _scales(block, records)
+    seen = Seen(
+        scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
+        max(r.duration for r in records),
+    )  # fmt: skip
+    return Data(learn, judge, thin, scales, limits, seen)
+
+
+def _within(own, shown) -> tuple[float, float]:
+    """Return what both ranges have in common, or the model's own where that is nothing."""
+    if shown is None:
+        return own
+    low, high = max(own[0], shown[0]), min(own[1], shown[1])
+    return (low, high) if low < high else own
 
 
 def _rough(record, thin: int) -> bool:
@@ -321,11 +321,11 @@ def brief_window(model, records: Sequence[Measurement]) -> float | None:
 
     Not for models of which something is hidden, nor for records too short to tell.
     """
-    if min(map(len, records)) < PARTS * LEAST:
+    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST:
         return None
     data = prepare(model, records, records)
     near, forced = data.levels[0].fit(model, (), iterations=4, tolerance=2e-2), data.wandering
-    if near.rmse <= FORCED * data.noise or data.clean or forced.carries(model):
+    if near.rmse <= PROCESS_NOISE * data.noise or data.clean or forced.carries(model):
         return None
     windows = forced.brief.train.windows
     spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, windows, strict=True)]

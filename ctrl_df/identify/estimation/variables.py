@@ -3,16 +3,58 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from ...blocks.mechanism import Mechanism
+from ...blocks.primitives import Ramp
 from ...units import dimension, size
 from .segments import Facts
 
 
+@dataclass(frozen=True)
+class Seen:
+    """What records can show of an effect.
+
+    Attributes
+    ----------
+    force, position, speed, mass : float
+        Typical sizes [N], [m], [m/s], [kg].
+    dt, duration : float
+        Shortest sample time and longest record [s].
+    reach : float
+        Farthest place where the body has been, beyond noise [m]; -inf where the sensor tells other places.
+    """
+
+    force: float
+    position: float
+    speed: float
+    mass: float
+    dt: float
+    duration: float
+    reach: float = -math.inf
+
+
+def seen_by(block, records, known: Facts) -> Seen:
+    """Return what the records show of the effects of a block."""
+    reach = max(float(np.max(np.abs(r.y))) for r in records) - 4 * known.noise
+    shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
+    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
+    return Seen(
+        known.force, known.spread, known.speed, mass, min(r.dt for r in records),
+        max(r.duration for r in records), -math.inf if shifted else reach,
+    )  # fmt: skip
+
+
 def default_free(block) -> tuple[str, ...]:
     """Return the parameters that a refit moves unless told otherwise."""
-    return tuple(k for k, p in block.parameters.items() if p.free and k != "sensor_quantization.step")
+    return tuple(k for k, p in block.parameters.items() if p.free and not p.stepped)
+
+
+def step_of_sensor(block) -> str | None:
+    """Return the name of the step of a block's sensor that rounds; None where it has none."""
+    return next((k for k, p in getattr(block, "parameters", {}).items() if p.stepped), None)
 
 
 class Variable:
@@ -66,11 +108,16 @@ def variables_of(block, names, records, known: Facts, limits=None) -> list[Varia
     table = block.parameters
     limits = limits or {}
     found = [Variable(k, table[k], natural_scale(table[k].line_unit, known), limits.get(k)) for k in names]
-    for variable in found:
-        if variable.name == "hard_stop.limit" and not {"sensor_offset", "drift"} & set(block.named_effects):
-            # No body has been where a stop would not let it.
-            reach = max(float(np.max(np.abs(r.y))) for r in records) - 4 * known.noise
-            variable.lower = max(variable.lower, reach)
+    if isinstance(block, Mechanism):
+        seen = seen_by(block, records, known)
+        proved = {
+            f"{key}.{name}": span
+            for key, effect in block.named_effects.items()
+            for name, span in effect.bounds(seen).items()
+        }
+        for variable in found:
+            low, high = proved.get(variable.name, (-math.inf, math.inf))
+            variable.lower, variable.upper = max(variable.lower, low), min(variable.upper, high)
     return found
 
 

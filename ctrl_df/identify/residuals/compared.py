@@ -36,6 +36,19 @@ class Compared:
         raise NotImplementedError
 
     @property
+    def where(self) -> Any:
+        """Regions ranked by their share of the error."""
+        raise NotImplementedError
+
+    def report(self) -> str:
+        """Return the comparison as text."""
+        raise NotImplementedError
+
+    def plot(self, record=None, **keywords) -> Any:
+        """Draw the comparison; returns a ``ct.ControlPlot``."""
+        raise NotImplementedError
+
+    @property
     def fit_percent(self) -> float:
         """MATLAB's fit, ``100 (1 - nrmse)``."""
         return 100 * (1 - self.nrmse)

@@ -16,15 +16,7 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_model
 from ..estimation.trial import Data, Trial
-
-# Amplitude of a test force over the rms of the force: linear still, and far above rounding.
-_SMALL = 3e-3
-
-FINER = 3
-"""How many times finer the second grid of every kind is."""
-
-# Travel after a reversal [typical positions] over which a force may build up.
-_REACHES = (0.03, 0.1, 0.3, 1.0)
+from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
 @dataclass(frozen=True)
@@ -75,24 +67,25 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
             ]
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
-    windows = tangent.pieces
+    windows, record = tangent.pieces, data.train.records[0]
+    units = {"x": record.output_unit, "f": record.input_unit}
     if data.forced:
         # the residual is of forces here, as the fits see it
         noise = noise_model([residual[w] for w in windows], max_order=12)
-    found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
+    found = [_regressed(k, m, s, residual, noise, windows, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
         noise = noise_model([left[w] for w in windows], max_order=12)
-        found = [_regressed(k, m, s, residual, noise, windows) for k, m, s in tables]
+        found = [_regressed(k, m, s, residual, noise, windows, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
         best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
     return list(best.values())
 
 
-def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.ndarray]:
+def _regressed(kind, matrix, spans, residual, noise, windows, units) -> tuple[Lack, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain."""
     white, filtered = noise.seen(residual, windows), noise.seen(matrix, windows)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
@@ -104,15 +97,15 @@ def _regressed(kind, matrix, spans, residual, noise, windows) -> tuple[Lack, np.
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
-    return Lack(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span)), explained
+    return Lack(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span, **units)), explained
 
 
 _SENTENCES = {
     "time": "a force that changes along the record, most between {0:.3g} and {1:.3g} s",
-    "position": "a force bound to the place, most between {0:.3g} and {1:.3g} m",
-    "low_speed": "a force over speed of a shape not in the library, most between {0:.3g} and {1:.3g} m/s",
-    "load": "a force that goes with the load, most between {0:.3g} and {1:.3g} N",
-    "after_reversal": "a force that builds up after each reversal, over {1:.3g} m",
+    "position": "a force bound to the place, most between {0:.3g} and {1:.3g} {x}",
+    "low_speed": "a force over speed of a shape not in the library, most between {0:.3g} and {1:.3g} {x}/s",
+    "load": "a force that goes with the load, most between {0:.3g} and {1:.3g} {f}",
+    "after_reversal": "a force that builds up after each reversal, over {1:.3g} {x}",
     "frequency": "a force at one frequency, {0:.4g} Hz",
 }
 
@@ -124,7 +117,7 @@ class _Scene:
         self.view, self.data = data.train, data
         self.fit = tried.train
         self.scale = data.scales.position
-        self.size = _SMALL * data.scales.force
+        self.size = TEST_FORCE * data.scales.force
         self.motion = [
             _motion(r, w, y)
             for r, w, y in zip(self.view.records, self.view.windows, tried.train.simulated, strict=True)
@@ -166,7 +159,7 @@ class _Scene:
                     for f in factors
                 ]
             yield kind, families
-        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in _REACHES]]
+        yield "after_reversal", [[(_since(f * self.scale), (0.0, f * self.scale)) for f in REVERSAL_REACHES]]
         line = self._line()
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 

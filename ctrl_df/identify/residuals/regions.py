@@ -96,7 +96,9 @@ class Regions(tuple[Region, ...]):
         return "\n".join(lines)
 
 
-def error_regions(t, residual, *, position=None, velocity=None, force=None, bins=8) -> Regions:
+def error_regions(
+    t, residual, *, position=None, velocity=None, force=None, bins=8, units=("m", "N")
+) -> Regions:
     """Return every region's share of the squared error, worst first.
 
     Parameters
@@ -110,6 +112,8 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
         Signals that divide the record; those missing leave their regions out.
     bins : int
         Parts of the record in time and in position.
+    units : (str, str)
+        Of position and of force.
 
     Returns
     -------
@@ -130,7 +134,7 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
     if total == 0:
         return Regions()
     null = _Null(r)
-    found = [null.region(*part) for part in _parts(t, bins, **signals)]
+    found = [null.region(*part) for part in _parts(t, bins, units, **signals)]
     found += _bands(t, r, signals.values())
     found.sort(key=lambda region: region.p_value)
     count, worst, worst_bias = len(found), 0.0, 0.0
@@ -146,33 +150,33 @@ def error_regions(t, residual, *, position=None, velocity=None, force=None, bins
 # --- dividing the record --------------------------------------------------------------------------
 
 
-def _parts(t, bins, position=None, velocity=None, force=None) -> Iterator[tuple]:
+def _parts(t, bins, units, position=None, velocity=None, force=None) -> Iterator[tuple]:
     """Yield (kind, label, mask, span) of every region of samples."""
     edges = np.linspace(t[0], t[-1], bins + 1)
     for a, b in zip(edges[:-1], edges[1:], strict=True):
         yield "time", f"{a:.3g} to {b:.3g} s", (t >= a) & ((t < b) | (b == edges[-1])), (a, b)
     if velocity is not None:
-        yield from _by_velocity(t, velocity, position)
+        yield from _by_velocity(t, velocity, position, units[0])
     if position is not None:
-        yield from _quantiles("position", "m", position, bins)
+        yield from _quantiles("position", units[0], position, bins)
     if force is not None:
-        yield from _quantiles("load", "N", np.abs(force), 4, "|F| ")
+        yield from _quantiles("load", units[1], np.abs(force), 4, "|F| ")
 
 
-def _by_velocity(t, velocity, position):
+def _by_velocity(t, velocity, position, unit):
     fast = float(np.quantile(np.abs(velocity), 0.95))
     low = 0.1 * fast
     yield "direction", "v > 0", velocity > low, (low, math.inf)
     yield "direction", "v < 0", velocity < -low, (-math.inf, -low)
     speed = np.abs(velocity)
-    yield "low_speed", f"|v| < {low:.2g} m/s", speed < low, (0.0, low)
+    yield "low_speed", f"|v| < {low:.2g} {unit}/s", speed < low, (0.0, low)
     yield (
         "low_speed",
-        f"{low:.2g} < |v| < {0.6 * fast:.2g} m/s",
+        f"{low:.2g} < |v| < {0.6 * fast:.2g} {unit}/s",
         (speed >= low) & (speed < 0.6 * fast),
         (low, 0.6 * fast),
     )
-    yield "low_speed", f"|v| > {0.6 * fast:.2g} m/s", speed >= 0.6 * fast, (0.6 * fast, math.inf)
+    yield "low_speed", f"|v| > {0.6 * fast:.2g} {unit}/s", speed >= 0.6 * fast, (0.6 * fast, math.inf)
     turns = reversals(velocity, low)
     if len(turns) < 3:
         return
@@ -189,7 +193,7 @@ def _by_velocity(t, velocity, position):
     )
     yield "after_reversal", f"later than {middle:.2g} s", since >= middle, (middle, math.inf)
     if position is not None:
-        yield from _quantiles("amplitude", "m", swing(position, turns), 3)
+        yield from _quantiles("amplitude", unit, swing(position, turns), 3)
 
 
 def _quantiles(kind, unit, values, count, prefix=""):

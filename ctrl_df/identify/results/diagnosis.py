@@ -7,14 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...blocks.effect import Effect
-from ...drawing import draw
+from ...drawing import draw, go_on
 from ..data.measurement import Measurement
+from ..thresholds import RULED_OUT
 
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
-
-
-# Evidence [nats] behind the first up to which a candidate is not ruled out.
-_NEAR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +68,7 @@ class CandidateEffect:
 def rivals(ranking) -> list[CandidateEffect]:
     """Return the confirmed candidates that the data hardly tell from the first."""
     first = ranking[0]
-    return [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < _NEAR]
+    return [c for c in ranking[1:] if c.confirmed and first.evidence - c.evidence < RULED_OUT]
 
 
 def certainty(ranking) -> float:
@@ -135,9 +132,7 @@ class Diagnosis:
     @property
     def next_experiment(self):
         """The input that would separate the candidates that remain; see `ctrl_df.identify.experiment`."""
-        from ..experiment import next_experiment
-
-        return next_experiment(self)
+        return go_on("next experiment", self)
 
     def table(self, rows: int = 8) -> str:
         """Return the ranking as text."""

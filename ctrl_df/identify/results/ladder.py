@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
-from ...drawing import draw
-from ..diagnose import free_names
+from ...drawing import draw, go_on
 from .diagnosis import NONE, UNKNOWN, Diagnosis
 
 
@@ -136,69 +135,10 @@ class Study:
 
     def report(self, path) -> str:
         """Write one self-contained HTML file and return its path."""
-        from ..report import write_report
-
-        return write_report(self, path)
+        return go_on("report", self, path)
 
     def __str__(self) -> str:
         return self.summary()
-
-
-class Found(NamedTuple):
-    """What one step was told.
-
-    Attributes
-    ----------
-    diagnosis : Diagnosis
-    worth : bool
-        Whether the first of its ranking is worth a step.
-    revise : callable
-        ``revise(block, ids) -> (block, ids dropped, ids in their place)``: looks again at the effects `ids`,
-        added earlier, now that the last one of the block is there too.
-    """
-
-    diagnosis: Diagnosis
-    worth: bool
-    revise: Callable[[Any, Sequence[str]], tuple[Any, tuple[str, ...], tuple[str, ...]]]
-
-
-def climb(start, free, max_effects, ask) -> tuple[Step, ...]:
-    """Add one effect after another while it is worth it.
-
-    Parameters
-    ----------
-    start : Mechanism
-    free : sequence of str or None
-        Parameters of it that may be refitted; None: all that are free.
-    max_effects : int
-        Longest ladder, >= 0.
-    ask : callable
-        ``ask(block, names, search) -> Found``: the block refitted in its parameters `names`, and what it
-        misses; no effect is tried where `search` is false.
-
-    Raises
-    ------
-    ValueError
-        `max_effects` that is no integer >= 0.
-    """
-    if int(max_effects) != max_effects or max_effects < 0:
-        raise ValueError(f"improve needs max_effects as an integer >= 0; got {max_effects!r}.")
-    kept, own = set(start.parameters) - set(free_names(start, free)), set(start.named_effects)
-    block, steps, effect, evidence, dropped, same, instead = start, [], "", 0.0, (), (), ()
-    while True:
-        names = tuple(k for k in free_names(block) if k not in kept)
-        found = ask(block, names, len(steps) < max_effects)
-        d = found.diagnosis
-        values = {k: p.value for k, p in d.model.parameters.items()}
-        steps.append(
-            Step(effect, dropped, d.model, d.nrmse, d.nrmse_holdout, evidence, values, same, d, instead)
-        )
-        if not found.worth:
-            return tuple(steps)
-        best = d.ranking[0]
-        effect, evidence, same = best.id, best.evidence, best.equivalents
-        added = [k for k in list(best.model.named_effects)[:-1] if k not in own]
-        block, dropped, instead = found.revise(best.model, added) if added else (best.model, (), ())
 
 
 def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:

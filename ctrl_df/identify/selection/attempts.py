@@ -9,27 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ...blocks.effect import effect_class
 from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
-from ..estimation.multistart import HOPELESS
 from ..estimation.simulator import feasible
 from ..estimation.trial import Data, Trial
 from ..starting.attach import applicable, attach
 from ..starting.proposals import proposals
 from ..starting.regression import Start
-from ..starting.resonance_grid import SHARES, resonant
+from ..starting.resonance_grid import resonant
 from ..starting.screen import Screen, starts_for
-from .evidence import ROUNDED
-
-# Steps of every start before the first look at them, and those of an effect that go on after it.
-_BEGUN, _KEPT = 2, 2
-
-# Joints that resonate with which fits begin.
-_JOINTS = 3
+from ..thresholds import BEGUN, HOPELESS, JOINTS, KEPT, LOAD_SHARES
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +52,7 @@ class Attempt:
     """
 
     key: str
-    block: object
+    block: Any
     names: tuple[str, ...]
     data: Data
     steps: int
@@ -74,6 +67,11 @@ class Attempt:
         """Error it has come to."""
         assert self.fit is not None
         return self.fit.rmse
+
+    @property
+    def multimodal(self) -> bool:
+        """Whether fits of its effect begin in short windows."""
+        return self.block.effects[-1].multimodal
 
     @property
     def trial(self) -> Trial:
@@ -105,19 +103,19 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
     joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1]
-    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in SHARES]
+    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in LOAD_SHARES]
     jobs += [(c, None, screen, shortest, free, nominal) for c in kinds]
     begun = run(_begin, jobs)
-    attempts = _best([a for found in begun for a in found if a.fit is not None], _JOINTS)
+    attempts = _best([a for found in begun for a in found if a.fit is not None], JOINTS)
     attempts += [a for found in begun for a in found if a.fit is None]
     # those of few steps first: what they come to tells of the others which need no long look
-    short = [a for a in attempts if not effect_class(a.key).multimodal]
+    short = [a for a in attempts if not a.multimodal]
     begun = run(_first, [(a, np.inf) for a in short])
     least = min((a.error for a in begun), default=np.inf)
     least = min(least, screen.base.rmse)
-    begun += run(_first, [(a, HOPELESS * least) for a in attempts if effect_class(a.key).multimodal])
+    begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
-    kept = _best(begun, _KEPT)
+    kept = _best(begun, KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another valley
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
@@ -134,15 +132,10 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
 
 
 def itself(tried: Trial, span) -> bool:
-    """Whether the newest effect is what its name says, and no stand-in for another.
-
-    A ripple of which the stroke `span` [m] shows less than a period is a spring, a joint with nothing behind
-    it (or before it) is a dashpot.
-    """
-    bounds = dict(zip(tried.train.names, tried.train.at_bound, strict=True))
-    if bounds.get(f"{tried.block.newest}.load_fraction", False):
-        return False
-    return getattr(tried.block.effects[-1], "wavelength", 0.0) < 0.9 * span
+    """Whether the newest effect is what its name says over the stroke `span` [m]."""
+    own, pairs = tried.block.newest + ".", zip(tried.train.names, tried.train.at_bound, strict=True)
+    at_bound = {name.removeprefix(own) for name, bound in pairs if bound and name.startswith(own)}
+    return tried.block.effects[-1].genuine(span, at_bound)
 
 
 def _best(attempts, count) -> list[Attempt]:
@@ -162,7 +155,7 @@ def _begin(job) -> list[Attempt]:
     cls, share, screen, shortest, free, nominal = job
     if share is not None:
         found = []
-        for near in resonant(screen, share, _JOINTS):
+        for near in resonant(cls, screen, share, JOINTS):
             added = own_names(near.model)
             found.append(
                 Attempt(
@@ -191,10 +184,10 @@ def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
     if block is None:
         return None
     added = own_names(block)
-    names = (*free, *(() if key == ROUNDED else added))
+    names = (*free, *(n for n in added if not block.parameters[n].stepped))
     if start.effect.multimodal:
         # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
-        bent = start.effect.role in ("contact", "coupling") or key == "load_friction"
+        bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
         steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
         return Attempt(key, block, names, shortest, steps, tolerance, len(added))
     begin = None if start.values else screen.starts(block)
@@ -204,7 +197,7 @@ def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
 def _first(job) -> Attempt:
     """Take the first steps, fewer where all would not lead to an error below `hopeless` at their pace."""
     attempt, hopeless = job
-    return _on(attempt, min(_BEGUN, attempt.steps), hopeless)
+    return _on(attempt, min(BEGUN, attempt.steps), hopeless)
 
 
 def _on(attempt: Attempt, steps, hopeless) -> Attempt:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from ..estimation.noise_model import NoiseModel, whitened_power
+from ..thresholds import TOLD_APART
 
 
-def indistinguishable(first, second, noise: NoiseModel, *, nats: float = 6.0) -> bool:
+def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_APART) -> bool:
     """Whether two candidates' outputs differ by no more than the noise lets one see.
 
     Parameters

@@ -11,12 +11,8 @@ from dataclasses import replace
 
 from ..estimation.noise_model import NoiseModel, whitened_power, whitener
 from ..estimation.trial import Trial
+from ..thresholds import REFUTED
 from .rounding import rounding_evidence
-
-ROUNDED = "sensor_quantization"
-
-REFUTED = 20.0
-"""Evidence [nats] of held-out data against a candidate that puts it last."""
 
 
 def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
@@ -25,16 +21,27 @@ def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
     What held-out data speak against comes after all that they do not. The noise model is of the residuals of
     the best one, a sensor that rounds left aside.
     """
-    best = min([base, *(t for t in trials if t.key != ROUNDED)], key=lambda t: t.size)
+    best = min([base, *(t for t in trials if not rounds(t))], key=lambda t: t.size)
     noise = whitener(best.residuals, base.train.colour)
     before = _powers(base, noise)
     judged = []
     for t in trials:
-        gain, gain_held = _rounded_gains(base, t) if t.key == ROUNDED else _gains(before, _powers(t, noise))
+        gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than starts was fitted to the windows to be judged by: their gain also stands alone
         price = 0.5 * t.extra * math.log(sum(n for _, n in before))
         judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
     return sorted(judged, key=lambda t: (t.evidence_held < -REFUTED, -t.evidence)), noise
+
+
+def rounds(tried: Trial) -> bool:
+    """Whether what a candidate adds is a sensor that rounds: its errors are no noise."""
+    return bool(tried.key) and _step(tried) > 0
+
+
+def _step(tried: Trial) -> float:
+    """Return the step to which the newest effect rounds; 0 if it does not."""
+    steps = (p.value for p in tried.block.effects[-1].parameters.values() if p.stepped)
+    return next(steps, 0.0)
 
 
 def _powers(tried: Trial, noise: NoiseModel):
@@ -53,7 +60,7 @@ def _gains(before, after) -> tuple[float, float]:
 
 def _rounded_gains(base: Trial, tried: Trial) -> tuple[float, float]:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
-    step = tried.block.effects[-1].step
+    step = _step(tried)
     noise = whitener(base.residuals)
     gains = []
     for fit, power in zip((base.train, base.held), _powers(base, noise), strict=True):

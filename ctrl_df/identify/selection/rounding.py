@@ -12,9 +12,7 @@ import math
 
 import numpy as np
 
-_STRAY = 1e-3  # share of the samples that may lie on any line
-_FINEST = 0.02  # spread about the lines, over the step, that still counts: finer is a grid of its own
-_COARSE = 0.4  # rms residual over the step up to which rounding can be what makes it (1/sqrt(12) = 0.29)
+from ..thresholds import COARSE, FINEST, STRAY
 
 
 def rounding_evidence(measured, simulated, step: float) -> float:
@@ -38,10 +36,10 @@ def rounding_evidence(measured, simulated, step: float) -> float:
     y, x = np.concatenate(measured), np.concatenate(simulated)
     if len(y) == 0:
         return 0.0
-    if float(np.sqrt(np.mean((y - x) ** 2))) > _COARSE * step:
+    if float(np.sqrt(np.mean((y - x) ** 2))) > COARSE * step:
         return -math.inf
     line = np.round(y / step)
-    spread = max(float(np.sqrt(np.mean((y / step - line) ** 2))), _FINEST)
+    spread = max(float(np.sqrt(np.mean((y / step - line) ** 2))), FINEST)
     about = -len(y) * math.log(spread * step * math.sqrt(2 * math.pi * math.e))
     distance = line - x / step
     found = minimize_scalar(lambda s: -_lines(distance, math.exp(s)), bounds=(-5.0, 0.0), method="bounded")
@@ -53,4 +51,4 @@ def _lines(distance, error: float) -> float:
     from scipy.special import ndtr
 
     sure = ndtr((distance + 0.5) / error) - ndtr((distance - 0.5) / error)
-    return float(np.sum(np.log((1 - _STRAY) * sure + 0.5 * _STRAY)))
+    return float(np.sum(np.log((1 - STRAY) * sure + 0.5 * STRAY)))

@@ -1,4 +1,4 @@
-"""One diagnosis at work: the baseline, every candidate fitted, the best confirmed at the full rate."""
+"""The search over records: the baseline, every candidate fitted, the best confirmed at the full rate."""
 
 from __future__ import annotations
 
@@ -8,35 +8,43 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.core import level
+from ...blocks.effect import static_levels
 from ...simulate.crew import side_by_side
 from ..estimation.candidate import Candidate
-from ..estimation.multistart import HOPELESS, NEAR, all_hopped, begun_at, beyond, hopped, own, settled
+from ..estimation.common_friction import dry_level, inertia, viscous_slope
+from ..estimation.multistart import all_hopped, begun_at, beyond, hopped, own, settled
 from ..estimation.simulator import feasible
-from ..estimation.trial import FORCED, Data, Trial, prepare
+from ..estimation.trial import Data, Trial, prepare
+from ..estimation.variables import default_free
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
+from ..thresholds import (
+    CONFIRMED,
+    CONFIRMED_FORCED,
+    EXACT,
+    EXPLAINS_LITTLE,
+    FLOOR,
+    GROWTH,
+    HOPELESS,
+    PASSED,
+    PROCESS_NOISE,
+    PROMISING,
+    SHOWS_HARDLY,
+    SIGNIFICANT,
+    SIGNIFICANT_HELD,
+    STILL_POSSIBLE,
+    STOPPED_EARLY,
+)
 from .attempts import itself, tried
 from .equivalence import indistinguishable
-from .evidence import ROUNDED, ranked
-
-CONFIRMED = 6
-"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
-
-CONFIRMED_FORCED = 10
-"""The same where the machine's own forces wander."""
-
-# Best error over windows four times as long that still counts as the same.
-_GROWTH = 1.35
-# Evidence [nats] by which candidates may differ because their fits stopped early.
-_CLOSE = 60.0
-# Width of a Stribeck bump over the typical speed below which it is stiction.
-_NARROW = 1e-3
-# Error over the least that windows of the shortest length leave, up to which a fit has nothing to gain.
-_FLOOR = 1.03
+from .evidence import ranked, rounds
+from .remaining import located, remainder
+from .search import Search, Words
 
 
-class Study:
-    """The fits of one diagnosis.
+class StructureSearch(Search):
+    """The fits of one diagnosis over time.
 
     Parameters
     ----------
@@ -48,8 +56,12 @@ class Study:
         Parameters of the model that may be refitted.
     """
 
+    significant = SIGNIFICANT
+    significant_held = SIGNIFICANT_HELD
+    words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
+
     def __init__(self, block, records, held, free):
-        self.free = free
+        self.block, self.free = block, tuple(free)
         data = prepare(block, records, held)
         self.nominal = {k: p.value for k, p in block.parameters.items()}
         self._look_at(data, 1)
@@ -57,7 +69,7 @@ class Study:
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
         # friction that wanders drowns all else over longer windows
         near = self.levels[0].moved(self.base.train)
-        if near.rmse > FORCED * data.noise and not data.clean:
+        if near.rmse > PROCESS_NOISE * data.noise and not data.clean:
             self._look_at(self.levels[0].wandering, 0)
             self.base = Trial("", self.data.fit(near.model, self.free))
 
@@ -68,17 +80,27 @@ class Study:
     def _baseline(self, block) -> Trial:
         """Fit the baseline from its own values and from a regression of the force; keep the better."""
         shortest, data = self.levels[:2]
-        begins, table = [block], block.parameters
-        names = {"mass", "coulomb.level", "viscous.coefficient"}
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, names)
-        guess = dict(zip(("mass", "coulomb.level", "viscous.coefficient"), w, strict=False))
-        guess = {k: float(v) for k, v in guess.items() if k in table and k in self.free and v > 0}
+        begins = [block]
+        names = (inertia(block), dry_level(block), viscous_slope(block))
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
         found = []
         for begin in begins:
             found.append(data.moved(shortest.fit(begin, self.free, iterations=8), 12))
         return Trial("", min(found, key=lambda f: f.rmse))
+
+    @property
+    def records(self):
+        """The records to fit, and those held out; none where parts of the former are."""
+        held = () if self.data.held.records is self.data.train.records else self.data.held.records
+        return self.data.train.records, held
+
+    @property
+    def measure(self) -> str:
+        """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
+        return "acceleration" if self.data.forced else "output"
 
     # --- every effect, coarsely -----------------------------------------------------------------------
 
@@ -87,7 +109,7 @@ class Study:
         longest = self.levels[-1]
         base, found = self._look(classes, executor, self.data.sampled)
         there = base.rmse if self.data.forced else longest.moved(base).rmse
-        if there > _GROWTH * base.rmse:
+        if there > GROWTH * base.rmse:
             # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
             moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
@@ -102,12 +124,12 @@ class Study:
 
         `here`, `there`: error of the baseline where the trials were fitted, and over the longest windows.
         """
-        if found and found[0].train.rmse <= 0.8 * here:
+        if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
             return None
         longest = self.levels[-1]
         best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
         moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, 4, 1e-2)), best)
-        shows = found and found[0].train.rmse <= 0.97 * here
+        shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
     def _look(self, classes, executor, data: Data):
@@ -146,7 +168,7 @@ class Study:
             short = levels[0]
             stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
             at = _longest_coherent(stages)
-        if found and found[0].key == ROUNDED and not self.data.forced:
+        if found and rounds(found[0]) and not self.data.forced:
             # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
             at = len(stages) - 1
         self.data = levels[at]
@@ -162,7 +184,7 @@ class Study:
             return []
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right valley.
-        near = [t for t in chosen if chosen[0].evidence - t.evidence < _CLOSE]
+        near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
         least = min(t.train.rmse for t in chosen)
         close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
         close = [t for t in close if t.train.rmse < HOPELESS * least]
@@ -182,7 +204,7 @@ class Study:
         """
         shortest, middle, longest = self.levels
         short = side_by_side(shortest.moved, fits)
-        floor = _FLOOR * min(f.rmse for f in short)
+        floor = FLOOR * min(f.rmse for f in short)
         if self.data.forced:
             return [short], floor
         near = self._stage(middle, fits, short, floor)
@@ -231,12 +253,75 @@ class Study:
 
     def alike(self, a: Trial, b: Trial) -> bool:
         """Whether two candidates make the same of these data, within noise or as the limit of each other."""
-        if {a.key, b.key} == {"stiction", "stribeck"}:
-            # a bump this narrow is passed within a sample: only breaking away is seen of it
-            narrow = next(t for t in (a, b) if t.key == "stribeck").block.effects[-1].velocity
-            if narrow < _NARROW * self.data.scales.speed:
-                return True
+        if all(self._breaks_away_only(t) for t in (a, b)):
+            return True
         return indistinguishable(a.outputs, b.outputs, self.noise)
+
+    def _breaks_away_only(self, tried: Trial) -> bool:
+        """Whether a candidate is a static level whose bump over speed is passed within a sample."""
+        effect = tried.block.effects[-1]
+        if effect.role != "friction" or not static_levels(type(effect)):
+            return False
+        beside = [e for e in tried.block.effects if e.role == "friction" and e.side == effect.side]
+        beside.sort(key=lambda e: e.rank)
+        without, speed = [e for e in beside if e is not effect], PASSED * self.data.scales.speed
+        kinetic = level(without, 1.0, 1.0, speed)
+        bump = level(beside, 1.0, 1.0, speed) - kinetic
+        return bump <= 0.01 * (level(beside, 0.0, 1.0, 0.0) - kinetic)
+
+    # --- what it comes to -----------------------------------------------------------------------------
+
+    def errors(self, judged):
+        """Return nrmse over the windows fitted, and over those held out."""
+        return judged.train.nrmse, judged.held.nrmse if judged.held is not None else math.nan
+
+    def standard_errors(self, judged):
+        """Return the standard errors of a fit that came to its end."""
+        return judged.train.standard_errors if len(judged.train.covariance) else {}
+
+    def exact(self):
+        """Whether the model errs by rounding alone."""
+        return self.base.train.nrmse < EXACT and not self.data.forced
+
+    def remainder(self, best, significant):
+        """Return what the best model leaves."""
+        return remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+
+    def located(self, best, remainder, unknown):
+        """Return where the error is."""
+        return located(
+            self.base, best, self.data, self.noise, remainder, unknown=unknown,
+            significant=self.significant, measure=self.measure,
+        )  # fmt: skip
+
+    def fitted(self, block, names, iterations):
+        """Return a block with these parameters fitted, and run over the windows held out."""
+        found = self.data.fit(block, names, iterations=iterations)
+        return self.data.judged(Trial(block.newest if block.effects else "", found, extra=len(names)))
+
+    def ranked(self, base, judged):
+        """Return models with their evidence over `base`, best first."""
+        return ranked(base, judged)[0]
+
+    def final(self, models, kept):
+        """Return the models with their errors at the full rate, over the windows that the last one bears.
+
+        Where disturbance forces blur parameters they are fitted over shorter windows first.
+        """
+        common = self.data.fine
+        if common.forced:
+            models = [self._sharpened(m, common, kept) for m in models]
+        return [(m, *common.errors(m)) for m in models]
+
+    @staticmethod
+    def _sharpened(model, data: Data, kept):
+        if data.carries(model):
+            return model
+        return data.brief.fit(model, [k for k in default_free(model) if k not in kept]).model
+
+    def relative(self, noise):
+        """Return noise over the rms of the centred output, or of the acceleration."""
+        return noise * self.base.train.nrmse / self.base.train.rmse
 
 
 def _best_of(base, trials) -> list[Trial]:
@@ -248,13 +333,13 @@ def _best_of(base, trials) -> list[Trial]:
     return ranked(Trial("", base), best.values())[0]
 
 
-def _promising(found, most=CONFIRMED, share=0.2) -> list[Trial]:
+def _promising(found, most=CONFIRMED, share=PROMISING) -> list[Trial]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
 
     `most`: of them by evidence, `share` of the best one's that is near.
     """
     close = sorted(found, key=lambda t: t.train.rmse)[:3]
-    close = [t for t in close if t.train.rmse < NEAR * close[0].train.rmse]
+    close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
     likely = found[:2] + [t for t in found[2:most] if t.evidence > share * found[0].evidence]
     return likely + [t for t in close if not any(t is o for o in likely)]
 
@@ -270,9 +355,13 @@ def _longest_coherent(stages) -> int:
     errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]
     base, best = [e[0] for e in errors], [min(e) for e in errors]
     at = 0
-    while at + 1 < len(errors) and best[at + 1] <= _GROWTH * best[at]:
+    while at + 1 < len(errors) and best[at + 1] <= GROWTH * best[at]:
         at += 1
-    if at + 1 < len(errors) and best[at] > 0.8 * base[at] and _left(base, best, at) > _left(base, best, -1):
+    if (
+        at + 1 < len(errors)
+        and best[at] > EXPLAINS_LITTLE * base[at]
+        and _left(base, best, at) > _left(base, best, -1)
+    ):
         return len(errors) - 1
     return at
 

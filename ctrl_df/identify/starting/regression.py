@@ -7,17 +7,15 @@ for all of them at once.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...blocks import effects as library
 from ...blocks.effect import Effect
+from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.segments import facts
 from ..estimation.trial import Scales
-from .ripple_spectrum import WaveSearch
 
 
 @dataclass(frozen=True)
@@ -51,69 +49,69 @@ class Start:
     values: tuple[tuple[str, float], ...] = ()  # baseline parameters that go with it
 
 
+@dataclass(frozen=True)
+class ForceFit:
+    """The force regressed on the motion and on further columns.
+
+    Attributes
+    ----------
+    weights : tuple of float
+        Of the further columns.
+    left : float
+        Mean squared force that remains [N^2].
+    friction : float
+        Level of plain dry friction [N], 0 where the model has none.
+    values : dict
+        The model's own parameters; empty where they make no sense.
+    sensible : bool
+        Whether they do.
+    """
+
+    weights: tuple[float, ...]
+    left: float
+    friction: float
+    values: dict[str, float]
+    sensible: bool
+
+
 def regressed(cls, screen) -> Iterator[Start]:
-    """Yield start values for effects of a shape that enters the force linearly: Stribeck friction, ripple."""
-    block = screen.block
-    names = {"mass", "coulomb.level", "viscous.coefficient"} & set(block.parameters)
-    if "mass" not in names or block.core.bodies > 1:
-        return
-    if cls is library.Stribeck:
-        yield from _stribeck(screen, names)
-    elif cls is library.PositionRipple:
-        yield from _ripple(screen, names)
+    """Yield the start values that a class takes from the force; only a single body makes them possible."""
+    if inertia(screen.block) is not None and screen.block.core.bodies == 1:
+        for effect, values in cls.regress(screen):
+            yield Start(effect, 0.0, tuple(values.items()))
 
 
-def _stribeck(screen, names):
-    s, m = screen.scales, screen.motion
-    scored = []
-    for speed in s.speed * np.array([0.04, 0.08, 0.15, 0.3, 0.6]):
-        weights, left = force_regression(m, s, names, [np.sign(m.v) * np.exp(-np.square(m.v / speed))])
-        scored.append((left, speed, weights))
-    _, speed, w = min(scored, key=lambda x: x[0])
-    values = _values(w, names, s)
-    if values is None or w[3] <= 0:
-        return
-    kinetic = values.get("coulomb.level", 0.0)
-    yield Start(library.Stribeck(kinetic + w[3], speed), 0.0, tuple(values.items()))
+def force_fit(motion: Motion, scales: Scales, block, columns) -> ForceFit:
+    """Regress the force on the model's own inertia and friction, and on further columns."""
+    dry, viscous = dry_level(block), viscous_slope(block)
+    weights, left = force_regression(
+        motion, scales, columns, dry=dry is not None, viscous=viscous is not None
+    )
+    values = own_values(block, weights[:3], scales)
+    return ForceFit(
+        tuple(map(float, weights[3:])), left, (values or {}).get(dry or "", 0.0), values or {},
+        values is not None,
+    )  # fmt: skip
 
 
-def _ripple(screen, names):
-    view, _ = screen.data.whole or (screen.view, None)
-    if not all(r.regular for r in view.records):
-        return
-    ripples = [e for e in screen.block.effects if e.id == "position_ripple"]
-    search = WaveSearch(view.records, view.windows, [2 * math.pi / e.wavelength for e in ripples])
-    # where friction wanders the fit over windows knows the mass better than whitened forces do
-    plain = all(e.id in ("coulomb", "viscous", "constant_force") for e in screen.block.effects)
-    plain = plain and not screen.data.forced
-    for wave in search.best(3):
-        weights = (wave.mass, wave.coulomb, wave.viscous)
-        values = (_values(weights, names, screen.scales) if plain else None) or {}
-        effect = library.PositionRipple(wave.amplitude, wave.wavelength, wave.phase)
-        yield Start(effect, 0.0, tuple(values.items()))
-
-
-def _values(weights, names, s):
-    """Return the model's own parameters as regressed; None where they make no sense."""
-    mass, kinetic, viscous = weights[:3]
+def own_values(block, weights, scales: Scales) -> dict[str, float] | None:
+    """Return inertia, dry level and viscous slope as regressed, by name; None where they make no sense."""
+    mass, kinetic, slope = weights
     if mass <= 0:
         return None
-    values = {
-        "mass": mass,
-        "coulomb.level": max(kinetic, 0.01 * s.force),
-        "viscous.coefficient": max(viscous, 1e-3 * s.force / s.speed),
-    }
-    return {k: float(v) for k, v in values.items() if k in names}
+    names = (inertia(block), dry_level(block), viscous_slope(block))
+    sizes = (mass, max(kinetic, 0.01 * scales.force), max(slope, 1e-3 * scales.force / scales.speed))
+    return {k: float(v) for k, v in zip(names, sizes, strict=True) if k is not None}
 
 
-def force_regression(motion: Motion, scales: Scales, names, extra=()):
+def force_regression(motion: Motion, scales: Scales, extra=(), *, dry=True, viscous=True):
     """Regress the force on acceleration, direction, speed and further columns where the mass moves.
 
     Returns
     -------
     weights : array
-        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for those not in
-        `names`.
+        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for a `dry` level
+        or `viscous` friction that is left out.
     left : float
         Mean squared force that remains [N^2].
     """
@@ -121,8 +119,8 @@ def force_regression(motion: Motion, scales: Scales, names, extra=()):
     v, force = motion.v[moving], motion.u[moving]
     matrix = np.column_stack([
         motion.a[moving],
-        np.sign(v) * ("coulomb.level" in names),
-        v * ("viscous.coefficient" in names),
+        np.sign(v) * dry,
+        v * viscous,
         *(column[moving] for column in extra),
     ])  # fmt: skip
     size = np.linalg.norm(matrix, axis=0)

@@ -6,35 +6,26 @@ begin a factor away from the resonance end in other valleys. Its frequency is wh
 
 from __future__ import annotations
 
-import numpy as np
-
-from ...blocks.effects import Compliance
 from ..estimation.candidate import Candidate
+from ..thresholds import JOINT_DAMPING, RESONANCES
 from .attach import attach
 from .screen import Screen
-
-SHARES = (0.15, 0.35, 0.6, 0.85)
-RATES = np.geomspace(1.5, 40.0, 12)
-"""Resonances tried, over the rate of the motion (its speed over its stroke)."""
-
-DAMPING = 0.1
-
 
 # Iterations of all, more of the best of them, and how many these are.
 _LINEAR, _FITTED, _BEST = 1, 2, 4
 
 
-def resonant(screen: Screen, share: float, count: int) -> list[Candidate]:
+def resonant(cls, screen: Screen, share: float, count: int) -> list[Candidate]:
     """Return the baseline with the joints that fit best, as many as `count`: initial states alone fitted.
 
-    `share`: of the mass, behind the joint; one of `SHARES`. Initial states are all but linear: one step tells
-    which joints to look at again.
+    `share`: of the mass, behind the joint; one of `LOAD_SHARES`. Initial states are all but linear: one step
+    tells which joints to look at again.
     """
     scales, found = screen.scales, []
     reduced = share * (1 - share) * scales.mass
-    for rate in RATES * scales.speed / scales.position:
-        stiffness = reduced * rate**2
-        block = attach(screen.block, Compliance(stiffness, 2 * DAMPING * reduced * rate, share))
+    for rate in RESONANCES * scales.speed / scales.position:
+        stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
+        block = attach(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
         if block is not None:
             found.append(screen.data.fit(block, (), iterations=_LINEAR, tolerance=3e-2))
     near = sorted(found, key=lambda f: f.rmse)[:_BEST]

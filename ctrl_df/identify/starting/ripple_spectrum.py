@@ -22,20 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..estimation.segments import facts
+from ..thresholds import RIPPLE_COARSEST, RIPPLE_STEP, RIPPLE_TURNS, SPECTRUM_SAMPLES
 
-TURNS = 400.0
-"""Wavelengths to the stroke, at most."""
-
-STEP = 0.3
-"""Of the scan, in wavelengths to the stroke."""
-
-COARSEST = 6.0
-"""Shortest wavelength over the error of the smoothed position."""
-
-_PLAIN = ("dry", "viscous", "constant")
-
-SAMPLES = 25_000
-"""Longer records are looked at in means over more samples."""
+_PLAIN = ("dry", "linear", "constant")
 
 
 @dataclass(frozen=True)
@@ -72,7 +61,7 @@ class WaveSearch:
         # the band of the motion and some of the noise above it
         band = min(facts(r).half for r in records) // 4
         longest = max(j - i for w in windows for i, j in _runs(w, 1))
-        self._size = max(band, math.ceil(max(map(len, records)) / SAMPLES), 1)
+        self._size = max(band, math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
         self._size = max(min(self._size, longest // 32), 1)
         self._runs = [_runs(w, self._size) for w in windows]
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
@@ -98,13 +87,13 @@ class WaveSearch:
         """Return the ripples that explain most, the best first."""
         if not self.span > 0 or not self._power > 0:
             return []
-        finest = self.span / (COARSEST * max(_blur(r) for r in self.records))
-        turns = np.arange(0.6, max(min(finest, TURNS), 2.0), STEP)
+        finest = self.span / (RIPPLE_COARSEST * max(_blur(r) for r in self.records))
+        turns = np.arange(0.6, max(min(finest, RIPPLE_TURNS), 2.0), RIPPLE_STEP)
         gains = self._scan(turns)
         found: list[Wave] = []
         while len(found) < count and np.max(gains) > 0:
             i = int(np.argmax(gains))
-            near = turns[i] + np.linspace(-STEP, STEP, 13)
+            near = turns[i] + np.linspace(-RIPPLE_STEP, RIPPLE_STEP, 13)
             wave = self.wave(2 * math.pi * near[int(np.argmax(self._scan(near)))] / self.span)
             if wave is not None:
                 found.append(wave)

@@ -7,19 +7,28 @@ is the screening evidence, and the values that explain most are where the refit 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from ...blocks.core import kinetic_level
 from ..estimation.candidate import Candidate
 from ..estimation.trial import Data, Scales, carried
 from .attach import attach
 from .proposals import proposals
-from .regression import Start, motion_of, regressed
+from .regression import ForceFit, Start, force_fit, motion_of, regressed
+from .ripple_spectrum import Wave
+from .ripple_starts import long_waves, waves
+from .value_grid import value_grid
 
 
 class Screen:
     """The refitted baseline as a linear map: its residual, what refitting could change projected out.
+
+    What `Effect.suggest` and `Effect.regress` may ask of it: `block`, `bodies`, `friction`, `scales`
+    (``force``, ``position``, ``speed``, ``mass``, ``of(unit)``), `motion` (``u``, ``x``, ``v``, ``a``),
+    `force_fit`, `step`, `long_waves`, `waves`.
 
     Parameters
     ----------
@@ -47,6 +56,33 @@ class Screen:
     def block(self):
         """The refitted baseline."""
         return self.base.model
+
+    @property
+    def friction(self) -> float:
+        """Its dry friction while it moves [N]."""
+        return kinetic_level(self.block.effects)
+
+    @property
+    def bodies(self) -> int:
+        """Its bodies, 1 or 2."""
+        return self.block.core.bodies
+
+    def step(self) -> float:
+        """Return the step of the grid to which measured values keep [m]; 0 where there is none."""
+        noise = math.sqrt(float(self.residual @ self.residual) / len(self.residual))
+        return value_grid(np.concatenate(self.data.train.outputs), noise)
+
+    def force_fit(self, columns) -> ForceFit:
+        """Regress the force on the motion, by the model's own laws and further columns over `motion`."""
+        return force_fit(self.motion, self.scales, self.block, columns)
+
+    def long_waves(self, make: Callable) -> list[tuple[float, float, float]]:
+        """Return amplitude [N], wavelength [m] and phase of the long ripples that explain most."""
+        return long_waves(self, make)
+
+    def waves(self, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
+        """Yield ripples of any length that explain most, with values of the model's parameters beside."""
+        return waves(self, known)
 
     def project(self, signals) -> np.ndarray:
         """Remove what the baseline's parameters and initial states can explain."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from ..estimation.trial import Scales
+from ..thresholds import WORK_LOW, WORK_MEDIUM
 from .fit import (
-    QUICK,
-    ROUGH,
     FittedTable,
     fit_table,
     log_density,
@@ -15,19 +14,14 @@ from .fit import (
 )
 from .starts import best_starts
 
-SLOW = frozenset({"position_ripple", "sensor_quantization"})
-# Starts that are followed, where not three: each costs, and the plane of backlash has many valleys.
-FOLLOWED = {"position_ripple": 1, "sensor_quantization": 1, "bristle": 2, "compliance": 2, "backlash": 4}
 
-
-def try_effect(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
+def try_effect(job) -> tuple[str, FittedTable, int] | None:
     """Fit one effect class from its best starts (a job of its own, for executors)."""
     cls, block, points, free, scales, slopes = job
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
-    slow = cls.id in SLOW
-    work = ROUGH if slow else QUICK
-    keep = FOLLOWED.get(cls.id, 3)
-    grown, hopeful = best_starts(cls, block, points, slopes, keep, work)
+    slow = cls.costly
+    work = WORK_LOW if slow else WORK_MEDIUM
+    grown, hopeful = best_starts(cls, block, points, slopes, cls.table_starts, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
@@ -39,10 +33,10 @@ def try_effect(job) -> tuple[str, FittedTable, tuple[str, ...]] | None:
         )  # fmt: skip
 
     if not hopeful:
-        return cls.id, fitted(grown[0], 0), own
+        return cls.id, fitted(grown[0], 0), len(own)
     begun = [fitted(g, 2) for g in grown]
     best = max(begun, key=_likelihood_of)
-    return cls.id, best if slow or best.converged else fitted(best.block, 8), own
+    return cls.id, best if slow or best.converged else fitted(best.block, 8), len(own)
 
 
 def fit_either(block, points, names, scales, *, again=True, **options) -> FittedTable:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...drawing import draw
 from ..data.frequency_measurement import FrequencyMeasurement
-from ..data.records import as_tables
 from ..residuals.compared import Compared
 from ..residuals.regions import Region, Regions
 from .fit import Points, counted, points_of, relative_error, rms, simulate_table
@@ -121,24 +120,6 @@ class FrequencyComparison(Compared):
         return draw("table comparison", self, record=record, **keywords)
 
 
-def compare_frequency(model, data, **keywords) -> FrequencyComparison:
-    """Compare a model's describing function with measured tables.
-
-    Parameters
-    ----------
-    model : block, or loop of `ctrl_df.closed_loop`
-        Anything `ctrl_df.describing_function` takes; of a loop its block.
-    data : FrequencyMeasurement or sequence of them
-
-    Returns
-    -------
-    FrequencyComparison
-    """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    return comparison_of_tables(inner_block(model), as_tables(data))
-
-
 def comparison_of_tables(model, records) -> FrequencyComparison:
     """Return the comparison; `records` are known to be tables."""
     rows = []
@@ -193,7 +174,7 @@ def plane_regions(points: Points, error) -> Regions:
         return Regions()
     found = []
     for kind, axis, unit, scale in (
-        ("amplitude", points.A, "N", 1.0),
+        ("amplitude", points.A, points.unit, 1.0),
         ("frequency", points.omega, "rad/s", 1 / (2 * math.pi)),
     ):
         for inside, low, high in _bands(axis):

@@ -19,6 +19,7 @@ from ..data.frequency_measurement import FrequencyMeasurement
 from ..estimation.simulator import feasible
 from ..estimation.trial import Scales
 from ..estimation.variables import Variable
+from ..thresholds import GROSS, RIGID, WORK_HIGH
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,8 @@ class Points:
         What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point
         is less (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with
         N).
+    unit : str
+        Of the amplitudes.
     """
 
     A: np.ndarray
@@ -48,6 +51,7 @@ class Points:
     noise: float
     record: np.ndarray
     scale: np.ndarray
+    unit: str = "N"
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -102,7 +106,7 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
     for value in np.unique(w):
         here = w == value
         scale[here] = np.maximum(scale[here], 0.1 * np.median(np.abs(n[here & (n != 0)])))
-    return Points(a, w, n, weight, noise, np.concatenate(numbers), scale)
+    return Points(a, w, n, weight, noise, np.concatenate(numbers), scale, records[0].input_unit)
 
 
 def counted(record: FrequencyMeasurement) -> np.ndarray:
@@ -111,20 +115,13 @@ def counted(record: FrequencyMeasurement) -> np.ndarray:
     return measured & np.any(measured & (record.N != 0), axis=0)
 
 
-# Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for
-# ever.
-ROUGH = {"max_steps": 4_000, "averages": 8}
-QUICK = {"max_steps": 25_000, "averages": 8}
-CAREFUL = {"max_steps": 60_000, "averages": 16}
-
-
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
     """Return N of the model at the points; NaN where it has no answer within the work allowed."""
     N = np.empty(len(points), complex)
-    rigid = _rigid(model, points, RIGID[1] if work in (None, CAREFUL) else RIGID[0])
-    for some, block in ((rigid, model.without_effect("bristle") if rigid.any() else model), (~rigid, model)):
+    rigid = _rigid(model, points, RIGID[1] if work in (None, WORK_HIGH) else RIGID[0])
+    for some, block in ((rigid, _without_bristles(model) if rigid.any() else model), (~rigid, model)):
         if some.any():
-            N[some] = _described(block, points.A[some], points.omega[some], work or CAREFUL)
+            N[some] = _described(block, points.A[some], points.omega[some], work or WORK_HIGH)
     return N
 
 
@@ -136,7 +133,8 @@ def _described(model, A, omega, work) -> np.ndarray:
     return np.asarray(describing_function(model, A, omega, **options))
 
 
-RIGID = (2e-3, 3e-4)  # share of the swing, when quick and when careful
+def _without_bristles(model):
+    return model.with_effects([e for e in model.effects if e.role != "presliding"])
 
 
 def _rigid(model, points: Points, share: float) -> np.ndarray:
@@ -145,7 +143,7 @@ def _rigid(model, points: Points, share: float) -> np.ndarray:
     There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by
     less than that share.
     """
-    bristles = [e for e in getattr(model, "effects", ()) if e.id == "bristle" and e.level == 0]
+    bristles = [e for e in getattr(model, "effects", ()) if e.role == "presliding" and e.level == 0]
     if not bristles:
         return np.zeros(len(points), bool)
     friction = [e for e in model.effects if e.role == "friction" and e.side == "motor"]
@@ -178,9 +176,6 @@ def outlying(error) -> np.ndarray:
     return far if np.count_nonzero(far) <= max(len(size) // 16, 2) else np.zeros(len(size), bool)
 
 
-_GROSS = 0.02  # share of points expected to err by as much as N itself
-
-
 def log_density(error, least: float) -> tuple[np.ndarray, float]:
     """Return the log density [nats] of every point's error, and the variance of what is mere scatter.
 
@@ -192,15 +187,15 @@ def log_density(error, least: float) -> tuple[np.ndarray, float]:
         The variance is no less.
     """
     size = np.abs(error) ** 2
-    gross = _GROSS * np.exp(-np.minimum(size, 700.0))
+    gross = GROSS * np.exp(-np.minimum(size, 700.0))
     best = (np.full(len(size), -np.inf), least)
     for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
         variance = max(variance, least)
         for _ in range(30):
-            usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+            usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
             share = usual / (usual + gross)
             variance = max(float(share @ size) / max(float(share.sum()), 1e-300), least)
-        usual = (1 - _GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+        usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
         density = np.log(usual + gross)
         if density.sum() > best[0].sum():
             best = density, variance
@@ -277,7 +272,7 @@ def fit_table(
     budget : int
         Bound on the tables computed.
     work : mapping or None
-        Bounds on the work of one point, `ROUGH`, `QUICK` or `CAREFUL` (the default).
+        Bounds on the work of one point, `WORK_LOW`, `WORK_MEDIUM` or `WORK_HIGH` (the default).
     """
     table = block.parameters
     job = _Job(

@@ -64,8 +64,9 @@ class Memory(NamedTuple):
     """Linear maps of the modes met last, and scratch; see `memory`."""
 
     probe: Drive  # external inputs of a unit
-    seen: np.ndarray  # (SLOTS, nm) modes; `order` tells how many are known and which is the next to go
-    order: np.ndarray
+    seen: np.ndarray  # (SLOTS, nm) modes
+    used: np.ndarray  # (SLOTS,): the how-manieth mode a run met first this one was; 0: none of this run
+    order: np.ndarray  # (2,): modes that are known, and modes that this run has met
     ready: (
         np.ndarray
     )  # (SLOTS * LENGTHS * ranks,) whether it has propagators, see `ctrl_df.simulate.kernel.glide`
@@ -94,7 +95,7 @@ def memory(prog) -> Memory:
     n, nr, ny, ng, nm = (int(prog.ints[i]) for i in (H_NX, H_NR, L.H_NY, H_NG, L.H_NM))
     probe = Drive(np.zeros(0), np.zeros((nr, 0)), 1, np.zeros((nr, 1), complex), 0.0, 0)
     return Memory(
-        probe, np.zeros((used, nm), np.int64), np.zeros(2, np.int64),
+        probe, np.zeros((used, nm), np.int64), np.zeros(used, np.int64), np.zeros(2, np.int64),
         np.zeros(used * LENGTHS * (RANKS if nq > 0 else 1), np.int64),
         np.zeros((used, n, n)),
         np.zeros((used, n, nr)), np.zeros((used, n)), np.zeros((used, n)),
@@ -137,17 +138,33 @@ def recall(prog, store, mode, work, x, dx0, dx, g):
                 same = False
                 break
         if same:
+            if store.used[slot] == 0:
+                store.order[1] += 1
+                store.used[slot] = store.order[1]
             return slot
     return _learn(prog, store, mode, work, x, dx0, dx, g)
 
 
 @part
+def forget_uses(store):
+    """Begin a run like any other: the maps of modes are what they are, which of them were met is not."""
+    for slot in range(store.used.shape[0]):
+        store.used[slot] = 0
+
+
+@part
 def _learn(prog, store, mode, work, x, dx0, dx, g):
-    """Learn the present mode in place of the one learnt first; returns its slot."""
-    known = int(store.order[0])
-    slot = int(store.order[1])
-    store.order[1] = (slot + 1) % SLOTS
-    store.order[0] = min(known + 1, SLOTS)
+    """Learn the present mode in place of the one that this run has met first, if at all; returns its slot."""
+    slot = int(store.order[0])
+    if slot < store.used.shape[0]:
+        store.order[0] = slot + 1
+    else:
+        slot = 0
+        for other in range(1, store.used.shape[0]):
+            if store.used[other] < store.used[slot]:
+                slot = other
+    store.order[1] += 1
+    store.used[slot] = store.order[1]
     each = LENGTHS * ranks(store)
     for i in range(slot * each, (slot + 1) * each):
         store.ready[i] = 0

@@ -34,9 +34,9 @@ from ..program.layout import (
 )
 from . import history
 from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
-from .exponential import Bend, bend_memory, forget
+from .exponential import Bend, bend_memory
 from .flow import rates
-from .glide import Glide, glide, glide_memory
+from .glide import Glide, forget_run, glide, glide_memory
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
@@ -205,9 +205,9 @@ def advance(
     for i in range(ng):
         g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
-        forget(store, bend)
+        forget_run(store, tracks)
         for j in range(n):
-            size[j] = abs(x[j])
+            size[j], grain[j] = abs(x[j]), 0.0
         if delays:
             start_delays(prog, drive, segment, t, x, mode, work)
         tick(prog, drive, segment, t, x, mode, work, dx)
@@ -341,7 +341,9 @@ def advance(
                 for i in range(ng):
                     lowest[i] = g0[i]
                 if stale == 0:
-                    grains(prog, drive, segment, t, x, mode, work, k[0], size, x1, dx, g, grain)
+                    grains(
+                        prog, drive, segment, t, length, x, mode, work, k[0], size, x1, dx, g, grain
+                    )  # fmt: skip
                     stale = GRAINS
                 stale -= 1
                 # samples much denser than the motion: a cheaper pair does

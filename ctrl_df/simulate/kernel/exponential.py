@@ -40,6 +40,7 @@ PATIENCE = 20  # steps of the higher rank before the lower one is tried again
 EPS = np.finfo(float).eps
 ORDER = 16  # terms of the series of an exponential
 HALVINGS = 40
+USE = 1  # an entry of `Bend.state`
 # u (u - 1) .. (u - i + 1) / i! = sum_k NEWTON[i, k] u^k / k!
 NEWTON = np.zeros((MOST + 1, MOST + 1))
 for _i in range(MOST + 1):
@@ -54,7 +55,7 @@ class Bend(NamedTuple):
     base: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): rows E_k, P_k of all nodes
     gain: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): G_ki, as they are needed
     slope: np.ndarray  # (SLOTS, nq, n): K
-    state: np.ndarray  # (SLOTS, 4): whether K is not zero, halvings, rank in use, patience
+    state: np.ndarray  # (SLOTS, 4): whether K is not zero, use of the slot it is of, rank, patience
     nodes: np.ndarray  # (MOST + 1, nz + 3 nq): at each node z, q, R and D
     push: np.ndarray  # forces, see `ctrl_df.simulate.program.layout`
     dx: np.ndarray  # (n,)
@@ -86,13 +87,15 @@ def parts(store, rank):
 
 
 @part
-def forget(store, bend):
-    """Begin a run like any other: no Jacobian that an earlier one has left."""
-    for slot in range(bend.state.shape[0]):
+def begin_use(store, bend, slot):
+    """Begin with a mode as a run does that meets it first: no Jacobian that another has left."""
+    use = float(store.used[slot])
+    if bend.state[slot, USE] != use:
         if bend.state[slot, 0] != 0.0:
             _straighten(store, bend, slot)
         for i in range(4):
             bend.state[slot, i] = 0.0
+        bend.state[slot, USE] = use
 
 
 @part
@@ -267,12 +270,11 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
             for k in range(nq):
                 value += store.q[slot, i, k] * bend.slope[slot, k, j]
             jacobian[i, j] = value
-    halvings = int(bend.state[slot, 1])
-    while not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, bend.dx):
+    halvings = _least_halvings(jacobian, sigma)
+    while halvings > HALVINGS or not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, bend.dx):
         halvings += 1
         if halvings > HALVINGS:
             return False
-    bend.state[slot, 1] = halvings
     tau = sigma / 2.0**halvings
     for _ in range(halvings):
         _copy(bend.matrix, m, n)
@@ -328,6 +330,23 @@ def _newton_gain(matrix, newton, q, row, degree, k, sigma):
         value += newton[degree, power] * scale * total
         scale /= sigma
     return value
+
+
+@part
+def _least_halvings(jacobian, tau):
+    """Return how often tau is to be halved at least for a series of `ORDER` terms to converge.
+
+    The trace of J^2 tells about the largest rate, whatever the units of the states.
+    """
+    square = 0.0
+    for i in range(jacobian.shape[0]):
+        for j in range(jacobian.shape[0]):
+            square += jacobian[i, j] * jacobian[j, i]
+    turn, halvings = math.sqrt(abs(square)) * tau, 0
+    while turn > 2.0 and halvings <= HALVINGS:
+        turn *= 0.5
+        halvings += 1
+    return halvings
 
 
 @part

@@ -24,11 +24,12 @@ import numpy as np
 
 from ..compiler.compiled import part
 from ..program import layout as L
-from .affine import LENGTHS, RANKS, Memory, entry, ranks, recall
+from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
 from .exponential import (
     MILD,
     PATIENCE,
     STIFF,
+    begin_use,
     bent_step,
     contraction,
     make_bent,
@@ -60,7 +61,7 @@ class Glide(NamedTuple):
     Rows: states (unless laws are curved), margins, outputs.
     """
 
-    length: np.ndarray  # (LENGTHS,): known steps [s]; 0: none
+    length: np.ndarray  # (LENGTHS,): steps of this run [s]; of an earlier one: less than zero; 0: none
     newest: np.ndarray  # (1,): which was learnt last
     first: np.ndarray  # (SLOTS * LENGTHS * ranks, rows + 1): where a row begins in `column` and `value`
     column: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
@@ -96,6 +97,17 @@ def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
 
 
 @part
+def forget_run(store, tracks):
+    """Begin a run like any other: nothing that its numbers depend on is left of an earlier one.
+
+    Matrices are: they are the same whoever has them made.
+    """
+    forget_uses(store)
+    for which in range(LENGTHS):
+        tracks.length[which] = -abs(tracks.length[which])
+
+
+@part
 def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
           size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g, bend):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
@@ -124,6 +136,8 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         here[j] = ahead[j] = 0.0
     here[one] = ahead[one] = bound[one] = 1.0
     before = -1
+    if bend is not None:
+        begin_use(store, bend, slot)
     while t < t_end:
         jumped = False
         while segment + 1 < nt and time[segment + 1] <= t:
@@ -203,6 +217,8 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                 settle(prog, drive, segment, t, x, mode, work, dx)
                 record(prog, drive, segment, t, x, mode, work, yout[index])
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
+            if bend is not None:
+                begin_use(store, bend, slot)
             stale, before = True, -1
             for j in range(n):
                 here[j] = x[j]
@@ -348,10 +364,12 @@ def _following(t, time, segment, tout, index, next_tick):
 
 @part(inline=True)
 def _known(tracks, length, near):
-    """Which of the known lengths a step has; -1: none."""
-    for which in range(LENGTHS):
+    """Which of the known lengths a step has, the newest first; -1: none."""
+    which = tracks.newest[0]
+    for _ in range(LENGTHS):
         if abs(tracks.length[which] - length) <= near:
             return which
+        which = which - 1 if which > 0 else LENGTHS - 1
     return -1
 
 
@@ -377,6 +395,11 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
         share = mean / max(round(mean / length), 1.0)
         if abs(share - length) <= near:
             length = share
+    for which in range(LENGTHS):
+        if tracks.length[which] == -length:
+            tracks.newest[0] = which
+            tracks.length[which] = length
+            return which
     which = (tracks.newest[0] + 1) % LENGTHS
     tracks.newest[0] = which
     tracks.length[which] = length

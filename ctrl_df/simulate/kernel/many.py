@@ -148,7 +148,7 @@ def _one(desk, rows, drives, par, how, row):
         fresh = 1
         if desk.tally[1] != rows.par[row]:
             # maps of modes that were learnt with other parameters
-            desk.space.store.order[0] = desk.space.store.order[1] = 0
+            desk.space.store.order[0] = 0
             desk.tally[1] = rows.par[row]
         for i in range(desk.scale.shape[0]):
             for j in range(desk.scale.shape[1]):

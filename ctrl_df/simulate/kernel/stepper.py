@@ -66,11 +66,13 @@ def measure(j, count, h, k, x1, size):
 
 
 @part
-def grains(prog, drive, segment, t, x, mode, work, k0, size, trial, dx, g, grain):
+def grains(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, grain):
     """Write what rounding leaves of each rate: the last digits of all the terms it is the sum of.
 
     A rate near zero may be the difference of large forces in balance; its last digits are theirs. The terms
-    are the rate's slopes times the sizes of the states, by differences, and what acts from outside.
+    are the rate's slopes times the sizes of the states, by differences, and what acts from outside. A state
+    that begins at rest is given the size to which these terms could bring it over a step of `h` seconds: its
+    digits are lost where large forces in balance have just set it free.
     """
     n, w = x.shape[0], work[0]
     for i in range(n):
@@ -93,9 +95,10 @@ def grains(prog, drive, segment, t, x, mode, work, k0, size, trial, dx, g, grain
                 for i in range(nx):
                     grain[first + i] += value * abs(prog.par[po + nx * nx + i * ni + k])
     for j in range(n):
-        if size[j] == 0.0:
+        reach = size[j] + h * grain[j] / GRAIN
+        if reach == 0.0:
             continue
-        trial[j] = x[j] + NUDGE * size[j]
+        trial[j] = x[j] + NUDGE * reach
         rates(prog, drive, segment, t, trial, mode, work, dx, g, False)
         trial[j] = x[j]
         for i in range(n):

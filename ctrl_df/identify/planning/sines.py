@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from .fit import QUICK
-
-_SETTLE, _COUNTED = 12, 8  # periods before and while a point is measured
-_POINTS = 6
+from ..results.experiment import Experiment, separated
+from ..thresholds import COUNTED, SETTLE, SINES, WORK_MEDIUM
 
 
-def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=None, dt=None):
+def stepped_sines(
+    diagnosis, models, names, *, force=None, stroke=None, duration=None, dt=None, loop=None
+) -> Experiment:
     """Return the `Experiment` of up to six sines at which the models differ most, relative to the scatter.
 
     Parameters
@@ -28,6 +28,8 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
         Limits [N], [m]; None: the largest of the tables; no limit.
     duration, dt : float or None
         [s]; None: what twenty periods of each sine need; a hundred samples of the fastest period.
+    loop
+        Of no meaning here: a sine is held by its own amplitude.
 
     Returns
     -------
@@ -35,9 +37,9 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     """
     from ...df.describing import quiet_describing_function as describing_function
     from ...df.dispatch import method_for
-    from ..experiment import Experiment
 
     tables, given = diagnosis.train, diagnosis.limits
+    long, strong = tables[0].output_unit, tables[0].input_unit
     force = float(force or given.get("force") or max(float(r.A[-1]) for r in tables))
     reach = float(stroke or given.get("stroke") or math.inf)
     if not (force > 0 and reach > 0):
@@ -47,7 +49,7 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
     omega = np.geomspace(0.5 * min(r.omega[0] for r in tables), 2 * max(r.omega[-1] for r in tables), 11)
     found = []
     for m in models:
-        options: dict[str, Any] = dict(QUICK) if method_for(m).takes_options else {}
+        options: dict[str, Any] = dict(WORK_MEDIUM) if method_for(m).takes_options else {}
         found.append(np.asarray(describing_function(m, A[:, None], omega[None], **options)))
     size = np.max(np.abs(np.nan_to_num(found)), axis=0)
     far = A[:, None] * size
@@ -57,32 +59,29 @@ def stepped_sines(diagnosis, models, names, force=None, stroke=None, duration=No
         for a, b in itertools.combinations(found, 2)
     ]
     separation = np.where((far <= reach) & (size > 0), np.min(gaps, axis=0) / sigma, 0.0)
-    order = np.argsort(separation, axis=None)[::-1][:_POINTS]
+    order = np.argsort(separation, axis=None)[::-1][:SINES]
     i, k = np.unravel_index(order[separation.ravel()[order] > 0], separation.shape)
     if len(i) == 0:
         raise ValueError(
-            f"no sine of up to {force:g} N within {reach:g} m separates {' and '.join(names)}. Allow more "
-            "force or "
-            "stroke, or record a run over time."
+            f"no sine of up to {force:g} {strong} within {reach:g} {long} separates {' and '.join(names)}. "
+            "Allow more force or stroke, or record a run over time."
         )
     chosen = sorted(zip(A[i].tolist(), omega[k].tolist(), strict=True), key=lambda p: (p[1], p[0]))
-    needed = sum((_SETTLE + _COUNTED) * 2 * math.pi / w for _, w in chosen)
+    needed = sum((SETTLE + COUNTED) * 2 * math.pi / w for _, w in chosen)
     factor = 1.0 if duration is None else float(duration) / needed
     dt = float(dt or 2 * math.pi / (100 * max(w for _, w in chosen)))
     parts = []
     for a, w in chosen:
-        periods = max(int(round((_SETTLE + _COUNTED) * factor)), 2)
+        periods = max(int(round((SETTLE + COUNTED) * factor)), 2)
         n = max(int(round(periods * 2 * math.pi / w / dt)), 2)
         # from rest with the sine, not the cosine: the mass then drifts off least
         parts.append(a * np.sin(w * dt * np.arange(n)))
     u = np.concatenate(parts)
-    words = " and ".join(n.replace("_", " ") for n in (names if len(names) > 1 else ("no effect", *names)))
     least, stroke_used = float(separation[i, k].min()), float(far[i, k].max())
-    points = ", ".join(f"{a:.3g} N at {w:.3g} rad/s" for a, w in chosen)
+    points = ", ".join(f"{a:.3g} {strong} at {w:.3g} rad/s" for a, w in chosen)
     reason = (
-        f"sines of {points}: there {words} differ by {least:.2g} to {float(separation[i, k].max()):.2g} "
-        "times the "
-        f"scatter, within {stroke_used:.3g} m of swing."
+        f"sines of {points}: there {separated(names)} differ by {least:.2g} to "
+        f"{float(separation[i, k].max()):.2g} times the scatter, within {stroke_used:.3g} {long} of swing."
     )
     return Experiment(
         dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for

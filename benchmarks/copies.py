@@ -1,0 +1,86 @@
+"""Every effect of the library, copied into a file of a user's own: is the copy found as the original is?
+
+    python benchmarks/copies.py [--jobs 2] [--only PART] [--whole]
+
+One rig an effect. The diagnosis is made twice: with the original among the candidates, and with its copy in
+its place. `--whole`: against the whole library; else against three others. One line each: verdict, evidence,
+and what differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+if "--jobs" in sys.argv:
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+import rigs
+from copies import copied
+
+import ctrl_df as cdf
+
+OTHERS = ("quadratic_drag", "linear_spring", "asymmetric_coulomb")
+SEEDS = {"position_ripple": 6001}  # of seed 21 it is none that fits can follow
+
+
+def found_by(rig, candidates):
+    """Return verdict and ranking."""
+    free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
+    train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
+    return cdf.diagnose(rig.baseline, train, holdout=held, free=free, candidates=candidates)
+
+
+def row(job) -> tuple[str, str, str, float, list[str], float]:
+    """Return effect, both verdicts, the evidence of the original, what differs, processor time."""
+    name, whole = job
+    began = time.process_time()
+    library = cdf.effect_library()
+    others = [c for k, c in library.items() if k != name and (whole or k in OTHERS)]
+    rig = rigs.draw(name, SEEDS.get(name, 21), excitation="multisine", snr_db=60)
+    before = found_by(rig, [library[name], *others])
+    with tempfile.TemporaryDirectory() as folder, copied(library[name], folder) as own:
+        after = found_by(rig, [own, *others])
+    pairs = [(c.id.replace("own_", ""), c.evidence) for c in after.ranking]
+    differs = [] if before.verdict == after.verdict else [f"{before.verdict} -> {after.verdict}"]
+    for c, (key, evidence) in zip(before.ranking, pairs, strict=True):
+        if key != c.id or abs(evidence - c.evidence) > 1e-6 * abs(c.evidence) + 1e-6:
+            differs.append(f"{c.id} {c.evidence:.6g} -> {key} {evidence:.6g}")
+    named = before.best.id if before.best else "-"
+    same = ", ".join(before.best.equivalents) if before.best else ""
+    called = f"{named} = {same}" if same else named
+    return name, before.verdict, called, before.ranking[0].evidence, differs, time.process_time() - began
+
+
+def main() -> int:
+    """Print a line an effect; return 1 if a copy differs from its original."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only", default="")
+    parser.add_argument("--whole", action="store_true")
+    args = parser.parse_args()
+    names = [n for n in rigs.ORDER if args.only in n]
+    alike = 0
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for name, verdict, called, evidence, differs, seconds in pool.map(
+            row, [(n, args.whole) for n in names]
+        ):
+            alike += not differs
+            says = "; ".join(differs) or "alike"
+            print(
+                f"{name:<20} {verdict:<10} {called:<36} {evidence:>10.1f}  {says}  {seconds:.0f} s",
+                flush=True,
+            )
+    print(f"{alike} of {len(names)} copies found as their originals")
+    return int(alike < len(names))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

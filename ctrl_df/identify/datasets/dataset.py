@@ -1,0 +1,95 @@
+"""What every kind of data answers: comparison, refit, diagnosis, ladder and plans are written once."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..residuals.compared import Compared
+from ..results.experiment import Experiment
+from ..selection.search import Search
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters of a block fitted to data.
+
+    Attributes
+    ----------
+    block : Mechanism
+        With the values found.
+    errors : dict
+        Standard errors by name.
+    at_bound : tuple of bool
+        Whether each parameter stands at a bound of its range.
+    blurred : collection of str
+        Parameters that the data do not determine.
+    doubts : tuple of str
+        Sentences about these.
+    covariance : (p, p) array
+    comparison : Compared
+        The fitted model beside the data.
+    converged : bool
+    simulations : int
+    """
+
+    block: Any
+    errors: dict[str, float]
+    at_bound: tuple[bool, ...]
+    blurred: Any
+    doubts: tuple[str, ...]
+    covariance: np.ndarray
+    comparison: Any
+    converged: bool
+    simulations: int
+
+
+class Dataset(ABC):
+    """Data that a model can be fitted to, and others that it is validated on.
+
+    Attributes
+    ----------
+    records, held : tuples
+        To fit; to validate on (may be empty: a part of `records` is then held out).
+    """
+
+    records: tuple
+    held: tuple
+
+    def check_segments(self, mode, window) -> None:
+        """Check how records are to be cut; tables are not."""
+        return None
+
+    @abstractmethod
+    def block_of(self, model):
+        """Return the block whose parameters a fit to these data moves."""
+
+    @abstractmethod
+    def compare(self, model, mode: str, window: float | None) -> Compared:
+        """Set a model beside the records."""
+
+    @abstractmethod
+    def fit(self, model, names, start, *, whole, mode, window, robust, budget) -> Estimate:
+        """Adjust the named parameters; `whole`: everything that can be found besides, too."""
+
+    @abstractmethod
+    def search(self, block, free) -> Search:
+        """Return the search for an effect that the block misses, its parameters `free` being refitted."""
+
+    @abstractmethod
+    def plan(self, diagnosis, models: Sequence, names, **limits) -> Experiment:
+        """Return the input that separates the models best."""
+
+    @staticmethod
+    def as_given(model, block):
+        """Return a fitted block as the model was given: within a loop of the same controller, or itself."""
+        parts = getattr(model, "parts", None)
+        if parts is None:
+            return block
+        from ...simulate.loop import closed_loop
+
+        return closed_loop(parts.controller, block, parts.dt)

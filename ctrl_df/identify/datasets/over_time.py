@@ -1,0 +1,76 @@
+"""Records over time: judged by what a model simulates, in segments that begin anew."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arguments import check_window
+from ..estimation.candidate import window_lengths
+from ..estimation.multiple_shooting import Problem
+from ..estimation.prepared import REFERENCE
+from ..estimation.refit_records import blurred, doubts, refit_records
+from ..estimation.segments import make_windows
+from ..estimation.simulator import Simulator
+from ..planning.inputs import input_that_separates
+from ..results.comparison import Comparison, RecordComparison
+from ..selection.structure_search import StructureSearch
+from .dataset import Dataset, Estimate
+
+
+class TimeDataset(Dataset):
+    """Records of the input and the output over time."""
+
+    def __init__(self, records, held=()):
+        self.records, self.held = tuple(records), tuple(held)
+
+    def check_segments(self, mode, window):
+        """Check the mode, and a length of segment that holds samples enough."""
+        check_window(self.records, mode, window)
+
+    def block_of(self, model):
+        """Return the block itself, or that of a loop."""
+        return Simulator(model, self.records[0]).block
+
+    def compare(self, model, mode, window):
+        """Simulate the model over segments of the records, their initial states fitted."""
+        self.check_segments(mode, window)
+        mode = "windows" if mode == "auto" and window is not None else mode
+        lengths = window_lengths(model, self.records, mode, window)
+        problem = Problem(model, self.records, (), 10_000)
+        cut = [make_windows(r, n) for r, n in zip(self.records, lengths, strict=True)]
+        problem.stage(cut, 1)
+        problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
+        return self._comparison(model, problem.windows, problem.nuisance)
+
+    def _comparison(self, model, windows, starts, fitted: int = 0) -> Comparison:
+        """Return the comparison of a model whose initial states in each segment are known already."""
+        rows = []
+        for record, w, start in zip(self.records, windows, starts, strict=True):
+            simulated = Simulator(model, record).run(w, None, start, rounded=True)
+            rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
+        return Comparison(model, tuple(rows))
+
+    def fit(self, model, names, start, *, whole, mode, window, robust, budget):
+        """Fit by multiple shooting; a loop by its block where the recorded force can drive that."""
+        if getattr(model, "parts", None) is not None and self._tells_references():
+            model = model.parts.block
+        found, seen = refit_records(
+            model, self.records, names, start, whole=whole, mode=mode, window=window, robust=robust,
+            budget=budget,
+        )  # fmt: skip
+        comparison = self._comparison(found.model, seen.windows, seen.starts, fitted=len(names))
+        return Estimate(
+            self.block_of(found.model), found.standard_errors, found.at_bound, blurred(found), doubts(found),
+            found.covariance, comparison, found.converged, found.nfev,
+        )  # fmt: skip
+
+    def _tells_references(self) -> bool:
+        return all(any(k in (r.channels or {}) for k in REFERENCE) for r in self.records)
+
+    def search(self, block, free):
+        """Return the search over segments of the records."""
+        return StructureSearch(block, self.records, self.held, free)
+
+    def plan(self, diagnosis, models, names, **limits):
+        """Return the input, of a few shapes and sizes, whose outputs differ most."""
+        return input_that_separates(diagnosis, models, names, **limits)

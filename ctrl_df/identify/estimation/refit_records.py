@@ -1,0 +1,123 @@
+"""A refit to records: short windows first, restarted where the cost is rough, then those that blur least."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...blocks.mechanism import Mechanism
+from ..data.derivatives import step_of
+from .candidate import Candidate, fit_candidate, fit_windows
+from .multistart import hopped, rough
+from .simulator import Simulator
+from .trial import brief_window
+from .variables import step_of_sensor
+
+
+def refit_records(
+    model, records, names, start, *, whole, mode, window, robust, budget
+) -> tuple[Candidate, Candidate]:
+    """Return the fit, and the one whose windows and initial states the comparison is to show.
+
+    Parameters
+    ----------
+    model : block or loop
+    records : sequence of Measurement
+    names : tuple of str
+        Parameters to move.
+    start : mapping or None
+        Start values other than the model's.
+    whole : bool
+        Whether the step of a sensor that rounds is to be found as well.
+    mode, window, robust, budget
+        As for `ctrl_df.refit`.
+    """
+    settings: dict[str, Any] = dict(
+        budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
+    )
+    found = fit_candidate(model, records, start, names, coarse=start is None, iterations=40, **settings)
+    shown = None
+    if mode == "auto" and window is None and names and isinstance(model, Mechanism):
+        brief = brief_window(found.model, records)
+        if brief is not None:
+            shown = settings | {"coarse": False, "starts": found.starts}
+            settings["window"] = brief
+            # from the start again: longer windows may have left the right valley (of a ripple, say)
+            found = fit_candidate(model, records, start, names, coarse=False, iterations=40, **settings)
+    if rough(found):
+        better = hopped(found, _Beside(records, found.windows), rough(found))
+        if better is not found:
+            found = fit_candidate(
+                better.model, records, None, names, coarse=False, starts=better.starts, **settings
+            )
+    found = _with_step(found, records, names, whole)
+    # a model that errs over brief windows of its own fit would look better than it is
+    seen = found if shown is None else fit_candidate(found.model, records, None, (), **shown)
+    return found, seen
+
+
+class _Beside:
+    """Fits over the windows of a refit, at the full rate."""
+
+    def __init__(self, records, windows):
+        self.records, self.windows = records, windows
+
+    def __call__(self, model, names, *, starts, iterations, hopeless) -> Candidate:
+        return fit_windows(
+            model, self.records, self.windows, names, thin=1, starts=starts, iterations=iterations,
+            hopeless=hopeless,
+        )  # fmt: skip
+
+
+def _with_step(found: Candidate, records, names, whole) -> Candidate:
+    """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
+    first = Simulator(found.model, records[0])
+    key = step_of_sensor(first.block)
+    if key is None or not (whole or key in names):
+        return found
+    steps = [step_of(r.y) for r in records]
+    if min(steps) == 0:
+        return found
+    return replace(found, model=first.with_values({key: float(np.median(steps))}))
+
+
+def blurred(found: Candidate) -> set[str]:
+    """Return the parameters in a null direction, or uncertain by more than themselves."""
+    names = set()
+    for _, direction in found.null:
+        names |= {k for k, d in zip(found.names, direction, strict=True) if abs(d) > 0.1}
+    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0)) if len(found.names) else np.zeros(0)
+    for k, value, error, scale in zip(found.names, found.values, errors, found.scale, strict=True):
+        if not math.isfinite(error) or error > max(abs(value), scale):
+            names.add(k)
+    return names
+
+
+def doubts(found: Candidate) -> tuple[str, ...]:
+    """Return a sentence for every direction the data do not determine."""
+    lines, named = [], set()
+    for _, direction in found.null:
+        parts = [(k, d) for k, d in zip(found.names, direction, strict=True) if abs(d) > 0.1]
+        parts.sort(key=lambda p: -abs(p[1]))
+        named |= {k for k, _ in parts}
+        if len(parts) == 1:
+            lines.append(f"{parts[0][0]} leaves no trace in these data: its value is the start value.")
+            continue
+        signs = [p[1] * parts[0][1] > 0 for p in parts]
+        up = ", ".join(k for (k, _), s in zip(parts, signs, strict=True) if s)
+        down = ", ".join(k for (k, _), s in zip(parts, signs, strict=True) if not s)
+        change = (
+            f"raising {up}"
+            + (f" while lowering {down}" if down else "")
+            + (" together" if len(parts) > 1 else "")
+        )
+        lines.append(
+            f"{' and '.join(k for k, _ in parts)} cannot be told apart on these data: {change} leaves the "
+            "output as it is. Fix one of them, or excite the drive otherwise."
+        )
+    for k in sorted(blurred(found) - named, key=found.names.index):
+        lines.append(f"{k} is less certain than it is large: these data do not determine it.")
+    return tuple(lines)

@@ -1,0 +1,1 @@
+"""Inputs that would separate what a diagnosis leaves open."""

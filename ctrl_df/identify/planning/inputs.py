@@ -1,0 +1,210 @@
+"""The input over time that separates candidates best: a few shapes, as large as the limits allow."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from ..estimation.segments import facts
+from ..estimation.simulator import free_run
+from ..results.experiment import Experiment, separated
+from ..thresholds import PLAN_MARGIN, PLAN_SIZES
+
+
+def input_that_separates(
+    diagnosis, models, names, *, force=None, stroke=None, duration=None, dt=None, loop=None
+) -> Experiment:
+    """Return the input whose outputs differ most between any two of the models, within the limits.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    models : sequence of block
+        Two or more.
+    names : tuple of str
+        What is separated.
+    force, stroke, duration, dt, loop
+        As for `next_experiment`.
+    """
+    record = diagnosis.train[0]
+    given, long, strong = diagnosis.limits, record.output_unit, record.input_unit
+    force = float(force or given.get("force") or np.max(np.abs(record.u)))
+    centre = float(record.y[0])
+    reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(record.y - centre)))
+    duration, dt = float(duration or record.duration), float(dt or record.dt)
+    if not (force > 0 and reach > 0 and duration > 20 * dt):
+        raise ValueError(
+            f"next_experiment needs force > 0, stroke > 0 and duration > 20 dt; got {force}, {reach}, "
+            f"{duration}, {dt}."
+        )
+    t = dt * np.arange(int(round(duration / dt)))
+    play = (
+        _Free(models, record, t, centre, reach)
+        if loop is None
+        else _Loop(models, loop, record, t, centre, diagnosis.noise)
+    )
+    best, best_moves = None, False
+    shapes = _shapes(t, record) if loop is None else _references(t, record)
+    for kind, shape in shapes.items():
+        for size in PLAN_SIZES:
+            u = force * size * shape if loop is None else centre + PLAN_MARGIN * reach * size * shape
+            ys, asked, gaps = play(u)
+            far = max(float(np.max(np.abs(y - centre))) for y in ys)
+            if not np.isfinite(far) or far > PLAN_MARGIN * reach * 1.0001 or asked > force:
+                continue
+            separation = min(gaps) / max(diagnosis.noise, 1e-300)
+            # A record in which nothing may move teaches one bit; where all candidates move it teaches their
+            # shape.
+            moves = min(float(np.ptp(y)) for y in ys) > 0.2 * max(float(np.ptp(y)) for y in ys)
+            if best is None or (moves, separation) > (best_moves, best.separation):
+                best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
+    if best is None:
+        raise ValueError(
+            f"every input tried leaves the stroke of {reach:g} {long} or asks more than {force:g} {strong}: "
+            "the candidates drift. Allow more stroke, or give loop= (a closed_loop whose controller holds "
+            "the drive in place)."
+        )
+    what = (
+        f"{best.kind} of up to {best.force:.3g} {strong}"
+        if loop is None
+        else f"reference as {best.kind}, {best.force:.3g} {strong}"
+    )
+    reason = (
+        f"{what}: the outputs of {separated(names)} then differ by at least {best.separation:.2g} times the "
+        f"noise, within {best.stroke:.3g} {long} of stroke."
+    )
+    return replace(best, reason=reason)
+
+
+class _Free:
+    """Plays a force on every model."""
+
+    def __init__(self, models, record, t, centre, reach):
+        self.models, self.record, self.t, self.centre = models, record, t, centre
+        self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
+
+    def __call__(self, u):
+        played = self.record._with(t=self.t, u=u, y=self.scale, velocity=None, channels={})
+        thin = max(1, len(self.t) // 2500)
+        ys = [free_run(m, played, position=self.centre, thin=thin) for m in self.models]
+        gaps = [_rms(a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
+        return ys, float(np.max(np.abs(u))), gaps
+
+
+class _Loop:
+    """Plays a reference on the loop of every model with the given controller.
+
+    A good controller hides the differences of the models in their positions; they are in the force. What
+    counts is therefore how far one model, driven by the force that another would be given, is from the
+    other's position.
+    """
+
+    def __init__(self, models, loop, record, t, centre, noise):
+        from ...simulate.loop import closed_loop
+
+        parts = getattr(loop, "parts", None)
+        if parts is None:
+            raise TypeError(
+                f"loop must come from ctrl_df.closed_loop; got {type(loop).__name__}. Build it from a "
+                "controller "
+                "and the block."
+            )
+        self.models, self.record, self.centre = models, record, centre
+        self.moves = parts.block.coordinates
+        self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
+        self.t = t[:: max(1, len(t) // 2500)]
+        self.thin = max(1, len(t) // 2500)
+        # The controller passes the noise of the sensor on to the drive.
+        self.tremor = 4 * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
+
+    def __call__(self, u):
+        from ...simulate.response import event_response
+
+        ys, forces = [], []
+        for loop in self.loops:
+            # a drive at rest at `centre`: what it is told is relative to that
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", RuntimeWarning)  # its status tells the same
+                    found = event_response(loop, self.t, (u - self.centre)[:: self.thin])
+            except (ValueError, RuntimeError):
+                return [np.full(2, np.inf)], math.inf, [0.0]
+            if not found.status.ok:
+                return [np.full(2, np.inf)], math.inf, [0.0]
+            labels: list[str] = list(found.output_labels or ())
+            outputs = dict(zip(labels, np.atleast_2d(np.asarray(found.outputs)), strict=True))
+            ys.append(self.centre + outputs[self.moves.name("x")])
+            forces.append(outputs[self.moves.name("F")])
+        gaps = []
+        for i, force in enumerate(forces):
+            played = self.record._with(
+                t=self.t, u=force, y=ys[i], velocity=None, channels={}, input_hold="linear"
+            )
+            runs = [free_run(m, played, position=self.centre) for m in self.models]
+            gaps += [_rms(y - runs[i]) for k, y in enumerate(runs) if k != i]
+        return ys, max(float(np.max(np.abs(f))) for f in forces) + self.tremor, gaps
+
+
+def _fastest_gain(controller, dt: float) -> float:
+    """Return a controller's gain at the highest frequency that samples `dt` [s] apart hold; 0 if improper.
+
+    A discrete controller has ticks of its own: its highest frequency is z = exp(j pi) = -1.
+    """
+    if not _proper(controller):  # its derivative acts on the velocity, whose noise is not stated
+        return 0.0
+    return abs(complex(controller(-1.0 if controller.isdtime(strict=True) else 1j * math.pi / dt)))
+
+
+def _proper(controller) -> bool:
+    import control as ct
+
+    if not isinstance(controller, ct.TransferFunction):
+        return isinstance(controller, ct.StateSpace)
+    return len(np.trim_zeros(controller.num[0][0], "f")) <= len(np.trim_zeros(controller.den[0][0], "f"))
+
+
+def _rms(values) -> float:
+    return math.sqrt(float(np.mean(np.square(values))))
+
+
+def _references(t, record):
+    """Return references of peak one that begin at rest and turn no faster than the records did."""
+    swing = max(facts(record).swing, 40 * (t[1] - t[0]))
+    half = max(int(round(0.25 * swing / (t[1] - t[0]))), 1)
+    window = np.hanning(2 * half + 1)
+    fade = np.sin(0.5 * math.pi * np.clip((t - t[0]) / swing, 0, 1)) ** 2
+    found = {}
+    for kind, shape in _shapes(t, record).items():
+        smooth = np.convolve(np.pad(shape, half, mode="edge"), window / window.sum(), "valid") * fade
+        found[kind] = smooth / np.max(np.abs(smooth))
+    return found
+
+
+def _shapes(t, record):
+    """Return inputs of peak one, each ending its motion near where it began."""
+    f0 = 1.0 / max(facts(record).swing, 10 * (t[1] - t[0]))
+    span = t[-1] + t[1]
+    rng = np.random.default_rng(0)
+    k = np.unique(np.round(np.geomspace(max(0.3 * f0 * span, 1), 8 * f0 * span, 20)))
+    sum_of_sines = np.sum(
+        np.sin(2 * math.pi * k[:, None] * t / span + rng.uniform(0, 2 * math.pi, len(k))[:, None]), axis=0
+    )
+    low, high = 0.3 * f0, 10 * f0
+    rate = math.log(high / low)
+    chirp = np.sin(2 * math.pi * low * span / rate * (np.exp(rate * t / span) - 1))
+    # each period + - - +: neither speed nor place is left over
+    quarter = np.floor(4 * t * 0.5 * f0) % 4
+    pulses = (
+        np.where((quarter == 0) | (quarter == 3), 1.0, -1.0)
+        * (0.4 + 0.6 * rng.uniform(size=400))[np.floor(t * 0.5 * f0).astype(int) % 400]
+    )
+    triangle = 2 / math.pi * np.arcsin(np.cos(2 * math.pi * 0.4 * f0 * t))
+    return {
+        "multisine": sum_of_sines / np.max(np.abs(sum_of_sines)),
+        "chirp": chirp,
+        "steps": pulses,
+        "triangle": triangle,
+    }

@@ -1,0 +1,221 @@
+"""A model beside its records: how far off, whether by more than noise, and where."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...drawing import draw
+from ..data.derivatives import automatic_cutoff, derivative
+from ..data.measurement import Measurement
+from ..estimation.segments import facts
+from ..residuals.compared import Compared
+from ..residuals.regions import Regions, error_regions
+from ..residuals.residual_tests import (
+    InputTest,
+    Whiteness,
+    fit_percent,
+    input_residual_test,
+    nrmse,
+    rmse,
+    whiteness,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordComparison:
+    """A model beside one record.
+
+    Attributes
+    ----------
+    record : Measurement
+    simulated, residual : (n,) array
+        At the record's samples; residual is measured minus simulated.
+    edges : (nw + 1,) array
+        Samples at which the model was started anew; two for a free run.
+    fitted : int
+        Parameters fitted to these data.
+    """
+
+    record: Measurement
+    simulated: np.ndarray
+    residual: np.ndarray
+    edges: np.ndarray
+    fitted: int = 0
+
+    @property
+    def rmse(self) -> float:
+        """Rms of the residual [output unit]."""
+        return rmse(self.residual)
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the residual over that of the centred output."""
+        return nrmse(self.record.y, self.simulated)
+
+    @property
+    def fit_percent(self) -> float:
+        """``100 (1 - nrmse)``."""
+        return fit_percent(self.record.y, self.simulated)
+
+    @property
+    def windows(self) -> int:
+        """Number of windows; 1: a free run."""
+        return len(self.edges) - 1
+
+    @cached_property
+    def white(self) -> Whiteness:
+        """Test of the residual for whiteness."""
+        return whiteness(self.residual)
+
+    @cached_property
+    def input_test(self) -> InputTest | None:
+        """Test of the residual for traces of the input; None for records too short."""
+        if len(self.residual) < 100:
+            return None
+        return input_residual_test(self.record.u, self.residual, fitted=self.fitted)
+
+    @cached_property
+    def where(self) -> Regions:
+        """Regions ranked by their share of the error; none for records under 50 samples.
+
+        A position error remembers what went wrong before. As long as the residual is not white, its regions
+        are therefore those of its second derivative, the error of acceleration, which stands where it arises.
+        """
+        if len(self.residual) < 50:
+            return Regions()
+        velocity = self.record.velocity if self.record.velocity is not None else facts(self.record).velocity
+        error, kept = (self.residual, slice(None)) if self.white else self._acceleration_error()
+        return error_regions(
+            self.record.t[kept],
+            error,
+            position=self.record.y[kept],
+            velocity=velocity[kept],
+            force=self.record.u[kept],
+            units=(self.record.output_unit, self.record.input_unit),
+        )
+
+    def _acceleration_error(self) -> tuple[np.ndarray, slice]:
+        """Return the low-passed second derivative of the residual, and the samples at which it holds.
+
+        Derivatives fail at the ends of a window: a line bridges them inside; the record's ends are left out.
+        """
+        t, dt = self.record.t, facts(self.record).dt
+        cutoff = automatic_cutoff(self.residual - self.residual.mean(), dt)
+        out, margin = np.empty(len(t)), int(0.6 / (cutoff * dt)) + 1
+        for a, b in zip(self.edges[:-1], self.edges[1:], strict=True):
+            out[a:b] = derivative(t[a:b], self.residual[a:b], 2, cutoff)
+        good = np.ones(len(t), bool)
+        for edge in self.edges:
+            good[max(edge - margin, 0) : edge + margin] = False
+        if np.count_nonzero(good) < 50:
+            return self.residual, slice(None)
+        out[~good] = np.interp(t[~good], t[good], out[good])
+        first, last = np.flatnonzero(good)[[0, -1]]
+        return out[first : last + 1], slice(int(first), int(last) + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Compared):
+    """Outcome of `compare`: the sum over all records, and each by itself in `records`.
+
+    `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and
+    `where` are those of the record with the largest error.
+    """
+
+    records: tuple[RecordComparison, ...]
+
+    @property
+    def rmse(self) -> float:
+        """Rms of the residual over all samples [output unit]."""
+        return math.sqrt(
+            sum(float(r.residual @ r.residual) for r in self.records)
+            / sum(len(r.residual) for r in self.records)
+        )
+
+    @property
+    def nrmse(self) -> float:
+        """Rms of the residual over that of the outputs, each centred."""
+        error = sum(float(r.residual @ r.residual) for r in self.records)
+        return math.sqrt(
+            error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in self.records)
+        )
+
+    @property
+    def white(self) -> Whiteness:
+        """Whiteness of the worst record's residual: true if it passes, with its ``p_value``."""
+        return self.worst.white
+
+    @property
+    def input_test(self) -> InputTest | None:
+        """Whether the worst record's residual still depends on the input."""
+        return self.worst.input_test
+
+    @property
+    def where(self) -> Regions:
+        """Regions of the worst record, ranked by their share of the error."""
+        return self.worst.where
+
+    @property
+    def windows(self) -> int:
+        """Number of windows of all records together."""
+        return sum(r.windows for r in self.records)
+
+    @property
+    def mode(self) -> str:
+        """``free`` or ``windows``."""
+        return "windows" if any(r.windows > 1 for r in self.records) else "free"
+
+    def report(self) -> str:
+        """Return the comparison as text: each record, the tests, the regions."""
+        lines = [str(self)]
+        if len(self.records) > 1:
+            lines += [
+                f"  {r.record.name:<24} nrmse {r.nrmse:.4g}  rmse {r.rmse:.4g} {r.record.output_unit}"
+                for r in self.records
+            ]
+        test = self.worst.input_test
+        if test is not None:
+            lines.append(
+                f"The residual shows {'no trace' if test else 'traces'} of the input (p = {test.p_value:.2g})"
+                + (
+                    ", and is white: nothing is missing."
+                    if test and self.white
+                    else "."
+                    if test
+                    else ": something is missing."
+                )
+            )
+        if self.where:
+            lines += ["", *self.where.sentences[:6], "", self.where.table(8)]
+        return "\n".join(lines)
+
+    def __str__(self) -> str:
+        """Return it as text."""
+        worst = self.worst
+        how = "free run from fitted initial states"
+        if self.mode == "windows":
+            lengths = [float(np.ptp(r.record.t)) / r.windows for r in self.records]
+            how = (
+                f"{self.windows} windows of {np.mean(lengths):.3g} s, each from a fitted initial state "
+                "(nothing holds this model in place: over a free run it would drift)"
+            )
+        count = f"{len(self.records)} records" if len(self.records) > 1 else f"record {worst.record.name!r}"
+        return (
+            f"{count}: nrmse {self.nrmse:.4g}, fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g} "
+            f"{worst.record.output_unit}, residual {'white' if self.white else 'not white'} "
+            f"(p = {self.white.p_value:.2g}); {how}."
+        )
+
+    def plot(self, record=None, **keywords):
+        """Draw outputs, residual, and where the error lies; returns a ct.ControlPlot.
+
+        Parameters
+        ----------
+        record : int or None
+            Which record; None: the worst.
+        """
+        return draw("comparison", self, record=record, **keywords)

@@ -1,0 +1,97 @@
+"""What a refit answers: the parameters, how well they are known, and what the data do not determine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..residuals.compared import Compared
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter after a refit.
+
+    Attributes
+    ----------
+    name, unit : str
+        As in ``block.parameters``.
+    value, standard_error : float
+        SI; the error allows for the colour of the residual.
+    start : float
+        Value before.
+    at_bound : bool
+        Whether it stands at a bound of its range (its error then means little).
+    identifiable : bool
+        Whether these data determine it.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    unit: str
+    start: float
+    at_bound: bool
+    identifiable: bool
+
+    def __float__(self) -> float:
+        """Return the value."""
+        return self.value
+
+    def __str__(self) -> str:
+        """Return it as text."""
+        marks = ("  at its bound" if self.at_bound else "") + (
+            "" if self.identifiable else "  not determined by these data"
+        )
+        return f"{self.name:<28} {self.value:>12.6g} ± {self.standard_error:<9.2g} {self.unit:<10}{marks}"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Outcome of `refit`.
+
+    Attributes
+    ----------
+    model : block or loop
+        The model given, with the parameters found.
+    parameters : mapping of str to FittedParameter
+        Those that were free.
+    comparison : Compared
+        The refitted model beside the records.
+    covariance : (p, p) array
+        Of the free parameters, in their order.
+    unidentifiable : tuple of str
+        A sentence for every direction the data do not determine; empty if all is well.
+    converged : bool
+        False: stopped at the bound on work.
+    simulations : int
+        How many were run.
+    """
+
+    model: Any
+    parameters: Mapping[str, FittedParameter]
+    comparison: Compared
+    covariance: np.ndarray
+    unidentifiable: tuple[str, ...]
+    converged: bool
+    simulations: int
+
+    @property
+    def nrmse(self) -> float:
+        """Residual over the centred output, both rms."""
+        return self.comparison.nrmse
+
+    def report(self) -> str:
+        """Return parameters, doubts and the comparison as text."""
+        lines = [str(p) for p in self.parameters.values()]
+        lines += ["", *self.unidentifiable] if self.unidentifiable else []
+        if not self.converged:
+            lines += ["", "Stopped at the bound on work: the fit may still improve (raise budget)."]
+        return "\n".join([*lines, "", self.comparison.report()])
+
+    def __str__(self) -> str:
+        """Return it as text."""
+        return self.report()

@@ -1,0 +1,27 @@
+"""What a diagnosis of tables N(A, omega) answers besides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...drawing import draw
+from .diagnosis import Diagnosis
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyDiagnosis(Diagnosis):
+    """A `Diagnosis` from tables; `noise` and `structure` are relative to ``|N|``.
+
+    Attributes
+    ----------
+    before, after : FrequencyComparison
+        The refitted model, and that with the first of the ranking, beside all tables.
+    """
+
+    before: Any = None
+    after: Any = None
+
+    def plot(self, **keywords):
+        """Draw the ranking and the error on the plane before and after; returns a ``ct.ControlPlot``."""
+        return draw("table diagnosis", self, **keywords)

@@ -1,0 +1,107 @@
+"""What the best candidate leaves of records over time: noise, structure, and where that is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..estimation.segments import facts
+from ..estimation.trial import Data, Trial
+from ..residuals.missing_forces import Lack, lacks
+from ..residuals.regions import error_regions
+from ..results.explain import places
+from ..thresholds import GROWN, LEFT, NOISIER
+from .evidence import rounds
+from .search import Located, Remainder
+
+
+def remainder(base: Trial, best: Trial, data: Data, noise, floor: float, significant: float) -> Remainder:
+    """Return what the best model leaves.
+
+    Structure shows on the windows fitted by what free forces explain, and on those held out by an error
+    beyond the noise: that of the fitted windows, times what the records' own noise floors say of the two.
+
+    Parameters
+    ----------
+    base, best : Trial
+    data : Data
+    noise : NoiseModel
+        Of the best model's residual.
+    floor : float
+        Error that a fit can come down to at best.
+    significant : float
+        Evidence that free forces need [nats].
+    """
+    # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not
+    # rounded.
+    rounded = rounds(best)
+    missed = lacks(base if rounded else best, data, noise)
+    telling = bool(missed) and missed[0].evidence > significant
+    structure = missed[0].rms if telling else 0.0
+    if not rounded and not data.forced:
+        # what the right model misses over long windows it misses over short ones
+        structure = max(structure, math.sqrt(max(best.train.rmse**2 - (GROWN * floor) ** 2, 0.0)))
+    spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
+    there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, 1e-300))
+    assert best.held is not None and base.held is not None
+    floors = [
+        math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records]))) for v in (data.train, data.held)
+    ]
+    # the floors see what is fast: of two records with slow noise neither counts as the quieter one
+    expected = NOISIER * spread * max(1.0, floors[1] / floors[0])
+    outside = math.sqrt(max(best.held.rmse**2 - expected**2, 0.0))
+    there_outside = math.sqrt(max(base.held.rmse**2 - expected**2, outside**2, 1e-300))
+    share = max(structure / there, outside / there_outside)
+    unexplained = telling if rounded else share > LEFT
+    return Remainder(spread, max(structure, outside), unexplained, missed)
+
+
+def located(
+    base: Trial,
+    best: Trial,
+    data: Data,
+    noise,
+    left: Remainder,
+    unknown: bool,
+    significant: float,
+    measure: str,
+) -> Located:
+    """Return where the error of the baseline is, or (`unknown`) that which nothing explains."""
+    shown, missed = base, left.about
+    if unknown:
+        # An effect that stands in for the one missing bends what it leaves: look where least remains.
+        before = lacks(base, data, noise)
+        if not before or (missed and missed[0].left < before[0].left):
+            shown = best
+        else:
+            missed = before
+    where = find_regions(shown, data.train)
+    if not unknown:
+        return Located(where, tuple(where.kinds) if where is not None else ())
+    kinds = tuple(m.kind for m in missed if m.evidence > 0.98 * missed[0].evidence - significant)
+    return Located(where, kinds, _sentences(left, missed, where, measure))
+
+
+def _sentences(left: Remainder, missed: list[Lack], where, measure: str) -> str:
+    acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
+    return (
+        f"Of structure {left.structure:.2g} remains beside {left.noise:.2g} of noise (rms of the {measure}). "
+        f"{acts}{places(where)}".rstrip()
+    )
+
+
+def find_regions(tried, view):
+    """Return the regions of error of a fitted candidate on its longest record."""
+    i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
+    record, inside, residual = view.records[i], view.windows[i].samples, np.asarray(tried.train.residual[i])
+    if not np.all(np.isfinite(residual)):
+        return None
+    colour = tried.train.colour
+    if colour is not None:
+        windows = view.windows[i].slices
+        inside, residual = inside[colour.rows(windows)], colour.seen(residual, windows) / tried.train.unit
+    return error_regions(
+        record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],
+        force=record.u[inside], units=(record.output_unit, record.input_unit),
+    )  # fmt: skip

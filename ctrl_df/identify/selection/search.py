@@ -1,0 +1,156 @@
+"""What the search for a missing effect asks of data, whatever they are."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ..results.diagnosis import Diagnosis
+
+
+class Judged(Protocol):
+    """A model fitted to data, and what they say for its newest effect over the baseline."""
+
+    key: str
+    extra: int
+    evidence: float
+    evidence_held: float
+    confirmed: bool
+
+    @property
+    def block(self) -> Any:
+        """The fitted model."""
+        ...
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the best model leaves.
+
+    Attributes
+    ----------
+    noise, structure : float
+        rms of noise, and of what is no noise.
+    unexplained : bool
+        Whether that is too much for the best candidate to be the answer.
+    about : object
+        What the data know besides, for `Search.located`.
+    """
+
+    noise: float
+    structure: float
+    unexplained: bool
+    about: Any = None
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where the error is: ranked regions, their kinds, and what remains unexplained in sentences."""
+
+    where: Any
+    kinds: tuple[str, ...]
+    remains: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Words:
+    """How a verdict speaks of these data."""
+
+    data: str
+    noise: str
+    of: str
+    separates: str
+    shows: str
+
+
+class Search(ABC):
+    """The fits of one diagnosis.
+
+    Attributes
+    ----------
+    block : Mechanism
+        The model as it stands.
+    base : Judged
+        The model refitted; it may improve as the search goes on.
+    free : tuple of str
+        Parameters of the model that are refitted.
+    significant, significant_held : float
+        Evidence [nats] an effect needs on the data fitted, and on those held out alone.
+    measure : str
+        What errors are of: ``output``, ``acceleration`` or ``N``.
+    words : Words
+    kind : type
+        Class of the answer.
+    """
+
+    block: Any
+    base: Any
+    free: tuple[str, ...]
+    significant: float
+    significant_held: float
+    measure: str
+    words: Words
+    kind: type[Diagnosis] = Diagnosis
+
+    @property
+    @abstractmethod
+    def records(self) -> tuple[tuple, tuple]:
+        """The data to fit, and those held out."""
+
+    @abstractmethod
+    def candidates(self, classes, executor=None) -> list[Any]:
+        """Return every effect that can be added, fitted, that of most evidence first."""
+
+    @abstractmethod
+    def confirm(self, found) -> list[Any]:
+        """Refit baseline and best candidates with all care; return these, best first."""
+
+    @abstractmethod
+    def errors(self, judged) -> tuple[float, float]:
+        """Return the relative errors of a model on the data fitted, and on those held out."""
+
+    @abstractmethod
+    def standard_errors(self, judged) -> dict[str, float]:
+        """Return the standard errors of the parameters fitted, as far as they are known."""
+
+    @abstractmethod
+    def alike(self, a, b) -> bool:
+        """Whether two confirmed candidates make the same of these data, within noise."""
+
+    @abstractmethod
+    def remainder(self, best, significant: bool) -> Remainder:
+        """Return what the best model leaves."""
+
+    @abstractmethod
+    def located(self, best, remainder: Remainder, unknown: bool) -> Located:
+        """Return where the error is: of the model, or (`unknown`) of what is left."""
+
+    def exact(self) -> bool:
+        """Whether the model errs by rounding alone."""
+        return False
+
+    def answer(self, best) -> dict[str, Any]:
+        """Return further fields of the answer."""
+        return {}
+
+    @abstractmethod
+    def fitted(self, block, names, iterations: int) -> Any:
+        """Return a block with these parameters fitted, and validated on the data held out."""
+
+    @abstractmethod
+    def ranked(self, base, judged: Sequence) -> list[Any]:
+        """Return models with their evidence over `base`, best first."""
+
+    def final(self, models: Sequence, kept) -> list[tuple[Any, float, float]] | None:
+        """Return the models of a ladder with their two errors, all over the same data; None: as they are.
+
+        `kept`: parameters that are not to be refitted.
+        """
+        return None
+
+    def relative(self, noise: float) -> float:
+        """Return noise as a share of what errors are relative to."""
+        return noise

@@ -1,0 +1,69 @@
+"""Ripples with which fits begin: long waves by what they change in the output, all others by the motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from .attach import attach
+from .regression import own_values
+from .ripple_spectrum import Wave, WaveSearch
+
+
+def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
+    """Return amplitude, wavelength and phase of the long waves that explain most of the residual.
+
+    Sine and cosine are two small changes, fitted together.
+
+    Parameters
+    ----------
+    screen : Screen
+    make : callable
+        ``make(amplitude, wavelength, phase)``, the effect.
+    """
+    span = float(np.ptp(screen.motion.x))
+    amplitude = 0.01 * screen.scales.force
+    total = float(screen.residual @ screen.residual)
+    scored = []
+    for turn in np.geomspace(0.6, 6.0, 20):
+        pair = []
+        for phase in (0.0, math.pi / 2):
+            block = attach(screen.block, make(amplitude, span / turn, phase))
+            change = None if block is None else screen.change(block)
+            if change is None:
+                break
+            pair.append(screen.project(change))
+        if len(pair) < 2:
+            continue
+        matrix = np.array(pair).T
+        weights, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
+        left = screen.residual - matrix @ weights
+        scored.append((float(left @ left) / total, turn, weights))
+    scored.sort(key=lambda x: x[0])
+    return [
+        (amplitude * float(np.hypot(*w)), span / turn, math.atan2(w[1], w[0])) for _, turn, w in scored[:5]
+    ]
+
+
+def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
+    """Yield the waves of any length that explain most, and values of the model's parameters beside them.
+
+    `known`: wavelengths [m] that the model has already.
+    """
+    view, _ = screen.data.whole or (screen.view, None)
+    if not all(r.regular for r in view.records):
+        return
+    search = WaveSearch(view.records, view.windows, [2 * math.pi / length for length in known])
+    # where friction wanders the fit over windows knows the mass better than whitened forces do
+    plain = all(map(_linear, screen.block.effects)) and not screen.data.forced
+    for wave in search.best(3):
+        weights = (wave.mass, wave.coulomb, wave.viscous)
+        yield wave, (own_values(screen.block, weights, screen.scales) if plain else None) or {}
+
+
+def _linear(effect) -> bool:
+    """Whether a law is linear in what a regression of the force may take for it: direction, speed, one."""
+    placed = (effect.role == "friction" and "x" not in effect.asks) or (effect.role == "force" and effect.place_free)
+    return placed and effect.affine and effect.proportional and effect.rank == 0

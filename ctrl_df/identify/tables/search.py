@@ -1,0 +1,284 @@
+"""The search over tables N(A, omega): each effect leaves its print on the plane.
+
+Points of a table are taken to err independently; what neighbours have in common is structure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..estimation.common_friction import inertia
+from ..results.explain import places
+from ..results.table_diagnosis import FrequencyDiagnosis
+from ..selection.search import Located, Remainder, Search, Words
+from ..starting.attach import applicable
+from ..thresholds import (
+    CONFIRMED_ON_TABLE,
+    HOPELESS_ON_TABLE,
+    POINTS,
+    POINTS_COSTLY,
+    SIGNIFICANT_TABLE,
+    SIGNIFICANT_TABLE_HELD,
+    TOLD_APART,
+    WORK_MEDIUM,
+)
+from .candidate import fit_either, try_effect
+from .compare import comparison_of_tables, plane_regions, scatter
+from .fit import (
+    FittedTable,
+    Points,
+    counted,
+    fit_table,
+    log_density,
+    outlying,
+    points_of,
+    relative_error,
+    rms,
+    simulate_table,
+    slopes_of,
+    table_scales,
+)
+from .uncertainty import uncertainty
+
+
+@dataclass(frozen=True, eq=False)
+class TableTrial:
+    """A model fitted to the points of the fit, and what it makes of all of them."""
+
+    key: str
+    fitted: FittedTable
+    extra: int  # parameters beyond the baseline's
+    error: np.ndarray
+    table: np.ndarray
+    evidence: float = 0.0
+    evidence_held: float = 0.0
+    confirmed: bool = False
+
+    @property
+    def block(self):
+        """The fitted model."""
+        return self.fitted.block
+
+    @property
+    def cost(self) -> float:
+        """Sum of squares over the points fitted."""
+        return float(self.fitted.weighted @ self.fitted.weighted)
+
+
+class TableSearch(Search):
+    """The fits of one diagnosis of tables.
+
+    Parameters
+    ----------
+    block : Mechanism
+        The model as it stands.
+    records, held : sequences of FrequencyMeasurement
+        To fit; to validate on (may be empty: every third point is then held out).
+    free : sequence of str
+        Parameters of the model that may be refitted.
+    """
+
+    significant = SIGNIFICANT_TABLE
+    significant_held = SIGNIFICANT_TABLE_HELD
+    measure = "N"
+    words = Words("tables", "scatter", " of |N|", "the points of the plane", "")
+    kind = FrequencyDiagnosis
+
+    def __init__(self, block, records, held, free):
+        self.block, self.free = block, tuple(free)
+        self._records, self._held = tuple(records), tuple(held)
+        self.points = points_of([*records, *held])
+        self.train = _train_mask(self.points, len(records), bool(held))
+        if np.count_nonzero(self.train) <= len(self.free) // 2 + 1:
+            raise ValueError(
+                f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to "
+                f"fit {len(self.free)} parameters. Measure more, or name fewer in free."
+            )
+        self.inside = self.points.take(self.train)
+        self.scales = table_scales(block, self.points)
+        self.base = self._trial("", self._fit_base(), 0)
+
+    @property
+    def records(self):
+        """The tables to fit, and those held out."""
+        return self._records, self._held
+
+    def _fit_base(self) -> FittedTable:
+        """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
+        inside = self.inside
+        begins = [self.block]
+        heavy = inertia(self.block)
+        if heavy in self.free:
+            moved = inside.take(inside.N != 0)
+            top = moved.omega >= np.quantile(moved.omega, 0.8)
+            mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
+            begins.append(self.block.with_parameters({heavy: mass}))
+        fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
+        return min(fits, key=lambda f: float(f.weighted @ f.weighted))
+
+    def _trial(self, key, fitted: FittedTable, extra: int, work=None, confirmed=False) -> TableTrial:
+        table = simulate_table(fitted.block, self.points, work)
+        return TableTrial(key, fitted, extra, relative_error(table, self.points), table, confirmed=confirmed)
+
+    # --- every effect ---------------------------------------------------------------------------------
+
+    def candidates(self, classes, executor=None):
+        """Return every effect that can be added, fitted roughly to some points, the best first."""
+        size = np.abs(self.inside.weight * self.base.error[self.train])
+        few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
+        block, slopes = self.base.block, {}
+        for some in (few, fewer):
+            slopes[len(some)] = slopes_of(block, some, self.free, self.scales, WORK_MEDIUM)
+        jobs = []
+        for c in classes:
+            if applicable(c, block):
+                some = fewer if c.costly else few
+                jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
+        run = map if executor is None else executor.map
+        found = [self._trial(*r, work=WORK_MEDIUM) for r in run(try_effect, jobs) if r is not None]
+        return self.ranked(self.base, found)
+
+    def confirm(self, found):
+        """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
+        best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
+        for tried in best[:2]:
+            values = {k: tried.block.parameters[k].value for k in self.free}
+            try:
+                begin = self.base.block.with_parameters(values)
+            except ValueError:
+                continue
+            again = self._trial("", fit_table(begin, self.inside, self.free, self.scales, iterations=10), 0)
+            if again.cost < self.base.cost:
+                self.base = again
+        return self.ranked(self.base, best)
+
+    def _confirmed(self, tried: TableTrial) -> TableTrial:
+        kind = tried.block.effects[-1]
+        fitted = fit_either(
+            tried.block, self.inside, tried.fitted.names, self.scales, iterations=3 if kind.costly else 12,
+            budget=120, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
+        )  # fmt: skip
+        return self._trial(tried.key, fitted, tried.extra, confirmed=True)
+
+    def fitted(self, block, names, iterations):
+        """Return a block with these parameters fitted to the points of the fit."""
+        found = fit_table(block, self.inside, names, self.scales, iterations=iterations)
+        return self._trial(block.newest if block.effects else "", found, len(names))
+
+    # --- judging --------------------------------------------------------------------------------------
+
+    def ranked(self, base, judged: Sequence[TableTrial]):
+        """Return models with their evidence over `base`, best first.
+
+        That is the likelihood ratio of independent complex errors, less Schwarz's price of parameters.
+        """
+        price, before = 0.5 * math.log(2 * len(self.points)), self._likelihood(base)[0]
+        found = []
+        for t in judged:
+            gain = self._likelihood(t)[0] - before
+            held = float(np.sum(gain[~self.train]))
+            found.append(replace(t, evidence=float(np.sum(gain)) - t.extra * price, evidence_held=held))
+        return sorted(found, key=lambda t: -t.evidence)
+
+    def _likelihood(self, tried) -> tuple[np.ndarray, float]:
+        """Return the log density of every point, and the variance of scatter.
+
+        No model gets below the stated noise, or below how exact orbits are.
+        """
+        stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
+        return log_density(self.points.weight * tried.error, max(0.5 * stated, 1e-6) ** 2)
+
+    def alike(self, a, b):
+        """Whether two candidates' tables differ by less than the scatter lets one see."""
+        both = np.isfinite(a.table) & np.isfinite(b.table)
+        if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
+            return False
+        sigma2 = min(self._likelihood(a)[1], self._likelihood(b)[1])
+        gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
+        return float(np.sum(gap[both] ** 2)) / sigma2 < TOLD_APART
+
+    def errors(self, judged):
+        """Return the rms of the relative errors of the points fitted, and of those held out."""
+        good = ~outlying(judged.error)
+        return rms(judged.error[self.train & good]), rms(judged.error[~self.train & good])
+
+    def standard_errors(self, judged):
+        """Return the standard errors of a candidate fitted to all points."""
+        return uncertainty(judged.fitted)[1] if judged.confirmed else {}
+
+    # --- what it comes to -----------------------------------------------------------------------------
+
+    def remainder(self, best, significant):
+        """Split the error into scatter and structure, and judge whether the latter is explained."""
+        noise, structure = self._split(best)
+        there = self._split(self.base)[1]
+        shown = best if significant else self.base
+        unexplained = structure > 2.0 * noise and structure > 0.2 * there and not self._scattered(shown)
+        return Remainder(noise, structure, unexplained)
+
+    def _split(self, t) -> tuple[float, float]:
+        """Split the relative error into scatter and what neighbours on the plane have in common."""
+        p, e = self.points, np.where(outlying(t.error), 0.0, t.error)
+        differences = []
+        for record in np.unique(p.record):
+            at = np.flatnonzero(p.record == record)
+            for a in np.unique(p.A[at]):
+                line = at[p.A[at] == a]
+                line = line[np.argsort(p.omega[line])]
+                if len(line) >= 3:
+                    # second differences see scatter six times as strong as a smooth print
+                    differences.append(e[line[2:]] - 2 * e[line[1:-1]] + e[line[:-2]])
+        total = rms(e)
+        stated = p.noise if math.isfinite(p.noise) else 0.0
+        if not differences:
+            return (stated, math.sqrt(max(total**2 - stated**2, 0.0))) if stated else (total, 0.0)
+        rough = float(np.median(np.abs(np.concatenate(differences)))) / math.sqrt(6 * math.log(2))
+        noise = min(max(rough, stated), total) if stated == 0 else min(stated, total)
+        return noise, math.sqrt(max(total**2 - noise**2, 0.0))
+
+    def _scattered(self, t) -> bool:
+        """Whether neighbours err independently."""
+        grids = []
+        for i, record in enumerate([*self._records, *self._held]):
+            grid, here = np.where(np.isfinite(record.N), 0, np.nan).astype(complex), self.points.record == i
+            grid[counted(record)] = np.where(outlying(t.error)[here], np.nan, t.error[here])
+            grids.append(grid)
+        return bool(scatter(grids))
+
+    def located(self, best, remainder, unknown):
+        """Return the bands of amplitude and frequency where the error is."""
+        where = plane_regions(self.points, (best if unknown else self.base).error)
+        look = places(where) or "the error is spread over the whole plane."
+        remains = (
+            f"Neighbouring points err alike: {remainder.structure:.2%} beside {remainder.noise:.2%} of "
+            f"scatter. Look here: {look}"
+        )
+        far = np.count_nonzero(outlying(best.error))
+        note = (
+            f" {far} of {len(best.error)} points err by more than ten times the usual and are left out of "
+            "these figures: another motion that coexists, or a bad measurement."
+        )
+        return Located(where, where.kinds, remains if unknown else "", note if far else "")
+
+    def answer(self, best):
+        """Return the refitted model, and the best, beside all tables."""
+        tables = [*self._records, *self._held]
+        before = comparison_of_tables(self.base.block, tables)
+        return {
+            "before": before,
+            "after": before if best is self.base else comparison_of_tables(best.block, tables),
+        }
+
+
+def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:
+    """Return which points are fitted: those of the training tables, or two of three over the plane."""
+    if held:
+        return points.record < records
+    i = np.searchsorted(np.unique(points.A), points.A)
+    k = np.searchsorted(np.unique(points.omega), points.omega)
+    mask = (i + k) % 3 != 2
+    return mask if 0 < np.count_nonzero(mask) < len(mask) else np.arange(len(points)) % 3 != 2

@@ -1,0 +1,249 @@
+"""Every tuned number of identification, with what it follows from, or the benchmark that chose it.
+
+``rigs``: `benchmarks/diagnosis.py`, single effects, ladders, rigs with nothing or something unknown
+hidden. ``records``: `benchmarks/studies.py`. ``tables``: `tests/test_frequency.py`. Numbers of one effect
+stand in its class, tolerances of one formula beside it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+# --- evidence [nats] --------------------------------------------------------------------------------
+
+SHAPES = 300
+"""Shapes that a diagnosis of records tries: some 25 effects, about a dozen starts each."""
+
+FALSE_ALARM = 1e-6
+"""Chance at which one of them may look like an effect where nothing is missing."""
+
+SIGNIFICANT = float(math.ceil(math.log(SHAPES / FALSE_ALARM)))
+"""Evidence an effect needs on records: one of `SHAPES` exceeds it by chance once in `FALSE_ALARM`: 20."""
+
+SIGNIFICANT_HELD = 5.0
+"""Evidence it needs on held-out records alone: odds of 150 to 1, for data that choose nothing.
+
+To these are fitted initial states, and what the others leave open: a threshold within a range, the phase of
+a ripple.
+"""
+
+SIGNIFICANT_TABLE = 12.0
+"""Evidence an effect needs on the points of a table: a hundred shapes, a false alarm of 6e-4."""
+
+SIGNIFICANT_TABLE_HELD = 2.0
+"""Evidence it needs on the points held out, of which there are few (tables)."""
+
+REFUTED = SIGNIFICANT
+"""Evidence of held-out data against a candidate that puts it last."""
+
+RULED_OUT = 5.0
+"""Evidence behind the first beyond which a candidate is no rival: odds of 150 to 1."""
+
+TOLD_APART = 6.0
+"""Log likelihood ratio that tells two candidates apart: odds of 400 to 1."""
+
+STOPPED_EARLY = 3 * SIGNIFICANT
+"""Evidence by which candidates may differ because their fits stopped early (rigs)."""
+
+ANGLE_WORTH = 50.0
+"""Log likelihood ratio, for white noise, that a record's own angle must bring: coloured residuals make tens
+of it by chance (rigs with ripples)."""
+
+PROMISING = 0.2
+"""Share of the best one's evidence, at the first look, from which a candidate is confirmed (rigs)."""
+
+HOPELESS_ON_TABLE = -20.0
+"""Evidence on a few points of a table below which a candidate is not confirmed: all of them will not speak
+for it (tables)."""
+
+# --- ratios of errors -------------------------------------------------------------------------------
+
+PROCESS_NOISE = 50.0
+"""Error over the sensor's noise, in the shortest segments, that disturbance forces alone make, and no effect
+that is missing (between the rigs and the recorded machines)."""
+
+HOPELESS = 3.0
+"""Error over the best candidate's beyond which another try is not worth it (rigs)."""
+
+STILL_POSSIBLE = 1.5
+"""Error over the best candidate's up to which another may yet turn out to be the right one (rigs)."""
+
+BETTER = 0.99
+"""Error over the one before that counts as a better minimum."""
+
+SAME = 1.001
+"""Error over the least that counts as the same: well below the spread of an rms, 1/sqrt(2 n), which is 0.007
+for 10,000 samples."""
+
+FLOOR = 1.03
+"""Error over the least that the shortest segments leave up to which a fit has nothing to gain: the spread of
+an rms over 500 effective samples, 1 + 1/sqrt(1000)."""
+
+GROWTH = 1.35
+"""Best error over segments four times as long that still counts as the same (rigs)."""
+
+EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
+"""Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
+
+LEFT = 0.2
+"""Share of the structure (rms) that the best candidate may leave: 4 % of its power (rigs)."""
+
+NOISIER = 1.4
+"""Error on held-out segments over that on fitted ones that may be chance (rigs)."""
+
+GROWN = 2.0
+"""Error over the least that the shortest segments leave, up to which it may be noise (rigs)."""
+
+OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
+"""Error of a segment over the good quarter's, and over the noise, from which its start is sought anew."""
+
+GOOD = 0.25
+"""Share of the segments that are taken to be right when others are compared with them."""
+
+HOPELESS_START = 3.0
+"""Error of a start on a table over that of the model itself from which it is none (tables)."""
+
+GROSS = 0.02
+"""Share of the points of a table expected to err by as much as N itself: motions coexist (tables)."""
+
+COARSE = 0.4
+"""rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
+
+FINEST = 0.02
+"""Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
+
+STRAY = 1e-3
+"""Share of rounded samples that may lie on any line."""
+
+# --- what a record shows ----------------------------------------------------------------------------
+
+NOISE_FREE = 1e-7
+"""Noise over the spread of the output that no sensor is below: such a record was simulated."""
+
+EXACT = 10 * NOISE_FREE
+"""Error over the spread of the output that is no error."""
+
+PARAMETER_RANGE = 12.0
+"""Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
+
+PASSED = 2.15e-3
+"""Speed, over the typical one, at which a bump of friction is gone to 1 % that only breaking away shows: a
+Gaussian one of a thousandth of the typical speed, sqrt(log 100) of its width away."""
+
+RIGID = (2e-3, 3e-4)
+"""Deflection of bristles, as a share of the swing, below which they are rigid: when quick, when careful."""
+
+# --- lengths of segments, samples -------------------------------------------------------------------
+
+SEGMENT_SAMPLES = 20
+"""Samples of the shortest segment that a comparison takes: fewer are used up by its initial states."""
+
+SEGMENT_LEAST = 50
+"""Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
+
+SHORTEST = 16
+"""How many times as many the shortest segments of a diagnosis are as the longest: of two to-and-fro motions
+and a half, a sixth of one remains, over which every effect is all but linear."""
+
+LEVELS = (SHORTEST, 4, 1)
+"""How many times as many they are, of the three lengths that are looked at."""
+
+BRIEF = 4 * SHORTEST
+"""The same of segments for the parameters of a machine with disturbance forces."""
+
+FILTERED = 40
+"""Values of the force that the shortest segments show where disturbance forces outweigh the noise."""
+
+HOLDOUT_PARTS = 9
+"""Parts of a record of which every third is held out where no record is."""
+
+SCREEN_SAMPLES = 2500
+"""Steps of the input to which a record is thinned while candidates are screened: a quarter of those
+of the rigs' records."""
+
+FULL_SAMPLES = 12_000
+"""Steps of the input of a longer record at the full rate."""
+
+SPECTRUM_SAMPLES = 25_000
+"""Samples of a record beyond which ripples are sought in means over several."""
+
+# --- work -------------------------------------------------------------------------------------------
+
+CONFIRMED = 6
+"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
+
+CONFIRMED_FORCED = 10
+"""The same where disturbance forces let the first look tell little."""
+
+CONFIRMED_ON_TABLE = 5
+"""Candidates that are fitted to all points of a table."""
+
+POINTS, POINTS_COSTLY = 20, 10
+"""Points of a table for the first look, and for effects whose orbits take many times as long."""
+
+RIVALS = 2
+"""Candidates of a step of a ladder that are tried again when a later step is taken."""
+
+BEGUN, KEPT, JOINTS = 2, 2, 3
+"""Steps of every fit before the first look, fits of an effect that go on after it, joints that begin."""
+
+ANGLES = 6
+"""Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
+
+# --- where fits begin again -------------------------------------------------------------------------
+
+RESTART_FACTORS = (0.6, 0.8, 1.25, 1.6)
+"""Of a parameter over which the cost has many minima."""
+
+STATIC_FACTORS = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)
+"""Of a static level: single samples pass it."""
+
+RESTARTED_AGAIN, RESTARTS_KEPT = 2, 3
+"""Times that a parameter that found a better minimum is moved once more; restarts that go on."""
+
+OPEN_RANGE = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+"""How far about a static level the segments are tried for the range that they leave open."""
+
+RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
+"""Speeds to begin a segment with, over how far the estimate may be off."""
+
+LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
+RESONANCES = np.geomspace(1.5, 40.0, 12)
+JOINT_DAMPING = 0.1
+"""Joints tried: share of the mass behind them, resonance over the rate of the motion (its speed over its
+stroke), damping ratio. Resonances that are neighbours lie a third apart."""
+
+RIPPLE_TURNS, RIPPLE_STEP, RIPPLE_COARSEST = 400.0, 0.3, 6.0
+"""Ripples tried: wavelengths to the stroke at most; between two of them (one turn apart they are orthogonal);
+shortest wavelength over the error of the smoothed position."""
+
+TEST_FORCE = 3e-3
+"""Amplitude of a test force over the rms of the force: linear still, and far above rounding."""
+
+FINER = 3
+"""How many times finer the second grid of test forces is."""
+
+REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
+"""Travel after a reversal [typical positions] over which a force may build up."""
+
+TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
+"""Sizes of an effect of which nothing is known, over those of the table."""
+
+WORK_LOW = {"max_steps": 4_000, "averages": 8}
+WORK_MEDIUM = {"max_steps": 25_000, "averages": 8}
+WORK_HIGH = {"max_steps": 60_000, "averages": 16}
+"""Bounds on the work of one point of a forced orbit: a candidate far from the truth may rattle or creep for
+ever."""
+
+# --- plans ------------------------------------------------------------------------------------------
+
+PLAN_SIZES = (1.0, 0.8, 0.6, 0.45, 0.35, 0.25, 0.15, 0.08, 0.04)
+"""Of inputs, over the largest that the limits allow."""
+
+PLAN_MARGIN = 0.9
+"""Share of the stroke that candidates may use: the drive itself is like them, not one of them."""
+
+SETTLE, COUNTED, SINES = 12, 8, 6
+"""Periods before and while a point is measured, and points of a plan."""

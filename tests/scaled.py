@@ -1,0 +1,35 @@
+"""The same machine and the same record in other units."""
+
+from __future__ import annotations
+
+import ctrl_df as cdf
+from ctrl_df.units import size
+
+
+def sizes(force, length):
+    """Return the factors of the dimensions where forces and lengths are `force` and `length` times the number."""
+    return {"N": force, "m": length, "kg": force / length}
+
+
+def block(model, force, length):
+    """Return a mechanism in units in which forces and lengths have other numbers."""
+    values = {k: p.value * size(p.unit, sizes(force, length)) for k, p in model.parameters.items()}
+    inertias = {k: v for k, v in values.items() if "." not in k}
+    effects = []
+    for key, effect in model.named_effects.items():
+        own = {n: p.value * size(p.unit, sizes(force, length)) for n, p in effect.parameters.items()}
+        effects.append(effect.replace(**own))
+        assert key
+    return type(model)(**inertias, effects=effects)
+
+
+def record(data, force, length):
+    """Return a record likewise."""
+    velocity = None if data.velocity is None else data.velocity * length
+    return cdf.Measurement(data.t, data.u * force, data.y * length, name=data.name, velocity=velocity)
+
+
+def back(candidate, force, length):
+    """Return the parameters of a candidate's effect in the units it was scaled from."""
+    table = candidate.effect.parameters
+    return {k: v / size(table[k].unit, sizes(force, length)) for k, v in candidate.parameters.items()}

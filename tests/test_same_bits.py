@@ -1,0 +1,61 @@
+"""A run is the same to the last bit whatever runs are made before it, beside it, or on which thread."""
+
+import numpy as np
+import pytest
+from test_exponential import rigs
+
+import ctrl_df as cdf
+from ctrl_df.simulate.engine import Engine
+from ctrl_df.simulate.groups import Group
+from ctrl_df.simulate.runs import run_many, sampled_drives
+
+SAMPLES, STARTS = 400, 7
+
+
+def blocks(rng):
+    """Every kind of step: affine laws, curved ones, stiff ones, controllers, more modes than are kept."""
+    affine = {
+        "friction": cdf.friction_mass(2, 5, 0.5),
+        "stiction": cdf.friction_mass(9, 5, 0.5, 6).with_effect(cdf.ConstantForce(0.3)),
+        "gap": cdf.backlash_masses(1, 2, 0.01, 0.5).with_effect(cdf.LoadFriction(0.5)),
+    }
+    many = cdf.backlash_masses(1, 2, 0.01, 0.5).with_effect(cdf.LoadFriction(0.5))
+    many = (
+        many.with_effect(cdf.Coulomb(2.0))
+        .with_effect(cdf.QuadraticDrag(0.5))
+        .with_effect(cdf.HardStop(0.05, 0.5))
+    )
+    return affine | rigs(rng) | {"many modes": many}
+
+
+def grids(rng, runs):
+    """Sample times of as many records: regular but for rounding, begun anywhere, three lengths of steps."""
+    steps = rng.choice([1e-3, 1e-3 * (1 + 1e-13), 7e-4], runs)
+    return rng.choice([0.0, 0.3, 17.1], runs)[:, None] + np.arange(SAMPLES) * steps[:, None]
+
+
+def runs_of(system, times, u, x0, which, hold):
+    """Return the outputs of the runs asked for, in one call on one thread."""
+    engine = Engine(system)
+    group = Group(engine, engine.par, np.arange(len(which)), np.zeros(len(which), int))
+    drives = sampled_drives(times[which], u[which][:, None], hold)
+    found = run_many(
+        [group], x0[which], times[which, 0], times[which, -1], times[which].ravel(), drives,
+        drive=np.arange(len(which)), first=np.arange(len(which)) * SAMPLES, count=SAMPLES, threads=1,
+    )  # fmt: skip
+    return found.outputs.reshape(len(which), SAMPLES, -1)
+
+
+@pytest.mark.parametrize("hold", ["zoh", "linear"])
+@pytest.mark.parametrize("name", list(blocks(np.random.default_rng(0))))
+def test_runs_before_it_change_no_bit(name, hold):
+    rng = np.random.default_rng([ord(c) for c in name + hold])
+    system = blocks(rng)[name]
+    times = grids(rng, STARTS)
+    u = 20 * np.sin(rng.uniform(5, 60, STARTS)[:, None] * times + rng.uniform(0, 6, STARTS)[:, None])
+    x0 = np.zeros((STARTS, Engine(system).nstates))
+    alone = np.concatenate([runs_of(system, times, u, x0, np.array([i]), hold) for i in range(STARTS)])
+    assert np.ptp(alone) > 0
+    for _ in range(2):
+        order = rng.permutation(STARTS)
+        np.testing.assert_array_equal(runs_of(system, times, u, x0, order, hold), alone[order])

@@ -1,0 +1,48 @@
+"""Units are a matter of writing: other ones alter neither the verdict nor the evidence nor, converted, values."""
+
+import functools
+
+import pytest
+import rigs
+import scaled
+
+import ctrl_df as cdf
+
+SCALES = [(1.0, 1e6), (1e-6, 1e3), (1e6, 1e-6)]
+"""Factors of forces and of lengths."""
+
+FAST = ("linear_spring", "input_delay")
+OTHERS = ("quadratic_drag", "asymmetric_coulomb")
+SEEDS = {"position_ripple": 6001}  # of seed 21 it is none that fits can follow
+
+
+@functools.cache
+def rig_of(hidden):
+    rig = rigs.draw(hidden, SEEDS.get(hidden, 21), excitation="multisine", snr_db=60, n=4000)
+    free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
+    return rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free
+
+
+@functools.cache
+def diagnosed(hidden, force=1.0, length=1.0):
+    model, train, held, free = rig_of(hidden)
+    return cdf.diagnose(
+        scaled.block(model, force, length), scaled.record(train, force, length),
+        holdout=scaled.record(held, force, length), free=free, candidates=(hidden, *OTHERS),
+    )  # fmt: skip
+
+
+CASES = [(e, s) for e in rigs.ORDER for s in SCALES if e not in OTHERS]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "scale"),
+    [pytest.param(e, s, marks=() if e in FAST and s != SCALES[0] else pytest.mark.slow) for e, s in CASES],
+)
+def test_other_units_alter_nothing(hidden, scale):
+    before, after = diagnosed(hidden), diagnosed(hidden, *scale)
+    assert after.verdict == before.verdict
+    assert [c.id for c in after.ranking] == [c.id for c in before.ranking]
+    first, second = before.ranking[0], after.ranking[0]
+    assert second.evidence == pytest.approx(first.evidence, rel=1e-6, abs=1e-6)
+    assert scaled.back(second, *scale) == pytest.approx(dict(first.parameters), rel=1e-6)
