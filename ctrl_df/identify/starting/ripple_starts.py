@@ -65,5 +65,5 @@ def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, floa
 
 def _linear(effect) -> bool:
     """Whether a law is linear in what a regression of the force may take for it: direction, speed, one."""
-    placed = (effect.role == "friction" and "x" not in effect.asks) or (effect.role == "force" and effect.place_free)
+    placed = effect.role == "friction" or (effect.role == "force" and effect.place_free)
     return placed and effect.affine and effect.proportional and effect.rank == 0
