@@ -10,6 +10,8 @@ import rig_physics as physics
 from rig_excitation import controller_for, excite, reference
 from rig_sizes import EFFECTS, OUTSIDE, base_needs
 
+from ctrl_df.blocks.effect import effect_class
+
 RATIO = (3.0, 200.0)
 
 
@@ -18,7 +20,8 @@ class Record:
     """One run: time [s], force [N] held over each sample, reported position [m], and what a test may know.
 
     `v` is a velocity channel [m/s] or None; `r` the reference of a closed loop or None; `clean` the position
-    without noise and encoder; `noise` the rms of noise and encoder together [m].
+    without noise and encoder; `noise` the rms of noise and encoder together [m]. Where the drive `turns`, all
+    is in units of rotation.
     """
 
     t: np.ndarray
@@ -30,12 +33,14 @@ class Record:
     noise: float
     excitation: str
     name: str
+    turns: bool = False
 
     def measurement(self):
         """Return the record as the library's `Measurement`."""
         from ctrl_df.identify.data.measurement import Measurement
 
-        return Measurement(self.t, self.u, self.y, name=self.name, velocity=self.v)
+        units = dict(input_unit="N m", output_unit="rad", velocity_unit="rad/s") if self.turns else {}
+        return Measurement(self.t, self.u, self.y, name=self.name, velocity=self.v, **units)
 
 
 def is_free(name):
@@ -332,7 +337,8 @@ class Setup:
         if velocity:
             v = run["v"] + 10 ** (-self.snr_db / 20) * np.std(run["v"]) * rng.standard_normal(self.n)
         return Record(
-            t, run["u"], run["y"], v, given if self.closed_loop else None, run["clean"], sigma, kind, name
+            t, run["u"], run["y"], v, given if self.closed_loop else None, run["clean"], sigma, kind, name,
+            any(effect_class(i).turns for i in self.ids),
         )  # fmt: skip
 
 
