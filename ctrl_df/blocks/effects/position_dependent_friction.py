@@ -47,25 +47,47 @@ class PositionDependentFriction(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Yield waves of the friction, short or longer than the stroke, that explain most of the force."""
+        """Yield waves of the friction that explain most of the force."""
+        for turns, pair in _waves(screen)[:4]:
+            size = min(float(np.hypot(*pair)), 2.0 * screen.scales.force)
+            for factor in (1.0, 0.5):
+                yield cls(factor * size, float(np.ptp(screen.motion.x)) / turns, math.atan2(pair[1], pair[0]))
+
+    @classmethod
+    def regress(cls, screen):
+        """Yield the waves that explain most, with the friction that the model keeps beside."""
         m = screen.motion
-        sense = np.sign(m.v) * (np.abs(m.v) > 0.03 * screen.scales.speed)
-        plain = np.column_stack([m.a, m.v, sense, np.ones(len(m.v)), m.x])
-        basis, _ = np.linalg.qr(plain / np.linalg.norm(plain, axis=0))
-        left = m.u - basis @ (basis.T @ m.u)
-        span, found = float(np.ptp(m.x)), []
-        for turns in np.geomspace(0.3, 30.0, 90):
-            angle = 2.0 * math.pi * turns * m.x / span
-            pair = np.column_stack([sense * np.sin(angle), sense * np.cos(angle)])
-            clean = pair - basis @ (basis.T @ pair)
-            weights, *_ = np.linalg.lstsq(clean, left, rcond=None)
-            found.append((float(np.sum((left - clean @ weights) ** 2)), turns, weights))
-        kept: list[float] = []
-        for _, turns, weights in sorted(found, key=lambda f: f[0]):
-            if all(abs(math.log(turns / other)) > 0.15 for other in kept):
-                kept.append(turns)
-                size = min(float(np.hypot(*weights)), 2.0 * screen.scales.force)
-                for factor in (1.0, 0.5):
-                    yield cls(factor * size, span / turns, math.atan2(weights[1], weights[0]))
-            if len(kept) == 4:
-                break
+        for turns, _ in _waves(screen)[:2]:
+            wavelength = float(np.ptp(m.x)) / turns
+            angle, sense = 2.0 * math.pi * m.x / wavelength, np.sign(m.v)
+            fit = screen.force_fit([sense * np.sin(angle), sense * np.cos(angle)])
+            if fit.sensible:
+                a, b = fit.weights
+                yield cls(math.hypot(a, b), wavelength, math.atan2(b, a)), fit.values
+
+
+TURNS = np.concatenate([np.geomspace(0.25, 1.0, 6), np.arange(1.25, 80.0, 0.25)])
+"""Waves tried, over the stroke: a quarter of a turn apart they are the same."""
+
+
+def _waves(screen):
+    """Return the waves that explain most of the force, the best first: turns, (sine, cosine) [N]."""
+    m = screen.motion
+    sense = np.sign(m.v) * (np.abs(m.v) > 0.03 * screen.scales.speed)
+    plain = np.column_stack([m.a, m.v, sense, np.ones(len(m.v)), m.x])
+    basis, _ = np.linalg.qr(plain / (np.linalg.norm(plain, axis=0) + 1e-300))
+    left = m.u - basis @ (basis.T @ m.u)
+    span, found = float(np.ptp(m.x)) or 1.0, []
+    for turns in TURNS:
+        angle = 2.0 * math.pi * turns * m.x / span
+        pair = np.column_stack([sense * np.sin(angle), sense * np.cos(angle)])
+        pair -= basis @ (basis.T @ pair)
+        square = pair.T @ pair + 1e-9 * len(left) * np.eye(2)
+        with_it = pair.T @ left
+        weights = np.linalg.solve(square, with_it)
+        found.append((float(weights @ with_it), float(turns), weights))
+    best: list = []
+    for _, turns, weights in sorted(found, key=lambda f: -f[0]):
+        if all(abs(turns - other) > max(0.1 * turns, 0.6) for other, _ in best):
+            best.append((turns, weights))
+    return best
