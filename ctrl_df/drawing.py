@@ -20,6 +20,7 @@ PICTURES = {
     "table diagnosis": "table.plot_frequency_diagnosis",
     "ladder": "ladder.plot_ladder",
     "missing force": "missing_force.missing_force_plot",
+    "gains": "gains.plot_limit_cycle_map",
 }
 
 

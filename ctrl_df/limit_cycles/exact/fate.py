@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .kicks import FACTORS
 from .known import KnownOrbits
 from .orbit import Orbit
 from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, Swings
@@ -154,15 +155,17 @@ class Explorer:
     def __init__(self, swings: Swings, close: Callable):
         self.swings, self.close = swings, close
 
-    def explore(self, longest=None, edges=True, known: KnownOrbits | None = None) -> Fate:
+    def explore(self, longest=None, edges=True, known: KnownOrbits | None = None, factors=FACTORS) -> Fate:
         """Simulate every start; with `edges` close in on the borders between starts of different fate.
+
+        `factors` are the sizes of the starts, in units of that at which the block's nonlinearity matters.
 
         Starts whose course ends on an orbit of `known` are not followed to its end, nor closed again.
         """
         kicks, met = self.swings.kicks, []
         known = KnownOrbits(self.swings, []) if known is None else known
         rows = []
-        for size, x0 in kicks.all():
+        for size, x0 in kicks.all(factors):
             course = self.swings.follow(x0, _SWINGS, longest, decided=known.ending)
             orbit = known.reached(course) or known.kept(self.close(x0, course, True))
             rows.append(self._row(size, course, orbit, x0))

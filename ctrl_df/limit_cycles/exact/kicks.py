@@ -52,9 +52,9 @@ class Kicks:
         else:
             self.pace, self.scale, self.unit = 1.0, 1.0, "of every state"
 
-    def all(self) -> list[tuple[float, np.ndarray]]:
-        """(size, state) of every start, in the order in which they are tried."""
-        return [(f * self.scale, self.state(f * self.scale)) for f in FACTORS]
+    def all(self, factors=FACTORS) -> list[tuple[float, np.ndarray]]:
+        """(size, state) of every start, in the order in which they are tried; `factors` are of the scale."""
+        return [(f * self.scale, self.state(f * self.scale)) for f in factors]
 
     def state(self, size: float) -> np.ndarray:
         """Return the start of a size: a displacement at rest, or what brings the block's input there."""

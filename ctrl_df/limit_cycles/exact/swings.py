@@ -17,7 +17,8 @@ from .kicks import Kicks
 
 _WORK = 300_000  # integration steps of one simulation
 _FEW = 12  # swings within that work, below which it is no use
-_QUIET = 40  # strides without a passage after which a loop is called at rest
+_QUIET = 40  # strides without a passage after which a loop is called at rest, if nothing in it moves on
+_PATIENCE = 400  # the same while something does: an integral that winds up, a slow mode
 _DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
 _SAMPLES = 1024  # in a stride, where passages are looked for among samples
 _FAINT = 1e-6  # of the highest peak met, below which swings count as rest
@@ -165,8 +166,10 @@ class Swings:
         bound = _GONE * max(1.0, largest)
         stretches = self._by_samples(state, limit) if self.held else self._by_passage(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
-        while len(laps) < count and time < limit and quiet <= _QUIET and work <= _WORK:
+        while len(laps) < count and time < limit and quiet <= _PATIENCE and work <= _WORK:
             stretch = next(stretches)
+            if quiet > _QUIET and self.size(stretch.x - end) < _DEAD * largest:
+                break
             time, end, work = stretch.time, stretch.x, work + stretch.steps
             if stretch.status is Status.DIVERGED or not self.size(end) < bound:
                 return Course(laps, DIVERGES, np.inf, end)

@@ -43,7 +43,7 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
         coarse = family.amplitudes
         a = _refined(coarse, method.amplitudes)
         if isinstance(method, ElementIntegrals):
-            a = _with_corners(a, method.subject.primitive)
+            a = with_corners(a, method.subject.primitive)
         if method.needs_omega and a.size * w.size > 60_000:
             a = coarse
         N = _fundamental(method, a, w, family)
@@ -76,7 +76,7 @@ def _refined(grid, least):
     )
 
 
-def _with_corners(a, primitive):
+def with_corners(a, primitive):
     """Add the amplitudes at which an element's N bends, and points closing in on them from above.
 
     As a sine reaches a further jump N rises at once, with the square root of what it is beyond: between two

@@ -1,0 +1,1 @@
+"""Choosing gains: what a loop does over the plane of two gains, and a PID without a limit cycle."""
