@@ -1,4 +1,4 @@
-"""Every effect of the library, copied into a file of a user's own: is the copy found as the original is?
+"""Every effect of the library, copied into a file of a user's own: is it found as the original is.
 
     python benchmarks/copies.py [--jobs 2] [--only PART] [--whole]
 

@@ -27,7 +27,7 @@ import rigs
 from diagnosis_peers import PEERS
 
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.estimation.trial import prepare
+from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.improve import improve
 from ctrl_df.identify.refit import refit

@@ -28,7 +28,7 @@ import numpy as np  # noqa: E402
 from numba.core import config  # noqa: E402
 
 import ctrl_df as cdf  # noqa: E402
-from ctrl_df.identify.estimation.segments import make_windows  # noqa: E402
+from ctrl_df.identify.estimation.segments import make_segments  # noqa: E402
 from ctrl_df.identify.estimation.simulator import Simulator  # noqa: E402
 
 ROWS: list[tuple[str, str, str, bool]] = []
@@ -417,7 +417,7 @@ def records() -> None:
     for three in others:
         block = cdf.Mass(5, [*common, *three])
         simulator = Simulator(block, cdf.Measurement(t, u, np.sin(t)))
-        whole = make_windows(simulator.record)
+        whole = make_segments(simulator.record)
         worst = max(worst, seconds(lambda s=simulator, w=whole: s.run(w), 9))
     row("10,000 samples with five effects", f"{1e3 * worst:.1f} ms", "10 ms", worst <= 0.010)
 

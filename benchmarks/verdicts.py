@@ -88,7 +88,7 @@ def row(name) -> dict:
     return dict(
         verdict=found, first=list(first), evidence=[c.evidence for c in candidates], error=error,
         parameters={k: p.value for k, p in last.parameters.items()}, truth=rig.truth,
-        errors={f"{c.model._keys[-1]}.{k}": e for c in candidates[:1] for k, e in c.errors.items()},
+        errors={f"{c.model.newest}.{k}": e for c in candidates[:1] for k, e in c.errors.items()},
         wall=times[0], processor=times[1],
     )  # fmt: skip
 

@@ -1,9 +1,41 @@
-"""Machine code is made once, before the workers start, and not by each of them."""
+"""Machine code is made once, before the workers start; tests that take long are marked slow by a list.
+
+`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a second of processor time. The
+list is made of a whole run, ``CTRL_DF_TIMES=times.txt pytest``, by ``python tests/tiers.py times.txt``.
+"""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
 
 from ctrl_df.warm import is_warm, warm_up
+
+SLOW = Path(__file__).with_name("slow.txt")
 
 
 def pytest_sessionstart(session):
     """Compile ahead where nothing is kept of the engine as it stands."""
     if not hasattr(session.config, "workerinput") and not is_warm():
         warm_up()
+
+
+def pytest_collection_modifyitems(items):
+    """Mark the tests of the list; a name without brackets stands for all its cases."""
+    slow = set(SLOW.read_text().split("\n")) if SLOW.exists() else set()
+    for item in items:
+        name = item.nodeid.rpartition("tests/")[2]
+        if name in slow or name.partition("[")[0] in slow:
+            item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item):
+    """Write how long a test took [s of processor], its fixtures included, where that is asked for."""
+    began = time.process_time()
+    yield
+    times = os.environ.get("CTRL_DF_TIMES")
+    if times:
+        with open(times, "a") as file:
+            file.write(f"{time.process_time() - began:.3f} {item.nodeid.rpartition('tests/')[2]}\n")

@@ -7,7 +7,7 @@ from ctrl_df.units import size
 
 
 def sizes(force, length):
-    """Return the factors of the dimensions where forces and lengths are `force` and `length` times the number."""
+    """Return the factors of dimensions where forces and lengths have so many times the number."""
     return {"N": force, "m": length, "kg": force / length}
 
 

@@ -12,7 +12,7 @@ from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.identify.compare import compare
 from ctrl_df.identify.data.measurement import Measurement
-from ctrl_df.identify.estimation.segments import make_windows
+from ctrl_df.identify.estimation.segments import make_segments
 from ctrl_df.identify.estimation.simulator import Simulator
 from ctrl_df.simulate.loop import closed_loop
 from ctrl_df.simulate.response import event_response
@@ -25,10 +25,10 @@ def test_simulation_agrees_with_the_rig(hidden):
     rig = rigs.draw(hidden, 3)
     record = rig.train[0]
     measured = record.measurement()
-    y = Simulator(rig.true_block, measured).run(make_windows(measured))
+    y = Simulator(rig.true_block, measured).run(make_segments(measured))
     # The start is estimated from noisy data: worst 0.3 of the noise; thinned 1.3.
     assert np.std(y - record.clean) < 0.6 * record.noise
-    thin = Simulator(rig.true_block, measured, thin=4).run(make_windows(measured))
+    thin = Simulator(rig.true_block, measured, thin=4).run(make_segments(measured))
     assert np.std(thin - record.clean) < 2 * record.noise
 
 

@@ -9,11 +9,11 @@ import rigs
 import ctrl_df as cdf
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.estimation.noise_model import whitener
+from ctrl_df.identify.estimation.noise_model import prediction_error_filter
+from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.simulator import feasible
-from ctrl_df.identify.estimation.trial import Trial, prepare
 from ctrl_df.identify.estimation.variables import default_free
-from ctrl_df.identify.residuals.missing_forces import lacks
+from ctrl_df.identify.residuals.missing_forces import missing_forces
 
 FEW = ("constant_force", "asymmetric_coulomb", "linear_spring", "input_delay", "sensor_delay")
 
@@ -23,7 +23,7 @@ def of(rig):
 
 
 @pytest.mark.parametrize("hidden, seed", [("stribeck", 4), ("backlash", 4)])
-def test_initial_states_carried_from_short_windows_to_long_ones_find_the_truth(hidden, seed):
+def test_initial_states_carried_from_short_segments_to_long_ones_find_the_truth(hidden, seed):
     rig = rigs.draw(hidden, seed, excitation="chirp", snr_db=40)
     train, held = of(rig)
     data = prepare(rig.baseline, [train], [held])
@@ -33,28 +33,28 @@ def test_initial_states_carried_from_short_windows_to_long_ones_find_the_truth(h
     found = data.level(16).fit(block.with_parameters(feasible(block, off)), free)
     for factor in (4, 1):
         found = data.level(factor).moved(found)
-    trial = data.judged(Trial("", found))
+    trial = data.validate(CandidateFit("", found))
     # worst of twelve such rigs: 1.02 on the record fitted, 1.16 on the one held out
     assert found.rmse < 1.06 * rig.train[0].noise
-    assert trial.held.rmse < 1.3 * rig.holdout[0].noise
+    assert trial.validation.rmse < 1.3 * rig.holdout[0].noise
 
 
-def test_windows_nest_and_hold_every_sample_once():
+def test_segments_nest_and_hold_every_sample_once():
     rig = rigs.draw_none(4, excitation="chirp")
     train, _ = of(rig)
     data = prepare(rig.baseline, [train])
-    learn, judge = (view.windows[0].samples for view in (data.train, data.held))
+    learn, judge = (view.segments[0].samples for view in (data.train, data.validation))
     assert np.array_equal(np.sort(np.concatenate([learn, judge])), np.arange(len(train)))
     short = data.level(16)
-    assert np.array_equal(short.train.windows[0].samples, learn)
-    assert set(data.train.windows[0].begins) <= set(short.train.windows[0].begins)
+    assert np.array_equal(short.train.segments[0].samples, learn)
+    assert set(data.train.segments[0].begins) <= set(short.train.segments[0].begins)
 
 
 def test_free_forces_tell_what_a_model_misses_and_where():
     def most_telling(rig, block):
         data = prepare(rig.baseline, [of(rig)[0]]).level(4)
         found = data.fit(block, default_free(block))
-        return lacks(Trial("", found), data, whitener(found.residual))[0]
+        return missing_forces(CandidateFit("", found), data, prediction_error_filter(found.residual))[0]
 
     rig = rigs.draw("linear_spring", 4, excitation="chirp")
     assert most_telling(rig, rig.true_block).evidence < 0
@@ -85,8 +85,8 @@ def test_a_bump_passed_within_a_sample_is_stiction():
     assert found.best.parameters["level"] == pytest.approx(rig.truth["stiction.level"], rel=0.03)
 
 
-def test_what_only_long_windows_show_is_unknown():
-    # a notch in the force at one place: short windows begin anew beyond it
+def test_what_only_long_segments_show_is_unknown():
+    # a notch in the force at one place: short segments begin anew beyond it
     rig = rigs.draw_outside(1005, kind="detent", excitation="multisine", snr_db=40, noise="coloured")
     train, held = of(rig)
     few = ("linear_spring", "position_ripple", "stribeck")
@@ -103,7 +103,7 @@ def test_a_joint_with_nothing_behind_it_is_no_joint():
     assert found.verdict == "unknown" and found.regions == ("position",)
 
 
-def test_hidden_states_of_many_windows_do_not_pass_for_a_hum():
+def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
     rig = rigs.draw_outside(1013, kind="hum", excitation="steps", snr_db=40, noise="encoder")
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance", "bristle"))
@@ -162,7 +162,7 @@ def test_errors_are_clear():
     with pytest.raises(TypeError, match="Measurement"):
         diagnose(cdf.Mass(1), (t, t, t))
     with pytest.raises(TypeError, match="unrecognized keyword"):
-        diagnose(cdf.Mass(1), data, colour="red")
+        diagnose(cdf.Mass(1), data, error_filter="red")
     with pytest.raises(ValueError, match="effect id"):
         diagnose(cdf.Mass(1), data, candidates=["gremlin"])
     with pytest.raises(TypeError, match="inertia"):

@@ -8,7 +8,7 @@ from ctrl_df.blocks.effects import InputGain, QuadraticDrag, SensorQuantization
 from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.identify.data.measurement import Measurement
-from ctrl_df.identify.estimation.candidate import fit_candidate
+from ctrl_df.identify.estimation.fit import fit_records
 from ctrl_df.identify.estimation.simulator import feasible
 from ctrl_df.identify.refit import refit
 from ctrl_df.simulate.loop import closed_loop
@@ -26,7 +26,7 @@ def test_standard_errors_hold_for_wrong_parameters():
             snr_db=[60.0, 40.0][seed % 2],
             noise=NOISES[(seed // 2) % 3],
         )
-        fit = fit_candidate(rig.baseline, [rig.train[0].measurement()])
+        fit = fit_records(rig.baseline, [rig.train[0].measurement()])
         errors = fit.standard_errors
         inside += [abs(v - rig.truth[k]) < 2 * errors[k] for k, v in fit.parameters.items()]
         ratios.append(fit.rmse / rig.train[0].noise)
@@ -77,7 +77,7 @@ def test_outliers_do_not_move_the_fit():
     record = rig.train[0]
     y = record.y.copy()
     y[500::400] += 200 * record.noise
-    fit = fit_candidate(rig.baseline, [Measurement(record.t, record.u, y)])
+    fit = fit_records(rig.baseline, [Measurement(record.t, record.u, y)])
     for name, value in fit.parameters.items():
         assert value == pytest.approx(rig.truth[name], rel=0.02)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.estimation.segments import cut, facts
-from ctrl_df.identify.estimation.trial import prepare
-from ctrl_df.identify.starting.ripple_spectrum import WaveSearch
+from ctrl_df.identify.starting.ripple_spectrum import RippleSpectrum
 
 MASS, DRY, VISCOUS, DT = 5.0, 0.5, 20.0, 1e-3
 
@@ -37,7 +37,7 @@ def test_short_waves(seed):
     wavelength, phase = rng.uniform(4e-3, 9e-3), rng.uniform(-3, 3)
     run = drive(seed, 4.0, wavelength, phase, wavelength / 30)
     assert np.max(np.abs(facts(run).velocity)) > 40 * wavelength
-    first, second = WaveSearch([run], [cut(run, 8)]).best(2)
+    first, second = RippleSpectrum([run], [cut(run, 8)]).best(2)
     # measured at worst 1.3e-3, 3.6 %, 0.03 rad, 2.4e-3; the second best explains 23 nats less or fewer
     assert first.wavelength == pytest.approx(wavelength, rel=5e-3)
     assert first.amplitude == pytest.approx(4.0, rel=0.12)
@@ -49,7 +49,7 @@ def test_short_waves(seed):
 def test_no_waves():
     """Where nothing repeats over position nothing is gained."""
     run = drive(4, 0.0, 1.0, 0.0, 3e-4)
-    assert WaveSearch([run], [cut(run, 8)]).best(1)[0].gain < 25
+    assert RippleSpectrum([run], [cut(run, 8)]).best(1)[0].gain < 25
 
 
 def test_other_phase_of_the_record_held_out():
@@ -65,5 +65,5 @@ def test_other_phase_of_the_record_held_out():
         abs(math.remainder(best.parameters["phase"] - 0.3, 2 * math.pi)) < 0.3
     )  # that of the training record
     data = prepare(best.model, [run], [held])
-    _, error = data.levels[0].errors(best.model)
+    _, error = data.segmentations[0].errors(best.model)
     assert error * np.std(held.y) < 1.1 * 2e-4

@@ -7,13 +7,13 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation import initial_states
-from ctrl_df.identify.estimation.segments import make_windows
+from ctrl_df.identify.estimation.segmented import prepare
+from ctrl_df.identify.estimation.segments import make_segments
 from ctrl_df.identify.estimation.simulator import Simulator, free_run
-from ctrl_df.identify.estimation.trial import prepare
 from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.selection.rounding import rounding_evidence
-from ctrl_df.identify.starting.attach import applicable
-from ctrl_df.identify.starting.resonance_grid import resonant
+from ctrl_df.identify.starting.extend import applicable
+from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
 from ctrl_df.identify.thresholds import LOAD_SHARES
 
@@ -52,7 +52,7 @@ def test_initial_states_and_their_corrections_are_one_map(name):
 def test_windows_that_go_on_from_one_another_are_one_run(name):
     block = BLOCKS[name]
     data = record(block)
-    simulator, windows = Simulator(block, data), make_windows(data, 0.5)
+    simulator, windows = Simulator(block, data), make_segments(data, 0.5)
     starts = simulator.at_rest(windows, None)
     if name == "gap":
         starts[:, 2] = 0.5
@@ -86,7 +86,7 @@ def test_rounding_is_told_from_noise_of_the_same_size():
 def test_a_joint_is_found_by_its_resonance():
     data = prepare(PLAIN, [record(BLOCKS["joint"], n=6000)]).level(4)
     screen = Screen(data.fit(PLAIN, default_free(PLAIN)), data)
-    found = [f for share in LOAD_SHARES for f in resonant(cdf.Compliance, screen, share, 1)]
+    found = [f for share in LOAD_SHARES for f in resonating(cdf.Compliance, screen, share, 1)]
     joint = min(found, key=lambda f: f.rmse).model.effects[-1]
 
     def frequency(effect, mass):

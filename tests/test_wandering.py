@@ -9,8 +9,13 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.estimation.initial_states import MEASURED
-from ctrl_df.identify.estimation.noise_model import force_errors, noise_model, whitened_power, whitener
-from ctrl_df.identify.estimation.segments import make_windows
+from ctrl_df.identify.estimation.noise_model import (
+    noise_model,
+    prediction_error_filter,
+    second_difference_filter,
+    whitened_power,
+)
+from ctrl_df.identify.estimation.segments import make_segments
 from ctrl_df.identify.estimation.simulator import Simulator
 
 DT = 1e-3
@@ -93,15 +98,15 @@ def test_noise_is_told_from_the_jumps_between_windows():
 def test_forces_are_second_differences():
     t = DT * np.arange(400)
     pieces = [3.0 * t**2 / 2 + 5 * t + 1, -2.0 * t**2 / 2]
-    noise = force_errors(10)
+    noise = second_difference_filter(10)
     whole, windows = np.concatenate(pieces), [slice(0, 400), slice(400, 800)]
-    seen = noise.seen(whole, windows) / (10 * DT) ** 2
+    seen = noise.filtered(whole, windows) / (10 * DT) ** 2
     assert len(seen) == 2 * 38
     assert seen[:38] == pytest.approx(3.0, rel=1e-9) and seen[38:] == pytest.approx(-2.0, rel=1e-9)
     # the value sits in the middle of the samples that make it
     rows = noise.rows(windows)
     assert len(rows) == len(seen)
-    cubic = noise.seen(t**3, [slice(0, 400)]) / (10 * DT) ** 2
+    cubic = noise.filtered(t**3, [slice(0, 400)]) / (10 * DT) ** 2
     assert cubic == pytest.approx(6 * t[rows[:38]], abs=6 * DT)
 
 
@@ -109,8 +114,8 @@ def test_wandering_forces_are_whitened():
     rng = np.random.default_rng(2)
     force = [np.convolve(rng.standard_normal(1200), 0.97 ** np.arange(200))[:1200] for _ in range(20)]
     pieces = [np.cumsum(np.cumsum(f)) for f in force]
-    noise = whitener(pieces, force_errors(10))
-    white = [noise.seen(p, [slice(0, len(p))]) for p in pieces]
+    noise = prediction_error_filter(pieces, second_difference_filter(10))
+    white = [noise.filtered(p, [slice(0, len(p))]) for p in pieces]
     one = sum(float(w[1:] @ w[:-1]) for w in white) / whitened_power(pieces, noise)[0]
     assert abs(one) < 0.05
 
@@ -126,7 +131,7 @@ def test_hidden_states_go_on_from_window_to_window(effect):
     u = np.repeat(np.random.default_rng(5).uniform(-6, 6, 30), 100)
     y, v = cdf.event_response(block, t, u, 0, input_hold="zoh").outputs[:2]
     data = cdf.Measurement(t, u, y)
-    windows = make_windows(data, 0.5)
+    windows = make_segments(data, 0.5)
     exact = replace(windows, x=y[windows.begins], v=v[windows.begins])
     simulator = Simulator(block, data, begins=MEASURED)
     assert simulator.nuisances == ()

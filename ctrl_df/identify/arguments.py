@@ -136,9 +136,9 @@ def check_limits(limits) -> None:
         positive("diagnose", f"limits[{name!r}]", value, "N" if name == "force" else "m")
 
 
-def check_held_out(records, held) -> None:
+def check_held_out(records, validation) -> None:
     """Check that no record is both fitted and held out."""
-    for record in held:
+    for record in validation:
         if any(record is other for other in records):
             raise ValueError(
                 f"holdout needs records that are not fitted; got {shown(record.name)} in both. "

@@ -53,6 +53,13 @@ class Measurement:
     ValueError
         NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a constant
         input or output, fewer than 10 samples, an unknown unit; the message gives rule, value, remedy.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 2, 0.01)
+    >>> record = cdf.Measurement(1e3 * t, np.sin(3 * t), 5 * np.cos(3 * t), time_unit="ms", output_unit="mm")
+    >>> record
+    Measurement('measurement': 200 samples, 0 to 1.99 s, dt 0.01 s, input [N] zoh, output [m])
     """
 
     t: np.ndarray
@@ -330,16 +337,16 @@ class Measurement:
         channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
         held = self.input_hold == "zoh"
         u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
-        return self._with(t=self.t[::factor], u=u, channels=MappingProxyType(channels), **thin)
+        return self.replaced(t=self.t[::factor], u=u, channels=MappingProxyType(channels), **thin)
 
     def _part(self, where, name):
         channels = MappingProxyType({k: v[where] for k, v in self.channels.items()})  # type: ignore[union-attr]
         velocity = None if self.velocity is None else self.velocity[where]
-        return self._with(
+        return self.replaced(
             t=self.t[where], u=self.u[where], y=self.y[where], velocity=velocity, channels=channels, name=name
         )
 
-    def _with(self, **changes):
+    def replaced(self, **changes):
         """Copy without checking again: a part of a good record may well have a constant input."""
         part = object.__new__(type(self))
         for field in dataclasses.fields(self):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..arguments import check_held_out
-from ..data.records import as_records, as_tables, has_tables
+from ..data.as_data import as_records, as_tables, has_tables
 from .dataset import Dataset
 from .over_time import TimeDataset
 from .tables import TableDataset
@@ -21,6 +21,6 @@ def dataset_of(data, holdout=None, name: str = "data") -> Dataset:
     """
     of, kind = (as_tables, TableDataset) if has_tables(data) else (as_records, TimeDataset)
     records = of(data, name)
-    held = () if holdout is None else of(holdout, "holdout")
-    check_held_out(records, held)
-    return kind(records, held)
+    validation = () if holdout is None else of(holdout, "holdout")
+    check_held_out(records, validation)
+    return kind(records, validation)

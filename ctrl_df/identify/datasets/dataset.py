@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..residuals.compared import Compared
+from ..residuals.comparison_base import ComparisonBase
 from ..results.experiment import Experiment
 from ..selection.search import Search
 
@@ -31,7 +31,7 @@ class Estimate:
     doubts : tuple of str
         Sentences about these.
     covariance : (p, p) array
-    comparison : Compared
+    comparison : ComparisonBase
         The fitted model beside the data.
     converged : bool
     simulations : int
@@ -58,7 +58,7 @@ class Dataset(ABC):
     """
 
     records: tuple
-    held: tuple
+    validation: tuple
 
     def check_segments(self, mode, window) -> None:
         """Check how records are to be cut; tables are not."""
@@ -69,7 +69,7 @@ class Dataset(ABC):
         """Return the block whose parameters a fit to these data moves."""
 
     @abstractmethod
-    def compare(self, model, mode: str, window: float | None) -> Compared:
+    def compare(self, model, mode: str, window: float | None) -> ComparisonBase:
         """Set a model beside the records."""
 
     @abstractmethod

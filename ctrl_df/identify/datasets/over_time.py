@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arguments import check_window
-from ..estimation.candidate import window_lengths
+from ..estimation.fit import segment_lengths
 from ..estimation.multiple_shooting import Problem
 from ..estimation.prepared import REFERENCE
 from ..estimation.refit_records import blurred, doubts, refit_records
-from ..estimation.segments import make_windows
+from ..estimation.segments import make_segments
 from ..estimation.simulator import Simulator
 from ..planning.inputs import input_that_separates
 from ..results.comparison import Comparison, RecordComparison
@@ -20,8 +20,8 @@ from .dataset import Dataset, Estimate
 class TimeDataset(Dataset):
     """Records of the input and the output over time."""
 
-    def __init__(self, records, held=()):
-        self.records, self.held = tuple(records), tuple(held)
+    def __init__(self, records, validation=()):
+        self.records, self.validation = tuple(records), tuple(validation)
 
     def check_segments(self, mode, window):
         """Check the mode, and a length of segment that holds samples enough."""
@@ -35,19 +35,19 @@ class TimeDataset(Dataset):
         """Simulate the model over segments of the records, their initial states fitted."""
         self.check_segments(mode, window)
         mode = "windows" if mode == "auto" and window is not None else mode
-        lengths = window_lengths(model, self.records, mode, window)
+        lengths = segment_lengths(model, self.records, mode, window)
         problem = Problem(model, self.records, (), 10_000)
-        cut = [make_windows(r, n) for r, n in zip(self.records, lengths, strict=True)]
+        cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
         problem.stage(cut, 1)
         problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
-        return self._comparison(model, problem.windows, problem.nuisance)
+        return self._comparison(model, problem.segments, problem.nuisance)
 
-    def _comparison(self, model, windows, starts, fitted: int = 0) -> Comparison:
+    def _comparison(self, model, segments, starts, fitted: int = 0) -> Comparison:
         """Return the comparison of a model whose initial states in each segment are known already."""
         rows = []
-        for record, w, start in zip(self.records, windows, starts, strict=True):
+        for record, w, start in zip(self.records, segments, starts, strict=True):
             simulated = Simulator(model, record).run(w, None, start, rounded=True)
-            rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
+            rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted, model))
         return Comparison(model, tuple(rows))
 
     def fit(self, model, names, start, *, whole, mode, window, robust, budget):
@@ -58,7 +58,7 @@ class TimeDataset(Dataset):
             model, self.records, names, start, whole=whole, mode=mode, window=window, robust=robust,
             budget=budget,
         )  # fmt: skip
-        comparison = self._comparison(found.model, seen.windows, seen.starts, fitted=len(names))
+        comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
             self.block_of(found.model), found.standard_errors, found.at_bound, blurred(found), doubts(found),
             found.covariance, comparison, found.converged, found.nfev,
@@ -69,7 +69,7 @@ class TimeDataset(Dataset):
 
     def search(self, block, free):
         """Return the search over segments of the records."""
-        return StructureSearch(block, self.records, self.held, free)
+        return StructureSearch(block, self.records, self.validation, free)
 
     def plan(self, diagnosis, models, names, **limits):
         """Return the input, of a few shapes and sizes, whose outputs differ most."""

@@ -13,8 +13,8 @@ from .dataset import Dataset, Estimate
 class TableDataset(Dataset):
     """Describing functions measured over amplitude and frequency."""
 
-    def __init__(self, records, held=()):
-        self.records, self.held = tuple(records), tuple(held)
+    def __init__(self, records, validation=()):
+        self.records, self.validation = tuple(records), tuple(validation)
 
     def block_of(self, model):
         """Return the block itself, or that of a loop."""
@@ -43,7 +43,7 @@ class TableDataset(Dataset):
 
     def search(self, block, free):
         """Return the search over the points."""
-        return TableSearch(block, self.records, self.held, free)
+        return TableSearch(block, self.records, self.validation, free)
 
     def plan(self, diagnosis, models, names, **limits):
         """Return the sines, one after another, at which the models' N differ most."""

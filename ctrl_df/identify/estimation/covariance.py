@@ -8,19 +8,19 @@ import numpy as np
 
 from .multiple_shooting import Problem
 from .noise_model import noise_model
-from .sensitivity import Tangent
+from .sensitivity import OutputSensitivity
 
 MANY = 50
 """Windows of a record from which on they tell how their errors go on from one to the next."""
 
 
-def covariance_of(problem: Problem, tangent: Tangent, jp, js):
+def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     """Return the covariance of the scaled parameters and the directions the data do not determine.
 
     The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
     H^-1, Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost
-    degrees of freedom are given back. Errors that go on from one of many windows into the next (forces that
-    wander, whose trace in position every fitted start cuts off) are seen from the scores of the windows.
+    degrees of freedom are given back. Errors that go on from one of many segments into the next (forces that
+    wander, whose trace in position every fitted start cuts off) are seen from the scores of the segments.
 
     Returns
     -------
@@ -47,17 +47,17 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
     inverse = (vectors / np.maximum(eigen, 1e-12 * top)) @ vectors.T / np.outer(size, size)
     middle = np.zeros_like(h)
     for k, e in enumerate(residual):
-        e, columns = problem.weighed(k, e), tangent.parameters[k]
-        if problem.colour is None and len(problem.windows[k]) >= MANY:
-            scores = np.array([columns[w].T @ e[w] for w in problem.windows[k].slices])
+        e, columns = problem.weighed(k, e), sensitivity.parameters[k]
+        if problem.error_filter is None and len(problem.segments[k]) >= MANY:
+            scores = np.array([columns[w].T @ e[w] for w in problem.segments[k].slices])
             middle += _long_run(scores)
             continue
         n = len(e)
-        lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.windows[k])
+        lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.segments[k])
         length = 1 << (n - 1).bit_length()
         transform = np.fft.rfft(columns, length, axis=0)
         omega = np.linspace(0, math.pi, transform.shape[0])
-        floor = problem.noise**2 if problem.colour is None else float(np.mean(e * e))
+        floor = problem.noise**2 if problem.error_filter is None else float(np.mean(e * e))
         density = noise_model(e).spectrum(omega) + 1e-6 * floor
         double = np.full(len(omega), 2.0)
         double[0] = double[-1] = 1.0
@@ -68,7 +68,7 @@ def covariance_of(problem: Problem, tangent: Tangent, jp, js):
 
 
 def _long_run(scores) -> np.ndarray:
-    """Return the covariance (p, p) of the sum of scores (nw, p) of windows that follow each other."""
+    """Return the covariance (p, p) of the sum of scores (nw, p) of segments that follow each other."""
     n = len(scores)
     reach, total = round(2 * n ** (1 / 3)), scores.T @ scores
     for lag in range(1, reach + 1):

@@ -1,8 +1,8 @@
-"""Initial states of a window: what the data say of them, corrected by what a fit finds, and back.
+"""Initial states of a segment: what the data say of them, corrected by what a fit finds, and back.
 
 Position and speed of the body that is measured are estimated from the record; the corrections of these, and
 all that is hidden (where the other body stands in a gap, how far a joint or the bristles are bent), are
-nuisance parameters of each window.
+nuisance parameters of each segment.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from ...blocks.effect import Effect
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
 
-FITTED, CHAINED, MEASURED = "fitted", "chained", "measured"
-"""How windows begin: every state is fitted, window by window; all but those that settle are, which go on from
-one window into the next; none is: windows begin as the record says, and what is hidden goes on.
+FREE, CONTINUED, MEASURED = "fitted", "chained", "measured"
+"""How segments begin: every state is fitted, segment by segment; all but those that settle are, which go on
+from one segment into the next; none is: segments begin as the record says, and what is hidden goes on.
 """
 
 
@@ -41,27 +41,27 @@ def settling(core) -> frozenset[str]:
 
 
 def fitted_names(core, begins: str) -> tuple[str, ...]:
-    """Return the names of those that are fitted where windows begin so."""
+    """Return the names of those that are fitted where segments begin so."""
     if begins == MEASURED:
         return ()
-    return tuple(n for n in names(core) if begins == FITTED or n not in settling(core))
+    return tuple(n for n in names(core) if begins == FREE or n not in settling(core))
 
 
 def carried_names(core, begins: str) -> tuple[str, ...]:
-    """Return the names of those that go on from one window into the next."""
+    """Return the names of those that go on from one segment into the next."""
     fitted = fitted_names(core, begins)
     return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
 
 
-def reach(which, core, known, windows) -> np.ndarray:
+def reach(which, core, known, segments) -> np.ndarray:
     """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
 
     `known`: `windows.facts` of the record.
     """
-    one = np.ones(len(windows))
+    one = np.ones(len(segments))
     table = {
-        "x": 5 * windows.x_error + 0.02 * known.spread,
-        "v": 2 * windows.v_error + 0.01 * known.speed,
+        "x": 5 * segments.x_error + 0.02 * known.spread,
+        "v": 2 * segments.v_error + 0.01 * known.speed,
         "slack": one,
         "slack_rate": 0.7 * known.speed * one,
     } | {name: 0.5 * one for name, _, _ in _inner(core)}
@@ -74,7 +74,7 @@ def reach(which, core, known, windows) -> np.ndarray:
 
 
 def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
-    """Write the states (nw, nx) of a mechanism at the begin of windows.
+    """Write the states (nw, nx) of a mechanism at the begin of segments.
 
     `usual`: positions, speeds and accelerations (nw,) of the body measured; `given`: corrections by name,
     each (nw,) or one number; `speed` [m/s] is typical of the record.

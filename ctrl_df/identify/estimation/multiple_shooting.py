@@ -1,8 +1,8 @@
 """Simulation-error least squares by multiple shooting.
 
-Each window of each record starts from a state of its own. Those states enter linearly near the solution; they
-are eliminated window by window from the normal equations (variable projection), so that the work grows with
-the number of parameters only. Steps are Levenberg-Marquardt, bounds are kept by projection, outliers are
+Each segment of each record starts from a state of its own. Those states enter linearly near the solution;
+they are eliminated segment by segment from the normal equations (variable projection), so that the work grows
+with the number of parameters only. Steps are Levenberg-Marquardt, bounds are kept by projection, outliers are
 bent to Huber's loss once the fit is near. Derivatives are differences of a size that moves the output by
 about the noise: far above the roughness that events leave in the cost.
 """
@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..thresholds import GOOD
-from .initial_states import FITTED
+from .initial_states import FREE
 from .noise_model import power
-from .restarts import rescue, scan_slack
-from .segments import Windows, facts
-from .sensitivity import Tangent
+from .restarts import restart_segments, scan_gap_state
+from .segments import Segments, facts
+from .sensitivity import OutputSensitivity
 from .simulator import Simulator, feasible
 from .variables import step_of_sensor, variables_of
 
@@ -27,17 +27,25 @@ Signals = list[np.ndarray]
 
 
 class Problem:
-    """Records, windows and free parameters of one fit.
+    """Records, segments and free parameters of one fit.
 
-    Call `stage` to set the windows, then `solve`; afterwards `last` holds the residuals, `nuisance` the
+    Call `stage` to set the segments, then `solve`; afterwards `last` holds the residuals, `nuisance` the
     initial states, `slopes` the derivatives of the last step.
     """
 
     def __init__(
-        self, model, records, names, budget, limits=None, colour=None, begins=FITTED, hopeless=(math.inf, 0)
+        self,
+        model,
+        records,
+        names,
+        budget,
+        limits=None,
+        error_filter=None,
+        begins=FREE,
+        hopeless=(math.inf, 0),
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
-        self.colour, self.begins = colour, begins
+        self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
         self.known = [facts(r) for r in records]
         self.block = Simulator(model, records[0]).block
@@ -46,7 +54,7 @@ class Problem:
         self.nfev = 0
         self.converged = False
         self.simulators: list[Simulator] = []
-        self.windows: list[Windows] = []
+        self.segments: list[Segments] = []
         self.measured: Signals = []
         self.nuisance: list[np.ndarray] = []
         self.priors: list[np.ndarray] = []
@@ -64,12 +72,12 @@ class Problem:
         given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
         return feasible(self.block, given) if given else None
 
-    def stage(self, windows: list[Windows], thin, starts=None):
-        """Set the windows; initial states begin at `starts` (corrections) or at what the data say."""
+    def stage(self, segments: list[Segments], thin, starts=None):
+        """Set the segments; initial states begin at `starts` (corrections) or at what the data say."""
         self.simulators = [Simulator(self.model, r, thin=thin, begins=self.begins) for r in self.records]
-        self.windows = windows
-        self.measured = [r.y[w.samples] for r, w in zip(self.records, windows, strict=True)]
-        self.priors = [s.priors(w) for s, w in zip(self.simulators, windows, strict=True)]
+        self.segments = segments
+        self.measured = [r.y[w.samples] for r, w in zip(self.records, segments, strict=True)]
+        self.priors = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
         if starts is not None:
             # those of a fit of more states: the first of them are the same
             starts = [a[:, : p.shape[1]] for a, p in zip(starts, self.priors, strict=True)]
@@ -82,20 +90,20 @@ class Problem:
             self.nuisance = [np.array(a) for a in starts]  # type: ignore[union-attr]
             # Starts that a fit before has found stay within reach.
             self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
-        self.widest = [3 * p for p in self.priors]  # where a start was lost
+        self.widest = [3 * p for p in self.priors]  # where a start was far off
 
     def simulate(self, theta, nuisance) -> Signals:
-        """Return the outputs within the windows."""
+        """Return the outputs within the segments."""
         self.nfev += 1
         values = self.values(theta)
-        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.windows, nuisance, strict=True)]
+        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.segments, nuisance, strict=True)]
 
     def round(self, theta):
         """Let an encoder of the model round the solution's outputs (fits leave it out: it has no slope)."""
         if step_of_sensor(self.block) is None:
             return
         values = self.values(theta)
-        runs = zip(self.simulators, self.windows, self.nuisance, self.measured, strict=True)
+        runs = zip(self.simulators, self.segments, self.nuisance, self.measured, strict=True)
         self.last = [m - s.run(w, values, a, rounded=True) for s, w, a, m in runs]
 
     def residual(self, theta, nuisance) -> Signals:
@@ -104,7 +112,7 @@ class Problem:
 
     def cost(self, residual, nuisance, weights) -> float:
         """Return half the weighted sum of squares, initial states weighed by what is known of them."""
-        if self.colour is not None:
+        if self.error_filter is not None:
             return 0.5 * power([self.weighed(k, r) for k, r in enumerate(residual)])
         total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
         known = sum(
@@ -116,7 +124,7 @@ class Problem:
 
     def weighed(self, k, x) -> np.ndarray:
         """Return what the cost sees of signals (n,) or (n, m) of one record."""
-        return x if self.colour is None else self.colour.seen(x, self.windows[k].slices)
+        return x if self.error_filter is None else self.error_filter.filtered(x, self.segments[k].slices)
 
     def power(self, signals: Signals) -> tuple[float, int]:
         """Return the sum of squares of what the cost sees of signals, and of how many values."""
@@ -126,7 +134,7 @@ class Problem:
     @property
     def unit(self) -> float:
         """Unit of what the cost sees: accelerations make second differences of their step squared."""
-        return 1.0 if self.colour is None else (self.colour.step * self.known[0].dt) ** 2
+        return 1.0 if self.error_filter is None else (self.error_filter.step * self.known[0].dt) ** 2
 
     def means(self):
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
@@ -136,69 +144,69 @@ class Problem:
                 mean[:, simulator.nuisances.index("slack")] = 0.5
         return means
 
-    def tangent(self) -> Tangent:
+    def sensitivity(self) -> OutputSensitivity:
         """Return the linear map about the last step of `solve`."""
         assert self.slopes is not None
         ridge = [self.noise**2 / p**2 for p in self.priors]
-        return Tangent(*self.slopes, self.windows, ridge, self.colour)
+        return OutputSensitivity(*self.slopes, self.segments, ridge, self.error_filter)
 
     # --- solving --------------------------------------------------------------------------------------
 
     def solve(self, theta, iterations, tolerance, robust):
         """Levenberg-Marquardt from `theta`; the initial states go along."""
         if self.fresh:
-            scan_slack(self, theta)
+            scan_gap_state(self, theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
         again = max(iterations // 2, 3)
-        # without parameters a window found lets the next one go on where it ends
+        # without parameters a segment found lets the next one go on where it ends
         for _ in range(1 if self.names else 4):
-            if not self._worth_a_rescue() or not rescue(self, theta):
+            if not self._worth_restarting() or not restart_segments(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
         rough = any(e.nonsmooth for e in getattr(self.block, "effects", ()))
-        rough = rough and self.names and self.colour is None
+        rough = rough and self.names and self.error_filter is None
         if (
             rough
-            and self._worth_a_rescue()
+            and self._worth_restarting()
             and self.nfev < self.budget
             and any(t.min() < 0.5 for t in self._trusts())
         ):
-            theta = self._without_the_lost(theta, again, tolerance, robust)
+            theta = self._without_outliers(theta, again, tolerance, robust)
         return theta
 
-    def _without_the_lost(self, theta, iterations, tolerance, robust):
-        """Let the windows that fit decide the parameters, then find where the others begin.
+    def _without_outliers(self, theta, iterations, tolerance, robust):
+        """Let the segments that fit decide the parameters, then find where the others begin.
 
-        A window whose start lies in a wrong valley pulls the parameters to where it can never leave that
-        valley. What is better is kept.
+        A segment whose start lies in a wrong minimum pulls the parameters to where it can never leave that
+        minimum. What is better is kept.
         """
         kept = theta, self.nuisance, self.last, self.slopes, self.converged
         trial = self._descend(theta, iterations, tolerance, robust, self._trusts())
-        rescue(self, trial)
+        restart_segments(self, trial)
         trial = self._descend(trial, iterations, tolerance, robust)
         if power(self.last) < power(kept[2]):
             return trial
         theta, self.nuisance, self.last, self.slopes, self.converged = kept
         return theta
 
-    def _worth_a_rescue(self) -> bool:
-        """Whether the error could come below what is hopeless if all windows erred like the good ones."""
-        if self.colour is not None or math.isinf(self.hopeless):
+    def _worth_restarting(self) -> bool:
+        """Whether the error could come below what is hopeless if all segments erred like the good ones."""
+        if self.error_filter is not None or math.isinf(self.hopeless):
             return True
-        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.windows, self.last, strict=True)]
+        rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, self.last, strict=True)]
         return float(np.quantile(np.concatenate(rms), GOOD)) < self.hopeless
 
     def _trusts(self) -> Signals:
-        """Return weights of the samples (n,): 1 in windows that err like the rest, less in worse ones."""
+        """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""
         trusts = []
-        for windows, e in zip(self.windows, self.last, strict=True):
-            power = windows.means(e**2)
+        for segments, e in zip(self.segments, self.last, strict=True):
+            power = segments.means(e**2)
             usual = max(float(np.median(power)), self.noise**2)
             trusts.append(
                 np.repeat(
                     np.minimum(1.0, (2 * usual / np.maximum(power, usual)) ** 2),
-                    windows.ends - windows.begins,
+                    segments.ends - segments.begins,
                 )
             )
         return trusts
@@ -263,10 +271,10 @@ class Problem:
         moved: list[Signals] = [[] for _ in thetas]
         by_start = []
         for k, simulator in enumerate(self.simulators):
-            asked = [(self.windows[k], self.values(q), nuisance[k]) for q in thetas]
+            asked = [(self.segments[k], self.values(q), nuisance[k]) for q in thetas]
             starts, widths = self._moved_starts(k, nuisance)
             values = self.values(theta)
-            asked += [(self.windows[k], values, start) for start in starts if start is not None]
+            asked += [(self.segments[k], values, start) for start in starts if start is not None]
             signals = simulator.run_all(asked)
             for found, y in zip(moved, signals, strict=False):
                 found.append(y)
@@ -309,10 +317,10 @@ class Problem:
 
     def _moved_starts(self, k, nuisance):
         """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
-        simulator, windows = self.simulators[k], self.windows[k]
+        simulator, segments = self.simulators[k], self.segments[k]
         starts, widths = [], []
         for j, name in enumerate(simulator.nuisances):
-            if name == "x" and not simulator.tied:
+            if name == "x" and not simulator.position_dependent:
                 starts.append(None)
                 widths.append(None)
                 continue
@@ -324,11 +332,11 @@ class Problem:
             sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             moved[:, j] += sign * size
             starts.append(moved)
-            widths.append(np.repeat(sign * size, windows.ends - windows.begins))
+            widths.append(np.repeat(sign * size, segments.ends - segments.begins))
         return starts, widths
 
     def _by_start(self, k, starts, widths, signals, base) -> np.ndarray:
-        """Return derivatives (n, ns) of one record's output by its initial states, all windows at once."""
+        """Return derivatives (n, ns) of one record's output by its initial states, all segments at once."""
         rows, moved = [], iter(signals)
         for start, width in zip(starts, widths, strict=True):
             rows.append(np.ones(len(base)) if start is None else (next(moved) - base) / width)
@@ -340,13 +348,13 @@ class Problem:
         p = len(self.names)
         h, g, pieces = np.zeros((p, p)), np.zeros(p), []
         prior, means = self.noise**2, self.means()
-        for k, windows in enumerate(self.windows):
-            if self.colour is not None:
+        for k, segments in enumerate(self.segments):
+            if self.error_filter is not None:
                 a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
                 h += a.T @ a
                 g += a.T @ r
                 continue
-            products = _by_window(js[k], jp[k], residual[k], weights[k], windows)
+            products = _by_segment(js[k], jp[k], residual[k], weights[k], segments)
             ns = js[k].shape[1]
             h += products[:, ns:-1, ns:-1].sum(axis=0)
             g += products[:, ns:-1, -1].sum(axis=0)
@@ -357,7 +365,9 @@ class Problem:
                 ss[:, i, i] += precision
                 ss[:, i, i] *= 1 + damping
                 right[:, :, -1] -= precision * (nuisance[k] - means[k])
-                solved = np.linalg.solve(ss, right)
+                # of one size, whatever the units: pivots are then chosen alike
+                size = np.sqrt(ss[:, i, i])[:, :, None]
+                solved = np.linalg.solve(ss / (size * size.transpose(0, 2, 1)), right / size) / size
                 h -= np.einsum("wsi,wsj->ij", right[:, :, :p], solved[:, :, :p])
                 g -= np.einsum("wsi,ws->i", right[:, :, :p], solved[:, :, p])
                 pieces.append((k, solved))
@@ -367,7 +377,7 @@ class Problem:
             for k, solved in pieces:
                 limit = 3 * self.priors[k]
                 there = moved[k] + solved[:, :, p] - solved[:, :, :p] @ step
-                # The data say where a window begins: the start is no parameter to hide the model's faults in.
+                # The data say where a segment begins: its start must not hide the faults of the model.
                 moved[k] = np.clip(there, means[k] - limit, means[k] + limit)
             for k, simulator in enumerate(self.simulators):
                 if "slack" in simulator.nuisances:
@@ -414,12 +424,12 @@ class Problem:
         return step / max(largest, 1.0)
 
 
-def _by_window(states, parameters, residual, weights, windows: Windows) -> np.ndarray:
-    """Return Z' W Z of every window, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
+def _by_segment(states, parameters, residual, weights, segments: Segments) -> np.ndarray:
+    """Return Z' W Z of every segment, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
     z = np.column_stack((states, parameters, residual))
     weighted = z * weights[:, None]
-    begins = np.concatenate(([0], np.cumsum(windows.ends - windows.begins)[:-1]))
-    products = np.empty((len(windows), z.shape[1], z.shape[1]))
+    begins = np.concatenate(([0], np.cumsum(segments.ends - segments.begins)[:-1]))
+    products = np.empty((len(segments), z.shape[1], z.shape[1]))
     for i in range(z.shape[1]):
         column = np.add.reduceat(weighted[:, i:] * z[:, i : i + 1], begins, axis=0)
         products[:, i, i:] = products[:, i:, i] = column

@@ -1,7 +1,7 @@
-"""Laws with events make the cost rough: a fit is begun again from either side of where it ended.
+"""Laws with events make the cost nonsmooth: a fit is begun again from either side of where it ended.
 
 An impact more or less, a mass that sticks or breaks away: each changes the output by a jump, so that the
-cost over a gap, a restitution or a static level has many valleys side by side. The next ones are a hop
+cost over a gap, a restitution or a static level has many minima side by side. The next ones are a step
 away.
 """
 
@@ -26,38 +26,38 @@ from ..thresholds import (
     STATIC_FACTORS,
     STILL_POSSIBLE,
 )
-from .candidate import Candidate
 from .common_friction import dry_level
+from .fit import FitResult
+from .segmented import CandidateFit, SegmentedData
 from .simulator import feasible
-from .trial import Data, Trial
 
 
-def rough(found: Candidate) -> list[str]:
-    """Return the free parameters over which the cost has many valleys."""
+def nonsmooth_names(found: FitResult) -> list[str]:
+    """Return the free parameters over which the cost has many minima."""
     effects = found.model.named_effects
     return [n for n in found.names if "." in n and effects[n.partition(".")[0]].nonsmooth]
 
 
-def own(found: Candidate) -> list[str]:
-    """Return the rough parameters of the last effect of a model."""
+def own(found: FitResult) -> list[str]:
+    """Return those parameters of the last effect of a model."""
     last = found.model.newest + "."
-    return [name for name in rough(found) if name.startswith(last)]
+    return [name for name in nonsmooth_names(found) if name.startswith(last)]
 
 
-def hopped(
-    found: Candidate, fit: Callable[..., Candidate], names: list[str], hopeless: float = math.inf
-) -> Candidate:
-    """Return the best of the fits that begin beside `found`, one rough parameter moved at a time; or itself.
+def restarted(
+    found: FitResult, fit: Callable[..., FitResult], names: list[str], hopeless: float = math.inf
+) -> FitResult:
+    """Return the best of the fits that begin beside `found`, one such parameter moved at a time; or itself.
 
     Parameters
     ----------
-    found : Candidate
+    found : FitResult
     fit : callable
-        ``fit(model, names, starts=, iterations=, hopeless=)`` over the windows of `found`.
+        ``fit(model, names, starts=, iterations=, hopeless=)`` over the segments of `found`.
     names : list of str
         Parameters to move.
     hopeless : float
-        Error above which a valley is of no use.
+        Error above which a minimum is of no use.
     """
     queue = [(name, 0) for name in names]
     for name, times in queue:
@@ -78,29 +78,31 @@ def hopped(
     return found
 
 
-def beyond(found: Candidate, least: float) -> float:
-    """Return the error above which other valleys of a fit are of no use; `least`: that of the best fit.
+def beyond(found: FitResult, least: float) -> float:
+    """Return the error above which other minima of a fit are of no use; `least`: that of the best fit.
 
     The best one itself tries all of them to their end.
     """
     return STILL_POSSIBLE * least if found.rmse > least else math.inf
 
 
-def _on(begun: Candidate, fit, names, hopeless) -> Candidate:
+def _on(begun: FitResult, fit, names, hopeless) -> FitResult:
     return fit(begun.model, names, starts=begun.starts, iterations=4, hopeless=hopeless)
 
 
-def all_hopped(fits, data: Data, floor: float) -> list:
-    """Return fits in their best valleys: those that are neither at the floor nor far behind the best.
+def all_restarted(fits, data: SegmentedData, floor: float) -> list:
+    """Return fits in their best minima: those that are neither at the floor nor far behind the best.
 
-    The first is the baseline. If it was in its best valley, so are the others in what they share with it.
+    The first is the baseline. If it was in its best minimum, so are the others in what they share with it.
     """
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
     lost = [floor < f.rmse < HOPELESS * least for f in fits]
-    base = hopped(fits[0], data.fit, rough(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
-    values = {k: base.parameters[k] for k in rough(base)} if base is not fits[0] else {}
+    base = (
+        restarted(fits[0], data.fit, nonsmooth_names(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
+    )
+    values = {k: base.parameters[k] for k in nonsmooth_names(base)} if base is not fits[0] else {}
     others = side_by_side(
         lambda pair: _other(pair[0], data, values, beyond(pair[0], least)) if pair[1] else pair[0],
         zip(fits[1:], lost[1:], strict=True),
@@ -108,8 +110,8 @@ def all_hopped(fits, data: Data, floor: float) -> list:
     return [base, *others]
 
 
-def _other(found: Candidate, data: Data, values, hopeless: float) -> Candidate:
-    """Return a fit in its best valley; `values`: of what it shares with the baseline, if that has hopped."""
+def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> FitResult:
+    """Return a fit in its best minimum; `values`: of what it shares with a baseline that was restarted."""
     table = found.model.parameters
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
@@ -117,14 +119,14 @@ def _other(found: Candidate, data: Data, values, hopeless: float) -> Candidate:
         near = data.fit(model, (), starts=found.starts, iterations=4, hopeless=hopeless)
         again = data.fit(model, found.names, starts=near.starts, iterations=6, hopeless=hopeless)
         found = min(found, again, key=lambda f: f.rmse)
-    return hopped(found, data.fit, own(found), hopeless)
+    return restarted(found, data.fit, own(found), hopeless)
 
 
-def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
+def cross_started(tried: CandidateFit, best: CandidateFit, data: SegmentedData) -> CandidateFit | None:
     """Fit a candidate again from where the best one ended, of which it may be a limit.
 
-    Stiction is that of a narrow Stribeck bump. The cost of stick and slip is rough: of two fits of one law
-    each may end in its own valley.
+    Stiction is that of a narrow Stribeck bump. The cost of stick and slip is nonsmooth: of two fits of one
+    law each may end in its own minimum.
     """
     table, mine, its = tried.block.parameters, tried.block.newest, best.block.newest
     values = {}
@@ -140,19 +142,19 @@ def begun_at(tried: Trial, best: Trial, data: Data) -> Trial | None:
     if near.rmse > HOPELESS * best.train.rmse:
         return None
     fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
-    return settled(data.judged(replace(tried, train=fitted)), data)
+    return thresholds_refined(data.validate(replace(tried, train=fitted)), data)
 
 
-def settled(tried: Trial, data: Data) -> Trial:
-    """Choose thresholds by the windows to be judged by, within what the windows fitted leave open."""
+def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
+    """Choose thresholds by the segments to validate on, within what the segments fitted leave open."""
     table = tried.block.parameters
     for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = _open_range(tried.train, data.fit, name)
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, 7)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
-            i = min(range(len(runs)), key=lambda k: runs[k].held_rmse)
-            if runs[i].held_rmse < tried.held_rmse:
+            i = min(range(len(runs)), key=lambda k: runs[k].validation_rmse)
+            if runs[i].validation_rmse < tried.validation_rmse:
                 tried = runs[i]
             low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
         tried = replace(
@@ -161,13 +163,13 @@ def settled(tried: Trial, data: Data) -> Trial:
     return tried
 
 
-def _with_level(tried: Trial, name, value, data: Data) -> Trial:
+def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> CandidateFit:
     block = _moved(tried.block, name, value)
-    return data.judged(replace(tried, train=replace(tried.train, model=block)))
+    return data.validate(replace(tried, train=replace(tried.train, model=block)))
 
 
-def _open_range(found: Candidate, fit: Callable[..., Candidate], name: str) -> tuple[float, float]:
-    """Return the least and the largest value of a threshold for which the windows fitted are the same."""
+def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> tuple[float, float]:
+    """Return the least and the largest value of a threshold for which the segments fitted are the same."""
     at, edges = found.parameters[name], []
     for sign in (-1, 1):
         edge = at

@@ -1,6 +1,6 @@
 """Noise of any colour: an autoregressive model of residuals, and what is left of them once it is taken out.
 
-Residuals come in pieces, one a window: each begins from an initial state of its own, so nothing ties the
+Residuals come in pieces, one a segment: each begins from an initial state of its own, so nothing ties the
 last sample of one to the first of the next.
 """
 
@@ -40,19 +40,19 @@ class NoiseModel:
             return x
         return np.asarray(lfilter(np.concatenate(([1.0], -self.a)), [1.0], x, axis=0))
 
-    def seen(self, x, windows) -> np.ndarray:
+    def filtered(self, x, segments) -> np.ndarray:
         """Return what counts of signals (n,) or (n, m) that begin anew in each of `windows` (slices).
 
-        The mean of every `step` samples, whitened; values that would mix two windows are left out.
+        The mean of every `step` samples, whitened; values that would mix two segments are left out.
         """
-        blocks, begins = averaged(x, windows, self.step)
+        blocks, begins = averaged(x, segments, self.step)
         age = np.arange(len(blocks)) - np.repeat(begins, np.diff([*begins, len(blocks)]))
         return self.whiten(blocks)[age >= self.order]
 
-    def rows(self, windows) -> np.ndarray:
+    def rows(self, segments) -> np.ndarray:
         """Return the sample in the middle of each value that `seen` returns of signals within `windows`."""
         found = []
-        for w in windows:
+        for w in segments:
             values = np.arange(self.order, (w.stop - w.start) // self.step)
             # a filter of k values is about the middle one
             found.append(w.start + ((values - 0.5 * self.order + 0.5) * self.step).astype(int))
@@ -124,43 +124,43 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseMode
     return NoiseModel(best[1], math.sqrt(best[2]))
 
 
-def averaged(x, windows, step: int) -> tuple[np.ndarray, np.ndarray]:
+def averaged(x, segments, step: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the means of every `step` samples within each of `windows` (slices), and where each begins."""
     x = np.asarray(x, dtype=float)
-    counts = [(w.stop - w.start) // step for w in windows]
+    counts = [(w.stop - w.start) // step for w in segments]
     begins = np.cumsum([0, *counts[:-1]])
     if step == 1:
         return x, begins
-    parts = [x[w.start : w.start + n * step] for w, n in zip(windows, counts, strict=True)]
+    parts = [x[w.start : w.start + n * step] for w, n in zip(segments, counts, strict=True)]
     means = [p.reshape(n, step, *x.shape[1:]).mean(axis=1) for p, n in zip(parts, counts, strict=True)]
     return np.concatenate(means), begins
 
 
-def force_errors(step: int) -> NoiseModel:
+def second_difference_filter(step: int) -> NoiseModel:
     """Return the filter that makes accelerations of residuals in position: their second differences.
 
-    Where wandering forces, integrated twice, make the residuals, their slow parts are the largest and tell
+    Where disturbance forces, integrated twice, make the residuals, their slow parts are the largest and tell
     the least; the forces themselves are level over the frequencies at which machines move. `step`: samples a
     value; what is faster than twice that does not count.
     """
     return NoiseModel(np.array([2.0, -1.0]), 1.0, step)
 
 
-def whitener(pieces: Pieces, plain: NoiseModel | None = None) -> NoiseModel:
+def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None) -> NoiseModel:
     """Return the noise model that evidence is judged by.
 
-    Of the longest record; `plain`: the `force_errors` that fits see, then of these in all windows.
+    Of the longest record; `plain`: the `second_difference_filter` of fits, then of these in all segments.
     """
     if plain is None:
         return noise_model(max(pieces, key=len), max_order=12)
-    left = noise_model([plain.seen(r, [slice(0, len(r))]) for r in pieces], max_order=4)
+    left = noise_model([plain.filtered(r, [slice(0, len(r))]) for r in pieces], max_order=4)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
     return NoiseModel(-both[1:], left.sigma, plain.step)
 
 
 def whitened_power(pieces: Pieces, noise: NoiseModel) -> tuple[float, int]:
     """Return the sum of squares of the whitened residuals, and their number."""
-    white = [noise.seen(r, [slice(0, len(r))]) for r in pieces]
+    white = [noise.filtered(r, [slice(0, len(r))]) for r in pieces]
     return power(white), sum(map(len, white))
 
 

@@ -22,7 +22,7 @@ REFERENCE = ("reference", "r")
 
 
 @dataclass
-class Ready:
+class PreparedModel:
     """An engine, what drives it, and what acts outside of it."""
 
     engine: Engine
@@ -36,22 +36,22 @@ class Ready:
     hold: str = ""  # between the values of the drive; as recorded if not said
 
 
-def of_system(system, record, u) -> Ready:
+def of_system(system, record, u) -> PreparedModel:
     """Return a system of which nothing is known, driven by the input `u` (n,)."""
-    return Ready(Engine(system), None, 0, *_before(record, record.t, u))
+    return PreparedModel(Engine(system), None, 0, *_before(record, record.t, u))
 
 
-def of_loop(loop, record, u, mechanism: bool) -> Ready:
+def of_loop(loop, record, u, mechanism: bool) -> PreparedModel:
     """Return a loop, driven by the record's reference, or by `u` where it has none."""
     channels = record.channels or {}
     reference = next((channels[k] for k in REFERENCE if k in channels), u)
     block = loop.parts.block
     offset = (loop.nstates or 0) - (block.nstates or 0)
     core = block.core if mechanism else None
-    return Ready(Engine(loop), core, offset, *_before(record, record.t, reference))
+    return PreparedModel(Engine(loop), core, offset, *_before(record, record.t, reference))
 
 
-def of_block(block, record, u, thin: int) -> Ready:
+def of_block(block, record, u, thin: int) -> PreparedModel:
     """Return a mechanism, driven by the input `u` (n,) in steps of `thin` samples."""
     t, held, static = record.t, u, record.input_hold == "zoh"
     outside, input_delay = [], 0.0
@@ -89,7 +89,7 @@ def of_block(block, record, u, thin: int) -> Ready:
         time, value, hold = _thinned(record, held, thin)
     time, value = _before(record, time, value)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
-    return Ready(
+    return PreparedModel(
         Engine(inner), inner.core, 0, time + input_delay, value, float(sum(delays)), output, lags, hold
     )
 

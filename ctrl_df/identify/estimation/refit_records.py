@@ -1,4 +1,4 @@
-"""A refit to records: short windows first, restarted where the cost is rough, then those that blur least."""
+"""A refit to records: short segments first, then those that blur least, restarted where minima are many."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
-from .candidate import Candidate, fit_candidate, fit_windows
-from .multistart import hopped, rough
+from .fit import FitResult, fit_records, fit_segments
+from .multistart import nonsmooth_names, restarted
+from .segmented import short_segment
 from .simulator import Simulator
-from .trial import brief_window
 from .variables import step_of_sensor
 
 
 def refit_records(
     model, records, names, start, *, whole, mode, window, robust, budget
-) -> tuple[Candidate, Candidate]:
-    """Return the fit, and the one whose windows and initial states the comparison is to show.
+) -> tuple[FitResult, FitResult]:
+    """Return the fit, and the one whose segments and initial states the comparison is to show.
 
     Parameters
     ----------
@@ -38,41 +38,41 @@ def refit_records(
     settings: dict[str, Any] = dict(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
     )
-    found = fit_candidate(model, records, start, names, coarse=start is None, iterations=40, **settings)
+    found = fit_records(model, records, start, names, coarse=start is None, iterations=40, **settings)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
-        brief = brief_window(found.model, records)
+        brief = short_segment(found.model, records)
         if brief is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
             settings["window"] = brief
-            # from the start again: longer windows may have left the right valley (of a ripple, say)
-            found = fit_candidate(model, records, start, names, coarse=False, iterations=40, **settings)
-    if rough(found):
-        better = hopped(found, _Beside(records, found.windows), rough(found))
+            # from the start again: longer segments may have left the right minimum (of a ripple, say)
+            found = fit_records(model, records, start, names, coarse=False, iterations=40, **settings)
+    if nonsmooth_names(found):
+        better = restarted(found, _Beside(records, found.segments), nonsmooth_names(found))
         if better is not found:
-            found = fit_candidate(
+            found = fit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
             )
     found = _with_step(found, records, names, whole)
-    # a model that errs over brief windows of its own fit would look better than it is
-    seen = found if shown is None else fit_candidate(found.model, records, None, (), **shown)
+    # a model that errs over brief segments of its own fit would look better than it is
+    seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
 
 
 class _Beside:
-    """Fits over the windows of a refit, at the full rate."""
+    """Fits over the segments of a refit, at the full rate."""
 
-    def __init__(self, records, windows):
-        self.records, self.windows = records, windows
+    def __init__(self, records, segments):
+        self.records, self.segments = records, segments
 
-    def __call__(self, model, names, *, starts, iterations, hopeless) -> Candidate:
-        return fit_windows(
-            model, self.records, self.windows, names, thin=1, starts=starts, iterations=iterations,
+    def __call__(self, model, names, *, starts, iterations, hopeless) -> FitResult:
+        return fit_segments(
+            model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
             hopeless=hopeless,
         )  # fmt: skip
 
 
-def _with_step(found: Candidate, records, names, whole) -> Candidate:
+def _with_step(found: FitResult, records, names, whole) -> FitResult:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
     first = Simulator(found.model, records[0])
     key = step_of_sensor(first.block)
@@ -84,7 +84,7 @@ def _with_step(found: Candidate, records, names, whole) -> Candidate:
     return replace(found, model=first.with_values({key: float(np.median(steps))}))
 
 
-def blurred(found: Candidate) -> set[str]:
+def blurred(found: FitResult) -> set[str]:
     """Return the parameters in a null direction, or uncertain by more than themselves."""
     names = set()
     for _, direction in found.null:
@@ -96,7 +96,7 @@ def blurred(found: Candidate) -> set[str]:
     return names
 
 
-def doubts(found: Candidate) -> tuple[str, ...]:
+def doubts(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every direction the data do not determine."""
     lines, named = [], set()
     for _, direction in found.null:

@@ -1,4 +1,4 @@
-"""Where windows begin: tries of initial states that a descent from the estimate does not reach.
+"""Where segments begin: tries of initial states that a descent from the estimate does not reach.
 
 `problem` is a `shooting.Problem`; what is found goes into its `nuisance`.
 """
@@ -12,27 +12,27 @@ import numpy as np
 from ..thresholds import GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS
 
 
-def rescue(problem, theta) -> bool:
-    """Try other starts where single windows err far more than the rest; whether any was better.
+def restart_segments(problem, theta) -> bool:
+    """Try other starts where single segments err far more than the rest; whether any was better.
 
-    Stick and slip make the error of a window a rough function of the speed it begins with, and so does a gap
-    of where in it and how fast the other body is: a start that is estimated badly may lie in another valley.
-    What the window before ends with is tried first.
+    Stick and slip make the error of a segment a nonsmooth function of the speed it begins with, and so does a
+    gap of where in it and how fast the other body is: a start that is estimated badly may lie in another
+    minimum. What the segment before ends with is tried first.
     """
     found, values = False, problem.values(theta)
     for k, simulator in enumerate(problem.simulators):
-        if "v" not in simulator.nuisances or simulator.chained:
+        if "v" not in simulator.nuisances or simulator.continued:
             continue
-        column, windows, starts = simulator.nuisances.index("v"), problem.windows[k], problem.nuisance[k]
-        rms = np.sqrt(windows.means(problem.last[k] ** 2))
+        column, segments, starts = simulator.nuisances.index("v"), problem.segments[k], problem.nuisance[k]
+        rms = np.sqrt(segments.means(problem.last[k] ** 2))
         bad = (rms > OUTLYING_SEGMENT * np.quantile(rms, GOOD)) & (rms > OUTLYING_NOISE * problem.noise)
         if not bad.any():
             continue
-        some = windows.only(bad)
+        some = segments.only(bad)
         measured, least = problem.records[k].y[some.samples], 0.7 * rms[bad] ** 2
         problem.priors[k][bad, column] = problem.widest[k][bad, column]
         reach, chosen = problem.priors[k][bad, column], starts[bad].copy()
-        before = simulator.carried_on(windows, values, starts)[bad]
+        before = simulator.carried_on(segments, values, starts)[bad]
         before = np.where(np.isfinite(before), before, starts[bad])
         tries: list[tuple[Any, Any]] = [
             (slice(None), before),
@@ -47,31 +47,31 @@ def rescue(problem, theta) -> bool:
             trial[:, which] = value
         for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
             e = measured - y
-            shift = np.zeros(len(some)) if simulator.tied else some.means(e)
+            shift = np.zeros(len(some)) if simulator.position_dependent else some.means(e)
             powers = some.means(e**2) - shift**2
             better = powers < least
             trial[:, 0] += shift
             chosen[better], least = trial[better], np.minimum(least, powers)
             found = found or bool(better.any())
         starts[bad] = chosen
-        problem.count(len(tries) * len(some) / len(windows))
+        problem.count(len(tries) * len(some) / len(segments))
     return found
 
 
-def scan_slack(problem, theta):
-    """Find where in its gap each window begins, and how fast it crosses it (the cost has several minima)."""
+def scan_gap_state(problem, theta):
+    """Find where in its gap each segment begins, and how fast it crosses it (the cost has several minima)."""
     for k, simulator in enumerate(problem.simulators):
         if "slack" not in simulator.nuisances:
             continue
         at = simulator.nuisances.index("slack")
-        windows, chosen = problem.windows[k], problem.nuisance[k].copy()
-        least, values, tries = np.full(len(windows), np.inf), problem.values(theta), _slacks(problem, k)
+        segments, chosen = problem.segments[k], problem.nuisance[k].copy()
+        least, values, tries = np.full(len(segments), np.inf), problem.values(theta), _slacks(problem, k)
         trials = [problem.nuisance[k].copy() for _ in tries]
         for trial, slack in zip(trials, tries, strict=True):
             trial[:, at : at + 2] = slack
-        for trial, y in zip(trials, simulator.run_all([(windows, values, t) for t in trials]), strict=True):
+        for trial, y in zip(trials, simulator.run_all([(segments, values, t) for t in trials]), strict=True):
             e = problem.measured[k] - y
-            errors = windows.means(e**2) - windows.means(e) ** 2
+            errors = segments.means(e**2) - segments.means(e) ** 2
             better = errors < least
             chosen[better], least = trial[better], np.minimum(least, errors)
         problem.nuisance[k] = chosen
@@ -79,7 +79,7 @@ def scan_slack(problem, theta):
 
 
 def _slacks(problem, k) -> list[tuple[float, float]]:
-    """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a window with."""
+    """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a segment with."""
     speed = problem.known[k].speed
     rates = [f * speed for f in (0.0, -0.2, 0.2, -0.7, 0.7)]
     return [(p, r) for p in (0.02, 0.25, 0.5, 0.75, 0.98) for r in rates]

@@ -1,4 +1,4 @@
-"""A record seen by a model: its scales, and the windows in which a simulation is started anew."""
+"""A record seen by a model: its scales, and the segments in which a simulation is started anew."""
 
 from __future__ import annotations
 
@@ -63,14 +63,14 @@ def _turns(y) -> int:
 
 
 @dataclass(frozen=True)
-class Windows:
+class Segments:
     """Parts of a record, and the state in which the data say each begins.
 
     Attributes
     ----------
     begins, ends : (nw,) integer arrays
-        First sample of each window and the one after its last; in order, without overlap. What lies between
-        windows is not simulated and does not count.
+        First sample of each segment and the one after its last; in order, without overlap. What lies between
+        segments is not simulated and does not count.
     x, v, a : (nw,) arrays
         Reported position [m], velocity [m/s], acceleration [m/s^2] at the first sample of each.
     x_error, v_error : (nw,) arrays
@@ -86,50 +86,50 @@ class Windows:
     v_error: np.ndarray
 
     def __len__(self) -> int:
-        """Return the number of windows."""
+        """Return the number of segments."""
         return len(self.x)
 
     @property
     def edges(self) -> np.ndarray:
-        """Sample numbers where windows begin, and the end of the last, (nw + 1,)."""
+        """Sample numbers where segments begin, and the end of the last, (nw + 1,)."""
         return np.append(self.begins, self.ends[-1])
 
     @cached_property
     def samples(self) -> np.ndarray:
-        """Numbers of the record's samples within the windows, (n,)."""
+        """Numbers of the record's samples within the segments, (n,)."""
         if np.array_equal(self.begins[1:], self.ends[:-1]):
             return np.arange(self.begins[0], self.ends[-1])
         return np.concatenate([np.arange(i, j) for i, j in zip(self.begins, self.ends, strict=True)])
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Each window as a slice of the samples within the windows."""
+        """Each segment as a slice of the samples within the segments."""
         at = np.concatenate(([0], np.cumsum(self.ends - self.begins)))
         return [slice(int(i), int(j)) for i, j in zip(at[:-1], at[1:], strict=True)]
 
     def means(self, x) -> np.ndarray:
-        """Return the mean over each window of a signal (n,) at the samples within the windows."""
+        """Return the mean over each segment of a signal (n,) at the samples within the segments."""
         lengths = self.ends - self.begins
         return np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1]))) / lengths
 
-    def only(self, which) -> Windows:
-        """Return some of the windows; `which` a boolean array (nw,)."""
-        return Windows(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+    def only(self, which) -> Segments:
+        """Return some of the segments; `which` a boolean array (nw,)."""
+        return Segments(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
-def usual_window(record: Measurement) -> float:
-    """Return a length of window [s] that shows two to-and-fro motions, 40 samples at least."""
+def usual_segment(record: Measurement) -> float:
+    """Return a length of segment [s] that shows two to-and-fro motions, 40 samples at least."""
     known = facts(record)
     return max(2 * known.swing, 40 * known.dt)
 
 
-def make_windows(record: Measurement, length: float | None = None) -> Windows:
-    """Cut a record into windows of about `length` [s] (None: one window) and estimate where each begins."""
+def make_segments(record: Measurement, length: float | None = None) -> Segments:
+    """Cut a record into segments of about `length` [s] (None: one segment) and estimate where each begins."""
     return cut(record, 1 if length is None else max(round(record.duration / length), 1))
 
 
-def cut(record: Measurement, count: int) -> Windows:
-    """Cut a record into `count` windows of equal time, of 20 samples at least."""
+def cut(record: Measurement, count: int) -> Segments:
+    """Cut a record into `count` segments of equal time, of 20 samples at least."""
     n = len(record)
     count = max(min(count, n // 20), 1)
     edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
@@ -138,20 +138,20 @@ def cut(record: Measurement, count: int) -> Windows:
     return _between(record, edges[:-1], edges[1:])
 
 
-def split(record: Measurement, windows: Windows, factor: int, least: int) -> Windows:
-    """Split each window into up to `factor` equal parts, none shorter than `least` samples."""
+def split(record: Measurement, segments: Segments, factor: int, least: int) -> Segments:
+    """Split each segment into up to `factor` equal parts, none shorter than `least` samples."""
     begins, ends = [], []
-    for i, j in zip(windows.begins, windows.ends, strict=True):
+    for i, j in zip(segments.begins, segments.ends, strict=True):
         edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
         begins.append(edges[:-1])
         ends.append(edges[1:])
     return _between(record, np.concatenate(begins), np.concatenate(ends))
 
 
-def _between(record, begins, ends) -> Windows:
+def _between(record, begins, ends) -> Segments:
     known = facts(record)
     rows = np.array([_local(record, int(i), known) for i in begins])
-    return Windows(begins, ends, *rows.T)
+    return Segments(begins, ends, *rows.T)
 
 
 def _local(record, i, known) -> tuple[float, float, float, float, float]:

@@ -7,22 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 
 
-class Tangent:
+class OutputSensitivity:
     """A fitted model as a linear map: what its parameters and initial states can change in the output.
 
     Parameters
     ----------
     parameters, states : list of (n, p) and (n, ns) arrays
-        Per record, derivatives of the output at the samples within the windows.
-    windows : list of Windows
+        Per record, derivatives of the output at the samples within the segments.
+    segments : list of Segments
     ridge : list of (nw, ns) arrays
         Precision of what is known of the initial states beforehand, in units of one sample.
-    colour : NoiseModel or None
+    error_filter : NoiseModel or None
         What fits see of the output, where that is not the output itself.
     """
 
-    def __init__(self, parameters, states, windows, ridge, colour=None):
-        self.states, self.windows, self.ridge, self.colour = states, windows, ridge, colour
+    def __init__(self, parameters, states, segments, ridge, error_filter=None):
+        self.states, self.segments, self.ridge, self.error_filter = states, segments, ridge, error_filter
         self.parameters = [self._without_starts(k, j) for k, j in enumerate(parameters)]
         stacked = np.concatenate(self.parameters)
         norms = np.linalg.norm(stacked, axis=0)
@@ -33,23 +33,26 @@ class Tangent:
     def _without_starts(self, k, columns):
         """Remove from the columns (n, m) of one record what its initial states can explain."""
         out = np.array(columns, dtype=float)
-        if self.colour is not None:
-            return self.colour.seen(out, self.windows[k].slices)
-        for w, where in enumerate(self.windows[k].slices):
+        if self.error_filter is not None:
+            return self.error_filter.filtered(out, self.segments[k].slices)
+        for w, where in enumerate(self.segments[k].slices):
             s = self.states[k][where]
             if s.shape[1]:
-                out[where] -= s @ np.linalg.solve(s.T @ s + np.diag(self.ridge[k][w]), s.T @ out[where])
+                normal = s.T @ s + np.diag(self.ridge[k][w])
+                size = np.sqrt(np.diag(normal))
+                weights = np.linalg.solve(normal / np.outer(size, size), (s.T @ out[where]) / size[:, None])
+                out[where] -= s @ (weights / size[:, None])
         return out
 
     @property
     def pieces(self) -> list[slice]:
-        """What `project` returns as evidence takes it: whole, or by windows where errors are of forces."""
-        if self.colour is None:
+        """What `project` returns as evidence takes it: whole, or by segments where errors are of forces."""
+        if self.error_filter is None:
             return [slice(0, sum(map(len, self.states)))]
         lengths = [
-            (w.stop - w.start) // self.colour.step - self.colour.order
-            for windows in self.windows
-            for w in windows.slices
+            (w.stop - w.start) // self.error_filter.step - self.error_filter.order
+            for segments in self.segments
+            for w in segments.slices
         ]
         ends = np.cumsum([0, *lengths])
         return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]

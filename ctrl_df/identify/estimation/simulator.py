@@ -1,4 +1,4 @@
-"""A model driven by a recorded input: whole, or window by window from initial states of its own."""
+"""A model driven by a recorded input: whole, or segment by segment from initial states of its own."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from ...simulate.loop import closed_loop
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from . import initial_states
-from .prepared import Ready, of_block, of_loop, of_system
-from .segments import Windows, facts
+from .prepared import PreparedModel, of_block, of_loop, of_system
+from .segments import Segments, facts
 
-Request = tuple[Windows, Mapping[str, float] | None, np.ndarray | None]
+Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
 
 _PREPARED = 4  # parameter sets whose models are kept ready
@@ -45,7 +45,7 @@ class Simulator:
     force : (n,) array or None
         Input in place of the recorded one.
     begins : str
-        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+        How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class Simulator:
         thin: int = 1,
         rtol: float = 1e-8,
         force: np.ndarray | None = None,
-        begins: str = initial_states.FITTED,
+        begins: str = initial_states.FREE,
     ):
         self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
         self.input = np.asarray(record.u if force is None else force)
@@ -77,15 +77,15 @@ class Simulator:
         self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
         self.facts = facts(record)
         self.runs = 0
-        self._prepared: dict[Any, Ready] = {}
+        self._prepared: dict[Any, PreparedModel] = {}
 
     @property
-    def tied(self) -> bool:
+    def position_dependent(self) -> bool:
         """Whether the block's laws depend on the place (a spring, a ripple, a stop, or a law not known)."""
         return self.closed or not self.mechanism or self.block.core.position_dependent
 
     @property
-    def anchored(self) -> bool:
+    def restoring(self) -> bool:
         """Whether something pulls the model back, so that a free run does not drift."""
         if self.closed or not self.mechanism:
             return True
@@ -102,19 +102,19 @@ class Simulator:
 
     @property
     def nuisances(self) -> tuple[str, ...]:
-        """Names of the initial states estimated beside the parameters, per window."""
+        """Names of the initial states estimated beside the parameters, per segment."""
         return initial_states.fitted_names(self.block.core, self.begins) if self.mechanism else ()
 
     @property
-    def chained(self) -> bool:
-        """Whether some of the initial states go on from one window into the next."""
+    def continued(self) -> bool:
+        """Whether some of the initial states go on from one segment into the next."""
         return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
 
-    def priors(self, windows: Windows) -> np.ndarray:
+    def priors(self, segments: Segments) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
         if not self.nuisances:
-            return np.zeros((len(windows), 0))
-        return initial_states.reach(self.nuisances, self.block.core, self.facts, windows)
+            return np.zeros((len(segments), 0))
+        return initial_states.reach(self.nuisances, self.block.core, self.facts, segments)
 
     def with_values(self, values: Mapping[str, float] | None):
         """Return the model with these values; a static level below the kinetic one is raised to it."""
@@ -125,17 +125,17 @@ class Simulator:
 
     def run(
         self,
-        windows: Windows,
+        segments: Segments,
         values: Mapping[str, float] | None = None,
         start: np.ndarray | None = None,
         *,
         rounded: bool = False,
     ) -> np.ndarray:
-        """Simulate and return the output at the samples within the windows, shape (n,).
+        """Simulate and return the output at the samples within the segments, shape (n,).
 
         Parameters
         ----------
-        windows : Windows
+        segments : Segments
             Where the state is set anew.
         values : mapping or None
             Parameters that differ from the model's.
@@ -152,10 +152,10 @@ class Simulator:
         array
             Where the model ran away, ten times the spread of the record beside its mean.
         """
-        return self.run_all([(windows, values, start)], rounded=rounded)[0]
+        return self.run_all([(segments, values, start)], rounded=rounded)[0]
 
     def run_all(self, asked: Sequence[Request], *, rounded: bool = False) -> list[np.ndarray]:
-        """Do what `run` does for several (windows, values, start) in one call, on all cores.
+        """Do what `run` does for several (segments, values, start) in one call, on all cores.
 
         Returns
         -------
@@ -164,36 +164,36 @@ class Simulator:
         """
         self.runs += len(asked)
         parts = [self._prepare(values) for _, values, _ in asked]
-        if self.chained:
+        if self.continued:
             outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
         else:
             outputs = self._together(parts, asked)
         return [
-            self._read(part, windows, out, rounded)
-            for part, (windows, _, _), out in zip(parts, asked, outputs, strict=True)
+            self._read(part, segments, out, rounded)
+            for part, (segments, _, _), out in zip(parts, asked, outputs, strict=True)
         ]
 
-    def _one_by_one(self, part, windows: Windows, start) -> np.ndarray:
-        """Run the windows one after the other: hidden states go on from each into the next."""
-        record, inside = self.record, windows.samples
+    def _one_by_one(self, part, segments: Segments, start) -> np.ndarray:
+        """Run the segments one after the other: hidden states go on from each into the next."""
+        record, inside = self.record, segments.samples
         out = np.empty(len(inside))
         drive, hidden = self._drive(part), {}
         carried = initial_states.carried_names(part.core, self.begins)
-        on = self._followed(windows)
-        for w, where in enumerate(windows.slices):
+        on = self._followed(segments)
+        for w, where in enumerate(segments.slices):
             t, follows = record.t[inside[where]], w in on
             if follows:
-                t = np.append(t, record.t[windows.begins[w + 1]])
-            run = self._window(part, drive, windows, w, start, t, hidden)
+                t = np.append(t, record.t[segments.begins[w + 1]])
+            run = self._window(part, drive, segments, w, start, t, hidden)
             out[where] = run.outputs[: where.stop - where.start, 0]
             if not run.status.ok:
                 out[where.start + run.recorded : where.stop] = np.nan
-            came = self._arrival(part, windows, w + 1, run) if follows and run.status.ok else {}
+            came = self._arrival(part, segments, w + 1, run) if follows and run.status.ok else {}
             hidden = {k: came[k] for k in carried if k in came}
         return out
 
-    def _together(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
-        """Run all windows of all that is asked for at once, except where systems differ in their states."""
+    def _together(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
+        """Run all segments of all that is asked for at once, except where systems differ in their states."""
         outputs: list[np.ndarray] = [np.empty(0)] * len(asked)
         sizes = [(p.engine.nstates, len(p.drive_time), p.hold) for p in parts]
         for size in dict.fromkeys(sizes):
@@ -203,17 +203,17 @@ class Simulator:
                 outputs[i] = out
         return outputs
 
-    def _alike(self, parts: Sequence[Ready], asked: Sequence[Request]) -> list[np.ndarray]:
-        counts = [len(windows) for windows, _, _ in asked]
+    def _alike(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
+        counts = [len(segments) for segments, _, _ in asked]
         edges = np.concatenate(([0], np.cumsum(counts)))
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
         x0, times, lengths, drive = [], [], [], []
-        drives: dict[int, int] = {}  # parts have one each, shared by all windows
-        for part, (windows, _, start) in zip(parts, asked, strict=True):
-            x0.append(self._starts(part, windows, start))
-            times.append(self.record.t[windows.samples] - part.delay)
-            lengths.append(windows.ends - windows.begins)
-            drive.append(np.full(len(windows), drives.setdefault(id(part), len(drives))))
+        drives: dict[int, int] = {}  # parts have one each, shared by all segments
+        for part, (segments, _, start) in zip(parts, asked, strict=True):
+            x0.append(self._starts(part, segments, start))
+            times.append(self.record.t[segments.samples] - part.delay)
+            lengths.append(segments.ends - segments.begins)
+            drive.append(np.full(len(segments), drives.setdefault(id(part), len(drives))))
         length = np.concatenate(lengths)
         first = np.concatenate(([0], np.cumsum(length)[:-1]))
         every = np.concatenate(times)
@@ -234,22 +234,22 @@ class Simulator:
         column, ends = result.outputs[:, 0], np.concatenate((first, [len(every)]))
         return [column[ends[i] : ends[j]] for i, j in zip(edges[:-1], edges[1:], strict=True)]
 
-    def _starts(self, part, windows: Windows, start) -> np.ndarray:
-        """Return the states (nw, nx) in which windows begin."""
-        x0 = np.zeros((len(windows), part.engine.nstates))
+    def _starts(self, part, segments: Segments, start) -> np.ndarray:
+        """Return the states (nw, nx) in which segments begin."""
+        x0 = np.zeros((len(segments), part.engine.nstates))
         if part.core is None:
             return x0
         given = {} if start is None else dict(zip(self.nuisances, np.asarray(start).T, strict=True))
         states = x0[:, part.offset :]
-        usual = self._usual(part, windows, slice(None))
+        usual = self._usual(part, segments, slice(None))
         initial_states.fill(states, part.core, given, usual, self.facts.speed)
         for state, samples in part.lags:
-            states[:, state] = samples[windows.begins]
+            states[:, state] = samples[segments.begins]
         return x0
 
-    def _read(self, part, windows: Windows, out: np.ndarray, rounded: bool) -> np.ndarray:
+    def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
         """Return what the sensors make of outputs; what ran away is set aside."""
-        record, inside = self.record, windows.samples
+        record, inside = self.record, segments.samples
         for primitive, later in part.output:
             if isinstance(primitive, Ramp):
                 out += primitive.offset + primitive.rate * (record.t[inside] - later)
@@ -263,38 +263,38 @@ class Simulator:
             )
         return out
 
-    def _followed(self, windows: Windows) -> set[int]:
-        """Return the windows that another one follows, after a pause no longer than two of them."""
-        pause = windows.begins[1:] - windows.ends[:-1]
-        return set(np.flatnonzero(pause <= 2 * (windows.ends - windows.begins)[:-1]).tolist())
+    def _followed(self, segments: Segments) -> set[int]:
+        """Return the segments that another one follows, after a pause no longer than two of them."""
+        pause = segments.begins[1:] - segments.ends[:-1]
+        return set(np.flatnonzero(pause <= 2 * (segments.ends - segments.begins)[:-1]).tolist())
 
-    def _arrival(self, part, windows, w, run) -> dict[str, float]:
-        """Return the states, as corrections by name, in which a run came to the begin of a window."""
-        usual = self._usual(part, windows, w)
+    def _arrival(self, part, segments, w, run) -> dict[str, float]:
+        """Return the states, as corrections by name, in which a run came to the begin of a segment."""
+        usual = self._usual(part, segments, w)
         return initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
 
-    def at_rest(self, windows: Windows, values) -> np.ndarray:
-        """Return the initial states (nw, number of nuisances) with which every window begins at rest."""
+    def at_rest(self, segments: Segments, values) -> np.ndarray:
+        """Return the initial states (nw, number of nuisances) with which every segment begins at rest."""
         part, rows = self._prepare(values), []
-        for w in range(len(windows)):
-            given = initial_states.at_rest(part.core, self._usual(part, windows, w), self.facts.speed)
+        for w in range(len(segments)):
+            given = initial_states.at_rest(part.core, self._usual(part, segments, w), self.facts.speed)
             rows.append([given[name] for name in self.nuisances])
         return np.array(rows)
 
-    def carried_on(self, windows: Windows, values, start: np.ndarray) -> np.ndarray:
-        """Return the initial states that let every window go on where the one before it ends.
+    def carried_on(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
+        """Return the initial states that let every segment go on where the one before it ends.
 
         Returns
         -------
         (nw, number of nuisances) array
-            NaN for windows that follow no other.
+            NaN for segments that follow no other.
         """
         part, found = self._prepare(values), np.full_like(start, np.nan)
-        follows = np.flatnonzero(windows.ends[:-1] == windows.begins[1:])
+        follows = np.flatnonzero(segments.ends[:-1] == segments.begins[1:])
         if part.core is None or not follows.size:
             return found
-        some = windows.only(follows)
-        times = self.record.t[np.column_stack((some.begins, windows.begins[follows + 1]))] - part.delay
+        some = segments.only(follows)
+        times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - part.delay
         engine, runs = part.engine, np.arange(len(follows))
         result = run_many(
             grouped([(engine, runs)]), self._starts(part, some, start[follows]), times[:, 0], times[:, 1],
@@ -309,7 +309,7 @@ class Simulator:
             raise error
         for i, w in enumerate(follows):
             if result.status[i].ok:
-                usual = self._usual(part, windows, w + 1)
+                usual = self._usual(part, segments, w + 1)
                 came = initial_states.corrections(
                     result.x[i, part.offset :], part.core, usual, self.facts.speed
                 )
@@ -319,19 +319,19 @@ class Simulator:
     def _drive(self, part):
         return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
 
-    def _window(self, part, drive, windows, w, start, t, hidden=None):
-        """Run one window, recording at the record's times `t`."""
+    def _window(self, part, drive, segments, w, start, t, hidden=None):
+        """Run one segment, recording at the record's times `t`."""
         times = t - part.delay
-        state = self._start(part, windows, w, None if start is None else start[w], times[0], hidden or {})
+        state = self._start(part, segments, w, None if start is None else start[w], times[0], hidden or {})
         state.segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
-        steps = 60 * int(windows.ends[w] - windows.begins[w]) + 20_000
+        steps = 60 * int(segments.ends[w] - segments.begins[w]) + 20_000
         return part.engine.run(
             state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
         )
 
     # --- preparing ------------------------------------------------------------------------------------
 
-    def _prepare(self, values) -> Ready:
+    def _prepare(self, values) -> PreparedModel:
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]
@@ -348,31 +348,31 @@ class Simulator:
         self._prepared[key] = part
         return part
 
-    def _start(self, part, windows, w, start, time, hidden) -> State:
+    def _start(self, part, segments, w, start, time, hidden) -> State:
         engine, core = part.engine, part.core
         x0 = np.zeros((1, engine.nstates))
         if core is None:
             return engine.start(x0[0], time)
         given = hidden | (dict(zip(self.nuisances, start, strict=True)) if start is not None else {})
-        i = int(windows.begins[w])
-        usual = self._usual(part, windows, w)
+        i = int(segments.begins[w])
+        usual = self._usual(part, segments, w)
         states = x0[:, part.offset :]
         initial_states.fill(states, core, given, usual, self.facts.speed)
         for state, samples in part.lags:
             states[:, state] = samples[i]
         return engine.start(x0[0], time)
 
-    def _usual(self, part, windows, w) -> tuple[Any, Any, Any]:
-        """Return position, speed and acceleration with which windows begin, without what sensors add.
+    def _usual(self, part, segments, w) -> tuple[Any, Any, Any]:
+        """Return position, speed and acceleration with which segments begin, without what sensors add.
 
         Noise can make of the acceleration what no force of the record does: it is held within what one does.
         """
         ramps = [
-            (p, self.record.t[windows.begins[w]] - later) for p, later in part.output if isinstance(p, Ramp)
+            (p, self.record.t[segments.begins[w]] - later) for p, later in part.output if isinstance(p, Ramp)
         ]
         shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
         usual = self.facts.force / sum(part.core.masses)
-        return windows.x[w] - shift, windows.v[w] - drift, usual * np.tanh(windows.a[w] / usual)
+        return segments.x[w] - shift, segments.v[w] - drift, usual * np.tanh(segments.a[w] / usual)
 
 
 def free_run(
@@ -394,7 +394,7 @@ def free_run(
     simulator = Simulator(model, record, thin=thin)
     known = {"x": position, "v": velocity, "slack": slack}
     one = np.zeros(1)
-    whole = Windows(np.array([0]), np.array([len(record)]), one, one, one, one, one)
+    whole = Segments(np.array([0]), np.array([len(record)]), one, one, one, one, one)
     start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
     return simulator.run(whole, None, start, rounded=True)
 

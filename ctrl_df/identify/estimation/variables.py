@@ -14,7 +14,7 @@ from .segments import Facts
 
 
 @dataclass(frozen=True)
-class Seen:
+class RecordScales:
     """What records can show of an effect.
 
     Attributes
@@ -36,12 +36,12 @@ class Seen:
     reach: float = -math.inf
 
 
-def seen_by(block, records, known: Facts) -> Seen:
+def seen_by(block, records, known: Facts) -> RecordScales:
     """Return what the records show of the effects of a block."""
     reach = max(float(np.max(np.abs(r.y))) for r in records) - 4 * known.noise
     shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
     mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
-    return Seen(
+    return RecordScales(
         known.force, known.spread, known.speed, mass, min(r.dt for r in records),
         max(r.duration for r in records), -math.inf if shifted else reach,
     )  # fmt: skip

@@ -87,7 +87,7 @@ class _Free:
         self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
 
     def __call__(self, u):
-        played = self.record._with(t=self.t, u=u, y=self.scale, velocity=None, channels={})
+        played = self.record.replaced(t=self.t, u=u, y=self.scale, velocity=None, channels={})
         thin = max(1, len(self.t) // 2500)
         ys = [free_run(m, played, position=self.centre, thin=thin) for m in self.models]
         gaps = [_rms(a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
@@ -140,7 +140,7 @@ class _Loop:
             forces.append(outputs[self.moves.name("F")])
         gaps = []
         for i, force in enumerate(forces):
-            played = self.record._with(
+            played = self.record.replaced(
                 t=self.t, u=force, y=ys[i], velocity=None, channels={}, input_hold="linear"
             )
             runs = [free_run(m, played, position=self.centre) for m in self.models]

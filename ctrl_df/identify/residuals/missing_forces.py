@@ -15,12 +15,12 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_model
-from ..estimation.trial import Data, Trial
+from ..estimation.segmented import CandidateFit, SegmentedData
 from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
 @dataclass(frozen=True)
-class Lack:
+class MissingForce:
     """Forces of one kind, fitted to a residual.
 
     Attributes
@@ -47,16 +47,16 @@ class Lack:
     sentence: str
 
 
-def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
+def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[MissingForce]:
     """Return every kind of free force with what it explains, the most telling first."""
-    tangent = tried.train.tangent
-    if tangent is None:
+    sensitivity = tried.train.sensitivity
+    if sensitivity is None:
         return []
     scene = _Scene(tried, data)
-    residual = tangent.project(tried.train.residual)
+    residual = sensitivity.project(tried.train.residual)
     kinds, tables = list(scene.kinds()), []
     shapes = [shape for _, families in kinds for family in families for shape, _ in family]
-    changes = iter(side_by_side(lambda shape: tangent.project(scene.response(shape)), shapes))
+    changes = iter(side_by_side(lambda shape: sensitivity.project(scene.response(shape)), shapes))
     for kind, families in kinds:
         answers = [[(next(changes), span) for _, span in family] for family in families]
         if len(answers) > 1:
@@ -67,27 +67,27 @@ def lacks(tried: Trial, data: Data, noise: NoiseModel) -> list[Lack]:
             ]
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
-    windows, record = tangent.pieces, data.train.records[0]
+    segments, record = sensitivity.pieces, data.train.records[0]
     units = {"x": record.output_unit, "f": record.input_unit}
-    if data.forced:
+    if data.disturbed:
         # the residual is of forces here, as the fits see it
-        noise = noise_model([residual[w] for w in windows], max_order=12)
-    found = [_regressed(k, m, s, residual, noise, windows, units) for k, m, s in tables]
+        noise = noise_model([residual[w] for w in segments], max_order=12)
+    found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = noise_model([left[w] for w in windows], max_order=12)
-        found = [_regressed(k, m, s, residual, noise, windows, units) for k, m, s in tables]
+        noise = noise_model([left[w] for w in segments], max_order=12)
+        found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
         best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
     return list(best.values())
 
 
-def _regressed(kind, matrix, spans, residual, noise, windows, units) -> tuple[Lack, np.ndarray]:
+def _regressed(kind, matrix, spans, residual, noise, segments, units) -> tuple[MissingForce, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain."""
-    white, filtered = noise.seen(residual, windows), noise.seen(matrix, windows)
+    white, filtered = noise.filtered(residual, segments), noise.filtered(matrix, segments)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
     left = white - filtered @ weights
     # a frequency is found by looking at many
@@ -97,7 +97,7 @@ def _regressed(kind, matrix, spans, residual, noise, windows, units) -> tuple[La
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
-    return Lack(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span, **units)), explained
+    return MissingForce(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span, **units)), explained
 
 
 _SENTENCES = {
@@ -120,15 +120,15 @@ class _Scene:
         self.size = TEST_FORCE * data.scales.force
         self.motion = [
             _motion(r, w, y)
-            for r, w, y in zip(self.view.records, self.view.windows, tried.train.simulated, strict=True)
+            for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
         ]
 
     def response(self, shape) -> list[np.ndarray]:
         """Return the change of output by a force: `shape(motion)` (n,) of one record, of order one."""
         changes = []
-        for record, windows, start, y, motion in zip(
+        for record, segments, start, y, motion in zip(
             self.view.records,
-            self.view.windows,
+            self.view.segments,
             self.fit.starts,
             self.fit.simulated,
             self.motion,
@@ -136,7 +136,7 @@ class _Scene:
         ):
             force = record.u + self.size * shape(motion)
             simulator = self.data.simulator(self.fit.model, record, force=force)
-            changes.append((simulator.run(windows, None, start) - y) / self.size)
+            changes.append((simulator.run(segments, None, start) - y) / self.size)
         return changes
 
     def kinds(self):
@@ -177,8 +177,8 @@ class _Scene:
         return float(np.argmax(ratio)) / (4 * len(e) * dt)
 
 
-def _motion(record, windows, y):
-    inside = windows.samples
+def _motion(record, segments, y):
+    inside = segments.samples
     x = np.array(record.y, dtype=float)
     x[inside] = y
     v = np.gradient(_smooth(x), record.t)

@@ -246,11 +246,11 @@ class _Null:
         # sharper, where enough independent samples remain to know the two means.
         mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
         rest = self.r - np.where(mask, mean_in, mean_out)
-        colour, power = self._colour(rest), float(np.mean(rest * rest))
-        means = [_independent(pairs, np.maximum(colour, 0)) for pairs in (inside, outside)]
+        error_filter, power = self._colour(rest), float(np.mean(rest * rest))
+        means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
         if min(means) < 60:
-            colour, power = self.rho, self.power
-            means = [_independent(pairs, np.maximum(colour, 0)) for pairs in (inside, outside)]
+            error_filter, power = self.rho, self.power
+            means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
         z = mean_in / math.sqrt(max(power, 1e-30 * self.power) / means[0])
         bias_p = float(2 * t_distribution.sf(abs(z), max(means[0] - 1, 1)))
         if share > expected:  # more error than its part: by its spread, or by its mean
@@ -288,7 +288,7 @@ def _bands(t, r, signals) -> list[Region]:
         widths = sum(bands[j][1] - bands[j][0] for j in near)
         # An excited line of the input shows in every residual: it must also stand out beside the signals.
         ratio = min(values[i] / _background(values, near) for values in (density, *relative))
-        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann window halves the independent lines
+        p = float(f_distribution.sf(ratio, b - a, widths))  # the Hann segment halves the independent lines
         share = float(power[a:b].sum()) / total
         span = (float(f[a]), float(f[b - 1]))
         expected = min(share, _background(density, near) * (b - a) / total)

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from ..estimation.candidate import Candidate
+from ..estimation.fit import FitResult
+from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.simulator import feasible
-from ..estimation.trial import Data, Trial
-from ..starting.attach import applicable, attach
+from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
 from ..starting.regression import Start
-from ..starting.resonance_grid import resonant
+from ..starting.resonance_grid import resonating
 from ..starting.screen import Screen, starts_for
 from ..thresholds import BEGUN, HOPELESS, JOINTS, KEPT, LOAD_SHARES
 
@@ -37,15 +37,15 @@ class Attempt:
         Where the fit begins, or has come to.
     names : tuple of str
         Parameters that it moves.
-    data : Data
-        The windows it is in.
+    data : SegmentedData
+        The segments it is in.
     steps, tolerance : int, float
         Iterations left in these, and when to end them.
     extra : int
         Parameters beyond the baseline's.
     starts : list of arrays or None
         Initial states with which it begins.
-    fit : Candidate or None
+    fit : FitResult or None
         What it has come to.
     nominal : bool
         Whether it begins at the user's values.
@@ -54,12 +54,12 @@ class Attempt:
     key: str
     block: Any
     names: tuple[str, ...]
-    data: Data
+    data: SegmentedData
     steps: int
     tolerance: float
     extra: int
     starts: list[np.ndarray] | None = None
-    fit: Candidate | None = None
+    fit: FitResult | None = None
     nominal: bool = False
 
     @property
@@ -70,25 +70,27 @@ class Attempt:
 
     @property
     def multimodal(self) -> bool:
-        """Whether fits of its effect begin in short windows."""
+        """Whether fits of its effect begin in short segments."""
         return self.block.effects[-1].multimodal
 
     @property
-    def trial(self) -> Trial:
+    def trial(self) -> CandidateFit:
         """What it has come to."""
         assert self.fit is not None
-        return Trial(self.key, self.fit, extra=self.extra)
+        return CandidateFit(self.key, self.fit, extra=self.extra)
 
 
-def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None) -> list[Trial]:
-    """Return every effect that can be added, fitted over the windows of the screen.
+def tried(
+    classes, screen: Screen, shortest: SegmentedData, free, nominal, executor=None
+) -> list[CandidateFit]:
+    """Return every effect that can be added, fitted over the segments of the screen.
 
     Parameters
     ----------
     classes : sequence of effect classes
     screen : Screen
-    shortest : Data
-        In short windows, where fits of effects with many valleys begin.
+    shortest : SegmentedData
+        In short segments, where fits of effects with many minima begin.
     free : tuple of str
         Parameters of the baseline that are refitted.
     nominal : mapping
@@ -116,7 +118,7 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
     kept = _best(begun, KEPT)
-    # few steps from where the user begins tell little: the baseline may have ended in another valley
+    # few steps from where the user begins tell little: the baseline may have ended in another minimum
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
     ahead = _best(begun, 1)[:2]
@@ -131,7 +133,7 @@ def tried(classes, screen: Screen, shortest: Data, free, nominal, executor=None)
     return [best[c.id] for c in kinds if c.id in best]
 
 
-def itself(tried: Trial, span) -> bool:
+def itself(tried: CandidateFit, span) -> bool:
     """Whether the newest effect is what its name says over the stroke `span` [m]."""
     own, pairs = tried.block.newest + ".", zip(tried.train.names, tried.train.at_bound, strict=True)
     at_bound = {name.removeprefix(own) for name, bound in pairs if bound and name.startswith(own)}
@@ -155,7 +157,7 @@ def _begin(job) -> list[Attempt]:
     cls, share, screen, shortest, free, nominal = job
     if share is not None:
         found = []
-        for near in resonant(cls, screen, share, JOINTS):
+        for near in resonating(cls, screen, share, JOINTS):
             added = own_names(near.model)
             found.append(
                 Attempt(
@@ -177,16 +179,16 @@ def _begin(job) -> list[Attempt]:
     return [a for a in found if a is not None]
 
 
-def _from(start: Start, screen: Screen, shortest: Data, free) -> Attempt | None:
+def _from(start: Start, screen: Screen, shortest: SegmentedData, free) -> Attempt | None:
     """Return the attempt that begins at a start; None where the effect contradicts the block."""
     base = screen.block.with_parameters(feasible(screen.block, dict(start.values)))
-    block, key = attach(base, start.effect), start.effect.id
+    block, key = extended(base, start.effect), start.effect.id
     if block is None:
         return None
     added = own_names(block)
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
     if start.effect.multimodal:
-        # a joint changes everything at once, and so does what rubs behind it: their valleys are long and bent
+        # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
         bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
         steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
         return Attempt(key, block, names, shortest, steps, tolerance, len(added))
@@ -209,8 +211,8 @@ def _on(attempt: Attempt, steps, hopeless) -> Attempt:
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)
 
 
-def _finish(job) -> Trial:
-    """Take the steps that are left, then those over the windows of the screen.
+def _finish(job) -> CandidateFit:
+    """Take the steps that are left, then those over the segments of the screen.
 
     Where they would not lead to an error below `hopeless` at the pace of the last ones they are left out.
     """

@@ -12,7 +12,7 @@ def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_AP
     Parameters
     ----------
     first, second : sequence of arrays
-        Simulated outputs, as evidence takes them (`Trial.outputs`).
+        Simulated outputs, as evidence takes them (`CandidateFit.outputs`).
     noise : NoiseModel
         Of the better one's residual.
     nats : float

@@ -9,61 +9,61 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ..estimation.noise_model import NoiseModel, whitened_power, whitener
-from ..estimation.trial import Trial
+from ..estimation.noise_model import NoiseModel, prediction_error_filter, whitened_power
+from ..estimation.segmented import CandidateFit
 from ..thresholds import REFUTED
 from .rounding import rounding_evidence
 
 
-def ranked(base: Trial, trials) -> tuple[list[Trial], NoiseModel]:
+def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     """Return the trials with their evidence over the baseline, best first, and the noise that judged it.
 
     What held-out data speak against comes after all that they do not. The noise model is of the residuals of
     the best one, a sensor that rounds left aside.
     """
     best = min([base, *(t for t in trials if not rounds(t))], key=lambda t: t.size)
-    noise = whitener(best.residuals, base.train.colour)
+    noise = prediction_error_filter(best.residuals, base.train.error_filter)
     before = _powers(base, noise)
     judged = []
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
-        # hardly more than starts was fitted to the windows to be judged by: their gain also stands alone
+        # hardly more than starts was fitted to the segments to validate on: their gain also stands alone
         price = 0.5 * t.extra * math.log(sum(n for _, n in before))
-        judged.append(replace(t, evidence=gain - price, evidence_held=gain_held))
-    return sorted(judged, key=lambda t: (t.evidence_held < -REFUTED, -t.evidence)), noise
+        judged.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
+    return sorted(judged, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
 
-def rounds(tried: Trial) -> bool:
+def rounds(tried: CandidateFit) -> bool:
     """Whether what a candidate adds is a sensor that rounds: its errors are no noise."""
     return bool(tried.key) and _step(tried) > 0
 
 
-def _step(tried: Trial) -> float:
+def _step(tried: CandidateFit) -> float:
     """Return the step to which the newest effect rounds; 0 if it does not."""
     steps = (p.value for p in tried.block.effects[-1].parameters.values() if p.stepped)
     return next(steps, 0.0)
 
 
-def _powers(tried: Trial, noise: NoiseModel):
-    """Return power and number of whitened residuals of the windows fitted, and of those to be judged by."""
-    held = tried.held.residual_pieces if tried.held is not None else []
-    return whitened_power(tried.train.residual_pieces, noise), whitened_power(held, noise)
+def _powers(tried: CandidateFit, noise: NoiseModel):
+    """Return power and number of whitened residuals of the segments fitted, and of those held out."""
+    validation = tried.validation.residual_pieces if tried.validation is not None else []
+    return whitened_power(tried.train.residual_pieces, noise), whitened_power(validation, noise)
 
 
 def _gains(before, after) -> tuple[float, float]:
-    """Return the log likelihood ratio of all windows, and of those to be judged by."""
-    (fitted, n), (held, n_held) = before
+    """Return the log likelihood ratio of all segments, and of those held out."""
+    (fitted, n), (validation, n_held) = before
     (fitted_t, _), (held_t, _) = after
-    gain_held = 0.5 * n_held * math.log(held / held_t) if n_held else 0.0
-    return 0.5 * (n + n_held) * math.log((fitted + held) / (fitted_t + held_t)), gain_held
+    gain_held = 0.5 * n_held * math.log(validation / held_t) if n_held else 0.0
+    return 0.5 * (n + n_held) * math.log((fitted + validation) / (fitted_t + held_t)), gain_held
 
 
-def _rounded_gains(base: Trial, tried: Trial) -> tuple[float, float]:
+def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
     step = _step(tried)
-    noise = whitener(base.residuals)
+    noise = prediction_error_filter(base.residuals)
     gains = []
-    for fit, power in zip((base.train, base.held), _powers(base, noise), strict=True):
+    for fit, power in zip((base.train, base.validation), _powers(base, noise), strict=True):
         if fit is None:
             gains.append(0.0)
             continue

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.segments import facts
-from ..estimation.trial import Data, Trial
-from ..residuals.missing_forces import Lack, lacks
+from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
 from ..thresholds import GROWN, LEFT, NOISIER
@@ -16,16 +16,18 @@ from .evidence import rounds
 from .search import Located, Remainder
 
 
-def remainder(base: Trial, best: Trial, data: Data, noise, floor: float, significant: float) -> Remainder:
+def remainder(
+    base: CandidateFit, best: CandidateFit, data: SegmentedData, noise, floor: float, significant: float
+) -> Remainder:
     """Return what the best model leaves.
 
-    Structure shows on the windows fitted by what free forces explain, and on those held out by an error
-    beyond the noise: that of the fitted windows, times what the records' own noise floors say of the two.
+    Structure shows on the segments fitted by what free forces explain, and on those held out by an error
+    beyond the noise: that of the fitted segments, times what the records' own noise floors say of the two.
 
     Parameters
     ----------
-    base, best : Trial
-    data : Data
+    base, best : CandidateFit
+    data : SegmentedData
     noise : NoiseModel
         Of the best model's residual.
     floor : float
@@ -36,31 +38,32 @@ def remainder(base: Trial, best: Trial, data: Data, noise, floor: float, signifi
     # Where an encoder rounds, the errors of single samples are whole steps: free forces show in what is not
     # rounded.
     rounded = rounds(best)
-    missed = lacks(base if rounded else best, data, noise)
+    missed = missing_forces(base if rounded else best, data, noise)
     telling = bool(missed) and missed[0].evidence > significant
     structure = missed[0].rms if telling else 0.0
-    if not rounded and not data.forced:
-        # what the right model misses over long windows it misses over short ones
+    if not rounded and not data.disturbed:
+        # what the right model misses over long segments it misses over short ones
         structure = max(structure, math.sqrt(max(best.train.rmse**2 - (GROWN * floor) ** 2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, 1e-300))
-    assert best.held is not None and base.held is not None
+    assert best.validation is not None and base.validation is not None
     floors = [
-        math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records]))) for v in (data.train, data.held)
+        math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records])))
+        for v in (data.train, data.validation)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
     expected = NOISIER * spread * max(1.0, floors[1] / floors[0])
-    outside = math.sqrt(max(best.held.rmse**2 - expected**2, 0.0))
-    there_outside = math.sqrt(max(base.held.rmse**2 - expected**2, outside**2, 1e-300))
+    outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
+    there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, 1e-300))
     share = max(structure / there, outside / there_outside)
     unexplained = telling if rounded else share > LEFT
     return Remainder(spread, max(structure, outside), unexplained, missed)
 
 
 def located(
-    base: Trial,
-    best: Trial,
-    data: Data,
+    base: CandidateFit,
+    best: CandidateFit,
+    data: SegmentedData,
     noise,
     left: Remainder,
     unknown: bool,
@@ -71,7 +74,7 @@ def located(
     shown, missed = base, left.about
     if unknown:
         # An effect that stands in for the one missing bends what it leaves: look where least remains.
-        before = lacks(base, data, noise)
+        before = missing_forces(base, data, noise)
         if not before or (missed and missed[0].left < before[0].left):
             shown = best
         else:
@@ -83,7 +86,7 @@ def located(
     return Located(where, kinds, _sentences(left, missed, where, measure))
 
 
-def _sentences(left: Remainder, missed: list[Lack], where, measure: str) -> str:
+def _sentences(left: Remainder, missed: list[MissingForce], where, measure: str) -> str:
     acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
         f"Of structure {left.structure:.2g} remains beside {left.noise:.2g} of noise (rms of the {measure}). "
@@ -94,13 +97,16 @@ def _sentences(left: Remainder, missed: list[Lack], where, measure: str) -> str:
 def find_regions(tried, view):
     """Return the regions of error of a fitted candidate on its longest record."""
     i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
-    record, inside, residual = view.records[i], view.windows[i].samples, np.asarray(tried.train.residual[i])
+    record, inside, residual = view.records[i], view.segments[i].samples, np.asarray(tried.train.residual[i])
     if not np.all(np.isfinite(residual)):
         return None
-    colour = tried.train.colour
-    if colour is not None:
-        windows = view.windows[i].slices
-        inside, residual = inside[colour.rows(windows)], colour.seen(residual, windows) / tried.train.unit
+    error_filter = tried.train.error_filter
+    if error_filter is not None:
+        segments = view.segments[i].slices
+        inside, residual = (
+            inside[error_filter.rows(segments)],
+            error_filter.filtered(residual, segments) / tried.train.unit,
+        )
     return error_regions(
         record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],
         force=record.u[inside], units=(record.output_unit, record.input_unit),

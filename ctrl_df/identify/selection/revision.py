@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..estimation.variables import default_free
-from ..starting.attach import attach
+from ..starting.extend import extended
 from .search import Search
 
 
@@ -44,7 +44,7 @@ def revised(block, start, search: Search, kept, rivals: Mapping[str, Sequence]) 
         less = fitted(block.without_effect(key), 8)
         tried = [fitted(block, 4)]
         for effect in rivals.get(key, ()):
-            other = attach(less.block, effect)
+            other = extended(less.block, effect)
             if other is not None:
                 tried.append(fitted(other, 8))
         tried = [replace(t, extra=t.extra - less.extra) for t in tried]

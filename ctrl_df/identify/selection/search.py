@@ -16,7 +16,7 @@ class Judged(Protocol):
     key: str
     extra: int
     evidence: float
-    evidence_held: float
+    evidence_validation: float
     confirmed: bool
 
     @property
@@ -90,7 +90,7 @@ class Search(ABC):
     base: Any
     free: tuple[str, ...]
     significant: float
-    significant_held: float
+    significant_validation: float
     measure: str
     words: Words
     kind: type[Diagnosis] = Diagnosis

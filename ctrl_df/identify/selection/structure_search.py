@@ -11,11 +11,11 @@ import numpy as np
 from ...blocks.core import level
 from ...blocks.effect import static_levels
 from ...simulate.crew import side_by_side
-from ..estimation.candidate import Candidate
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
-from ..estimation.multistart import all_hopped, begun_at, beyond, hopped, own, settled
+from ..estimation.fit import FitResult
+from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
+from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.simulator import feasible
-from ..estimation.trial import Data, Trial, prepare
 from ..estimation.variables import default_free
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
@@ -51,35 +51,35 @@ class StructureSearch(Search):
     block : Mechanism
         The model as it stands.
     records, held : sequences of Measurement
-        To learn from; to be judged by (may be empty).
+        To fit; to validate on (may be empty).
     free : tuple of str
         Parameters of the model that may be refitted.
     """
 
     significant = SIGNIFICANT
-    significant_held = SIGNIFICANT_HELD
+    significant_validation = SIGNIFICANT_HELD
     words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
 
-    def __init__(self, block, records, held, free):
+    def __init__(self, block, records, validation, free):
         self.block, self.free = block, tuple(free)
-        data = prepare(block, records, held)
+        data = prepare(block, records, validation)
         self.nominal = {k: p.value for k, p in block.parameters.items()}
         self._look_at(data, 1)
         self.base = self._baseline(block)
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
-        # friction that wanders drowns all else over longer windows
-        near = self.levels[0].moved(self.base.train)
-        if near.rmse > PROCESS_NOISE * data.noise and not data.clean:
-            self._look_at(self.levels[0].wandering, 0)
-            self.base = Trial("", self.data.fit(near.model, self.free))
+        # a disturbance force drowns all else over longer segments
+        near = self.segmentations[0].moved(self.base.train)
+        if near.rmse > PROCESS_NOISE * data.noise and not data.noise_free:
+            self._look_at(self.segmentations[0].with_process_noise, 0)
+            self.base = CandidateFit("", self.data.fit(near.model, self.free))
 
-    def _look_at(self, data: Data, which: int):
-        self.levels = data.levels
-        self.data = self.levels[which]
+    def _look_at(self, data: SegmentedData, which: int):
+        self.segmentations = data.segmentations
+        self.data = self.segmentations[which]
 
-    def _baseline(self, block) -> Trial:
+    def _baseline(self, block) -> CandidateFit:
         """Fit the baseline from its own values and from a regression of the force; keep the better."""
-        shortest, data = self.levels[:2]
+        shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
         w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
@@ -89,28 +89,30 @@ class StructureSearch(Search):
         found = []
         for begin in begins:
             found.append(data.moved(shortest.fit(begin, self.free, iterations=8), 12))
-        return Trial("", min(found, key=lambda f: f.rmse))
+        return CandidateFit("", min(found, key=lambda f: f.rmse))
 
     @property
     def records(self):
         """The records to fit, and those held out; none where parts of the former are."""
-        held = () if self.data.held.records is self.data.train.records else self.data.held.records
-        return self.data.train.records, held
+        validation = (
+            () if self.data.validation.records is self.data.train.records else self.data.validation.records
+        )
+        return self.data.train.records, validation
 
     @property
     def measure(self) -> str:
         """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
-        return "acceleration" if self.data.forced else "output"
+        return "acceleration" if self.data.disturbed else "output"
 
     # --- every effect, coarsely -----------------------------------------------------------------------
 
-    def candidates(self, classes, executor=None) -> list[Trial]:
+    def candidates(self, classes, executor=None) -> list[CandidateFit]:
         """Return every effect that can be added, fitted, the one with most evidence first."""
-        longest = self.levels[-1]
+        longest = self.segmentations[-1]
         base, found = self._look(classes, executor, self.data.sampled)
-        there = base.rmse if self.data.forced else longest.moved(base).rmse
+        there = base.rmse if self.data.disturbed else longest.moved(base).rmse
         if there > GROWTH * base.rmse:
-            # Short windows show nothing, long ones do: what is missing acts seldom, or slowly.
+            # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
             moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
@@ -119,26 +121,26 @@ class StructureSearch(Search):
             self._rebase(found)
         return found
 
-    def _over_long_windows(self, here, there, found) -> list[Trial] | None:
-        """Return the best by error moved to the longest windows; None where they explain enough there.
+    def _over_long_windows(self, here, there, found) -> list[CandidateFit] | None:
+        """Return the best by error moved to the longest segments; None where they explain enough there.
 
-        `here`, `there`: error of the baseline where the trials were fitted, and over the longest windows.
+        `here`, `there`: error of the baseline where the trials were fitted, and over the longest segments.
         """
         if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
             return None
-        longest = self.levels[-1]
+        longest = self.segmentations[-1]
         best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
         moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, 4, 1e-2)), best)
         shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
-    def _look(self, classes, executor, data: Data):
-        """Fit every effect over one set of windows; return the baseline there and the effects, best first."""
+    def _look(self, classes, executor, data: SegmentedData):
+        """Fit every effect over one set of segments; return baseline and effects there, best first."""
         base = data.moved(self.base.train, 3)
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        found = tried(classes, screen, self.levels[0].sampled, self.free, nominal, executor)
-        return base, ranked(Trial("", base), found)[0]
+        found = tried(classes, screen, self.segmentations[0].sampled, self.free, nominal, executor)
+        return base, ranked(CandidateFit("", base), found)[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -147,35 +149,35 @@ class StructureSearch(Search):
             block = self.base.block
             again = self.data.fit(block.with_parameters(feasible(block, values)), self.free, iterations=8)
             if again.rmse < self.base.train.rmse:
-                self.base = Trial("", again)
+                self.base = CandidateFit("", again)
 
     # --- the best, carefully --------------------------------------------------------------------------
 
-    def confirm(self, found) -> list[Trial]:
+    def confirm(self, found) -> list[CandidateFit]:
         """Refit baseline and best candidates at the full rate; return these candidates, best first.
 
-        The windows are of the length that suits these data (`_longest_coherent`).
+        The segments are of the length that suits these data (`_longest_coherent`).
         """
-        # Wandering forces let the first look tell little.
-        found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.forced else _promising(found)
+        # Disturbance forces let the first look tell little.
+        found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.disturbed else _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
         self.floor = floor
-        levels, at = list(self.levels), _longest_coherent(stages)
-        if at == 0 and not self.data.forced:
-            # Longer windows show what no candidate explains: hidden states, fitted anew in many short ones,
+        levels, at = list(self.segmentations), _longest_coherent(stages)
+        if at == 0 and not self.data.disturbed:
+            # Longer segments show what no candidate explains: hidden states, fitted anew in many short ones,
             # would pass for it.
-            levels[0] = levels[0].chained
+            levels[0] = levels[0].continued
             short = levels[0]
             stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
             at = _longest_coherent(stages)
-        if found and rounds(found[0]) and not self.data.forced:
-            # An error of whole steps of the sensor is averaged out by long windows, followed by short ones.
+        if found and rounds(found[0]) and not self.data.disturbed:
+            # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
             at = len(stages) - 1
         self.data = levels[at]
         fine = self.data.fine
         pairs = [(t, f) for t, f in zip((self.base, *found), stages[at], strict=True) if f is not None]
         best = side_by_side(
-            lambda pair: fine.judged(replace(pair[0], train=fine.moved(pair[1], 3, 1e-3), confirmed=True)),
+            lambda pair: fine.validate(replace(pair[0], train=fine.moved(pair[1], 3, 1e-3), confirmed=True)),
             pairs,
         )
         self.base = best[0]
@@ -183,7 +185,7 @@ class StructureSearch(Search):
         if not chosen:
             return []
         chosen = self._again(chosen, chosen[:1])
-        # Near equals are told apart by fits that have come to an end, and in the right valley.
+        # Near equals are told apart by fits that have come to an end, and in the right minimum.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
         least = min(t.train.rmse for t in chosen)
         close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
@@ -196,24 +198,24 @@ class StructureSearch(Search):
         return chosen
 
     def _stages(self, fits):
-        """Return the fits in windows of every length that may judge, the shortest first, and their floor.
+        """Return the fits in segments of every length that may judge, the shortest first, and their floor.
 
-        The floor is the error that a fit can come down to at best: over short windows nearly every model
-        follows. Where forces wander, the shortest windows alone may judge. None stands for fits without a
-        chance.
+        The floor is the error that a fit can come down to at best: over short segments nearly every model
+        follows. Where disturbance forces prevail the shortest segments alone may judge. None stands for fits
+        without a chance.
         """
-        shortest, middle, longest = self.levels
+        shortest, middle, longest = self.segmentations
         short = side_by_side(shortest.moved, fits)
         floor = FLOOR * min(f.rmse for f in short)
-        if self.data.forced:
+        if self.data.disturbed:
             return [short], floor
         near = self._stage(middle, fits, short, floor)
         return [short, near, self._stage(longest, near, near, floor)], floor
 
-    def _stage(self, data: Data, fits, before, floor) -> list[Candidate | None]:
-        """Move the baseline and the best candidate to other windows, then those with a chance against them.
+    def _stage(self, data: SegmentedData, fits, before, floor) -> list[FitResult | None]:
+        """Move the baseline and the best candidate to other segments, then those with a chance against them.
 
-        `before`: the fits in windows that these are made of: no fit over longer ones can err less than that
+        `before`: the fits in segments that these are made of: no fit over longer ones can err less than that
         over the parts of them.
         """
         errors = [math.inf if f is None else f.rmse for f in before]
@@ -227,37 +229,39 @@ class StructureSearch(Search):
         for i, f in zip(others, moved, strict=True):
             found[i] = f
         there = [i for i, f in enumerate(found) if f is not None]
-        for i, f in zip(there, all_hopped([found[i] for i in there], data, floor), strict=True):
+        for i, f in zip(there, all_restarted([found[i] for i in there], data, floor), strict=True):
             found[i] = f
         return found
 
-    def _ended(self, tried: Trial, exactly: bool, floor: float, least: float) -> Trial:
-        """Return a candidate in its best valley, unless nothing better is possible.
+    def _ended(self, tried: CandidateFit, exactly: bool, floor: float, least: float) -> CandidateFit:
+        """Return a candidate in its best minimum, unless nothing better is possible.
 
         `exactly`: iterated to the end first. `least`: error of the best of all [m].
         """
         fine, fit = self.data.fine, tried.train
         if exactly:
             fit = fine.moved(fit, 8, 1e-6)
-        if own(fit) and fit.rmse > floor and least > floor and not fine.forced:
-            fit = hopped(fit, fine.fit, own(fit), beyond(fit, least))
-        return settled(tried if fit is tried.train else fine.judged(replace(tried, train=fit)), fine)
+        if own(fit) and fit.rmse > floor and least > floor and not fine.disturbed:
+            fit = restarted(fit, fine.fit, own(fit), beyond(fit, least))
+        return thresholds_refined(
+            tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine
+        )
 
-    def _again(self, chosen, those) -> list[Trial]:
+    def _again(self, chosen, those) -> list[CandidateFit]:
         """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
         fine = self.data.fine
         pairs = [(t, best) for best in those for t in chosen if t is not best]
-        begun = side_by_side(lambda pair: begun_at(pair[0], pair[1], fine), pairs)
+        begun = side_by_side(lambda pair: cross_started(pair[0], pair[1], fine), pairs)
         judged, _ = ranked(self.base, [*chosen, *(t for t in begun if t is not None)])
         return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 
-    def alike(self, a: Trial, b: Trial) -> bool:
+    def alike(self, a: CandidateFit, b: CandidateFit) -> bool:
         """Whether two candidates make the same of these data, within noise or as the limit of each other."""
         if all(self._breaks_away_only(t) for t in (a, b)):
             return True
         return indistinguishable(a.outputs, b.outputs, self.noise)
 
-    def _breaks_away_only(self, tried: Trial) -> bool:
+    def _breaks_away_only(self, tried: CandidateFit) -> bool:
         """Whether a candidate is a static level whose bump over speed is passed within a sample."""
         effect = tried.block.effects[-1]
         if effect.role != "friction" or not static_levels(type(effect)):
@@ -272,8 +276,8 @@ class StructureSearch(Search):
     # --- what it comes to -----------------------------------------------------------------------------
 
     def errors(self, judged):
-        """Return nrmse over the windows fitted, and over those held out."""
-        return judged.train.nrmse, judged.held.nrmse if judged.held is not None else math.nan
+        """Return nrmse over the segments fitted, and over those held out."""
+        return judged.train.nrmse, judged.validation.nrmse if judged.validation is not None else math.nan
 
     def standard_errors(self, judged):
         """Return the standard errors of a fit that came to its end."""
@@ -281,7 +285,7 @@ class StructureSearch(Search):
 
     def exact(self):
         """Whether the model errs by rounding alone."""
-        return self.base.train.nrmse < EXACT and not self.data.forced
+        return self.base.train.nrmse < EXACT and not self.data.disturbed
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
@@ -295,45 +299,47 @@ class StructureSearch(Search):
         )  # fmt: skip
 
     def fitted(self, block, names, iterations):
-        """Return a block with these parameters fitted, and run over the windows held out."""
+        """Return a block with these parameters fitted, and run over the segments held out."""
         found = self.data.fit(block, names, iterations=iterations)
-        return self.data.judged(Trial(block.newest if block.effects else "", found, extra=len(names)))
+        return self.data.validate(
+            CandidateFit(block.newest if block.effects else "", found, extra=len(names))
+        )
 
     def ranked(self, base, judged):
         """Return models with their evidence over `base`, best first."""
         return ranked(base, judged)[0]
 
     def final(self, models, kept):
-        """Return the models with their errors at the full rate, over the windows that the last one bears.
+        """Return the models with their errors at the full rate, over the segments that the last one bears.
 
-        Where disturbance forces blur parameters they are fitted over shorter windows first.
+        Where disturbance forces blur parameters they are fitted over shorter segments first.
         """
         common = self.data.fine
-        if common.forced:
+        if common.disturbed:
             models = [self._sharpened(m, common, kept) for m in models]
         return [(m, *common.errors(m)) for m in models]
 
     @staticmethod
-    def _sharpened(model, data: Data, kept):
+    def _sharpened(model, data: SegmentedData, kept):
         if data.carries(model):
             return model
-        return data.brief.fit(model, [k for k in default_free(model) if k not in kept]).model
+        return data.short_segments.fit(model, [k for k in default_free(model) if k not in kept]).model
 
     def relative(self, noise):
         """Return noise over the rms of the centred output, or of the acceleration."""
         return noise * self.base.train.nrmse / self.base.train.rmse
 
 
-def _best_of(base, trials) -> list[Trial]:
+def _best_of(base, trials) -> list[CandidateFit]:
     """Return every effect's best fit, best first."""
-    best: dict[str, Trial] = {}
+    best: dict[str, CandidateFit] = {}
     for t in trials:
         if t.key not in best or t.train.rmse < best[t.key].train.rmse:
             best[t.key] = t
-    return ranked(Trial("", base), best.values())[0]
+    return ranked(CandidateFit("", base), best.values())[0]
 
 
-def _promising(found, most=CONFIRMED, share=PROMISING) -> list[Trial]:
+def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
     """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
 
     `most`: of them by evidence, `share` of the best one's that is near.
@@ -345,11 +351,11 @@ def _promising(found, most=CONFIRMED, share=PROMISING) -> list[Trial]:
 
 
 def _longest_coherent(stages) -> int:
-    """Return the level to judge at: the longest windows over which the best model's error does not grow.
+    """Return the level to judge at: the longest segments over which the best model's error does not grow.
 
-    `stages`: fits per level, short windows first, the baseline's and then the candidates'. Where the
+    `stages`: fits per level, short segments first, the baseline's and then the candidates'. Where the
     best grows with the length (motion that is sensitive to its start, force noise in a real machine, an
-    effect outside the library) short windows are clearer, provided that they show what is missing as well
+    effect outside the library) short segments are clearer, provided that they show what is missing as well
     as long ones do.
     """
     errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]

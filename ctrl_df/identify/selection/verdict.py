@@ -45,11 +45,12 @@ def verdict_of(search: Search, found, began: float, limits=None) -> Diagnosis:
         open_ones = rivals(ranking)
         verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
     located = search.located(best, remainder, verdict == UNKNOWN)
-    fitted, held = search.records
+    fitted, validation = search.records
     result = search.kind(
         verdict, tuple(ranking), base.block, base.block, *search.errors(base), remainder.noise,
-        remainder.structure, "", located.kinds, located.where, fitted, held, time.perf_counter() - began,
-        dict(limits or {}), search.measure, located.remains, **search.answer(best),
+        remainder.structure, "", located.kinds, located.where, fitted, validation,
+        time.perf_counter() - began, dict(limits or {}), search.measure, located.remains,
+        **search.answer(best),
     )  # fmt: skip
     return replace(result, explanation=explain(result, search.words) + located.note)
 
@@ -60,7 +61,9 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     On data held out the errors of all parameters show, and an idle effect may make up for them by chance:
     those fitted have to speak for themselves.
     """
-    return first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_held
+    return (
+        first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
+    )
 
 
 def _probabilities(chosen) -> list[float]:
@@ -79,5 +82,5 @@ def _entry(judged, search: Search, probability: float, same) -> CandidateEffect:
     return CandidateEffect(
         effect, effect.id, *search.errors(judged), judged.evidence, probability, values, same, judged.block,
         judged.confirmed, errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
-        evidence_holdout=judged.evidence_held,
+        evidence_holdout=judged.evidence_validation,
     )  # fmt: skip

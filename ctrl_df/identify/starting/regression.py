@@ -14,8 +14,8 @@ import numpy as np
 
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
+from ..estimation.segmented import Scales
 from ..estimation.segments import facts
-from ..estimation.trial import Scales
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class Motion:
 
 
 def motion_of(view, thin: int) -> Motion:
-    """Return every `thin`-th sample within the windows."""
+    """Return every `thin`-th sample within the segments."""
     parts = []
-    for record, windows in zip(view.records, view.windows, strict=True):
+    for record, segments in zip(view.records, view.segments, strict=True):
         velocity = facts(record).velocity
         acceleration = np.gradient(velocity, record.t)
-        some = windows.samples[::thin]
+        some = segments.samples[::thin]
         parts.append([np.asarray(c)[some] for c in (record.u, record.y, velocity, acceleration)])
     return Motion(*(np.concatenate(c) for c in zip(*parts, strict=True)), dt=view.records[0].dt)
 

@@ -1,21 +1,22 @@
 """Where an elastic joint may resonate: stiffness and share of load tried over the plane, starts fitted.
 
-A joint is no small change of the model, and over short windows its free states follow anything: descents that
-begin a factor away from the resonance end in other valleys. Its frequency is what the cost knows most about.
+A joint is no small change of the model, and over short segments its free states follow anything: descents
+that begin a factor away from the resonance end in other minima. Its frequency is what the cost knows most
+about.
 """
 
 from __future__ import annotations
 
-from ..estimation.candidate import Candidate
+from ..estimation.fit import FitResult
 from ..thresholds import JOINT_DAMPING, RESONANCES
-from .attach import attach
+from .extend import extended
 from .screen import Screen
 
 # Iterations of all, more of the best of them, and how many these are.
 _LINEAR, _FITTED, _BEST = 1, 2, 4
 
 
-def resonant(cls, screen: Screen, share: float, count: int) -> list[Candidate]:
+def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]:
     """Return the baseline with the joints that fit best, as many as `count`: initial states alone fitted.
 
     `share`: of the mass, behind the joint; one of `LOAD_SHARES`. Initial states are all but linear: one step
@@ -25,7 +26,7 @@ def resonant(cls, screen: Screen, share: float, count: int) -> list[Candidate]:
     reduced = share * (1 - share) * scales.mass
     for rate in RESONANCES * scales.speed / scales.position:
         stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
-        block = attach(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
+        block = extended(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
         if block is not None:
             found.append(screen.data.fit(block, (), iterations=_LINEAR, tolerance=3e-2))
     near = sorted(found, key=lambda f: f.rmse)[:_BEST]

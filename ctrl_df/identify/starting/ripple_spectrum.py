@@ -43,27 +43,27 @@ class Wave:
     viscous: float
 
 
-class WaveSearch:
+class RippleSpectrum:
     """Records as one linear regression.
 
     Parameters
     ----------
-    records, windows : sequences
+    records, segments : sequences
         Records, evenly sampled, and the parts of each that count (one of 20 samples at least).
     known : sequence of float
         Wave numbers [rad/m] of ripples that the model has already.
     """
 
-    def __init__(self, records: Sequence, windows: Sequence, known: Sequence[float] = ()):
+    def __init__(self, records: Sequence, segments: Sequence, known: Sequence[float] = ()):
         self.records = records
         self.places = [_smoothed(r) for r in records]
         self.span = max(float(np.ptp(x)) for x in self.places)
         # the band of the motion and some of the noise above it
         band = min(facts(r).half for r in records) // 4
-        longest = max(j - i for w in windows for i, j in _runs(w, 1))
+        longest = max(j - i for w in segments for i, j in _runs(w, 1))
         self._size = max(band, math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
         self._size = max(min(self._size, longest // 32), 1)
-        self._runs = [_runs(w, self._size) for w in windows]
+        self._runs = [_runs(w, self._size) for w in segments]
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
         for k in known:
@@ -206,10 +206,10 @@ def _blur(record) -> float:
     return max(known.noise / math.sqrt(2 * known.half), 1e-9 * known.spread)
 
 
-def _runs(windows, size) -> list[tuple[int, int]]:
+def _runs(segments, size) -> list[tuple[int, int]]:
     """Return first and last sample of parts without holes, whole numbers of `size` samples long."""
     runs: list[list[int]] = []
-    for i, j in zip(windows.begins, windows.ends, strict=True):
+    for i, j in zip(segments.begins, segments.ends, strict=True):
         if runs and runs[-1][1] == i:
             runs[-1][1] = int(j)
         else:

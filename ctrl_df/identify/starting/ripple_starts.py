@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from .attach import attach
+from .extend import extended
 from .regression import own_values
-from .ripple_spectrum import Wave, WaveSearch
+from .ripple_spectrum import RippleSpectrum, Wave
 
 
 def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
@@ -30,7 +30,7 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
     for turn in np.geomspace(0.6, 6.0, 20):
         pair = []
         for phase in (0.0, math.pi / 2):
-            block = attach(screen.block, make(amplitude, span / turn, phase))
+            block = extended(screen.block, make(amplitude, span / turn, phase))
             change = None if block is None else screen.change(block)
             if change is None:
                 break
@@ -55,9 +55,9 @@ def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, floa
     view, _ = screen.data.whole or (screen.view, None)
     if not all(r.regular for r in view.records):
         return
-    search = WaveSearch(view.records, view.windows, [2 * math.pi / length for length in known])
-    # where friction wanders the fit over windows knows the mass better than whitened forces do
-    plain = all(map(_linear, screen.block.effects)) and not screen.data.forced
+    search = RippleSpectrum(view.records, view.segments, [2 * math.pi / length for length in known])
+    # where friction drifts the fit over segments knows the mass better than whitened forces do
+    plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
     for wave in search.best(3):
         weights = (wave.mass, wave.coulomb, wave.viscous)
         yield wave, (own_values(screen.block, weights, screen.scales) if plain else None) or {}

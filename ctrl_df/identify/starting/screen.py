@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ...blocks.core import kinetic_level
-from ..estimation.candidate import Candidate
-from ..estimation.trial import Data, Scales, carried
-from .attach import attach
+from ..estimation.fit import FitResult
+from ..estimation.segmented import Scales, SegmentedData, carried
+from .extend import extended
 from .proposals import proposals
 from .regression import ForceFit, Start, force_fit, motion_of, regressed
 from .ripple_spectrum import Wave
@@ -32,18 +32,18 @@ class Screen:
 
     Parameters
     ----------
-    base : Candidate
-        The baseline fitted to windows that are short: there even a strong effect changes the output nearly
+    base : FitResult
+        The baseline fitted to segments that are short: there even a strong effect changes the output nearly
         linearly.
-    data : Data
-        In those windows.
+    data : SegmentedData
+        In those segments.
     """
 
-    def __init__(self, base: Candidate, data: Data):
+    def __init__(self, base: FitResult, data: SegmentedData):
         self.base, self.data = base, data
         self.view = data.train
         self.motion = motion_of(data.train, data.thin)
-        self.tangent = base.tangent
+        self.sensitivity = base.sensitivity
         self.residual = self.project(base.residual)
         self.simulators = [data.simulator(base.model, r) for r in self.view.records]
 
@@ -86,25 +86,25 @@ class Screen:
 
     def project(self, signals) -> np.ndarray:
         """Remove what the baseline's parameters and initial states can explain."""
-        return self.tangent.project(signals) if self.tangent is not None else np.concatenate(signals)
+        return self.sensitivity.project(signals) if self.sensitivity is not None else np.concatenate(signals)
 
     def starts(self, block) -> list[np.ndarray]:
         """Return the baseline's initial states as those of a block with an effect more."""
         return [
             carried(self.data.simulator(block, r), w, old, start)
             for r, w, old, start in zip(
-                self.view.records, self.view.windows, self.simulators, self.base.starts, strict=True
+                self.view.records, self.view.segments, self.simulators, self.base.starts, strict=True
             )
         ]
 
     def change(self, block) -> list[np.ndarray] | None:
         """Return the change of output from the baseline to `block`; None if it cannot be simulated."""
         change = []
-        for record, windows, start, y in zip(
-            self.view.records, self.view.windows, self.starts(block), self.base.simulated, strict=True
+        for record, segments, start, y in zip(
+            self.view.records, self.view.segments, self.starts(block), self.base.simulated, strict=True
         ):
             simulator = self.data.simulator(block, record)
-            change.append(simulator.run(windows, None, start, rounded=True) - y)
+            change.append(simulator.run(segments, None, start, rounded=True) - y)
         return change if all(np.all(np.isfinite(c)) for c in change) else None
 
 
@@ -126,7 +126,7 @@ def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
 
 
 def _judged(effect, screen, total) -> Iterator[Start]:
-    block = attach(screen.block, effect)
+    block = extended(screen.block, effect)
     change = None if block is None else screen.change(block)
     if block is None or change is None or total == 0:
         return
@@ -141,7 +141,7 @@ def _judged(effect, screen, total) -> Iterator[Start]:
         factor = float(change @ screen.residual) / power
         scaled = _scaled(effect, factor)
         if scaled is not None and not 0.8 < factor < 1.25:
-            again = attach(screen.block, scaled)
+            again = extended(screen.block, scaled)
             moved = None if again is None else screen.change(again)
             if again is not None and moved is not None:
                 left = screen.residual - screen.project(moved)

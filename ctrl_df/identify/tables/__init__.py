@@ -1,1 +1,1 @@
-"""The same course over tables N(A, omega)."""
+"""Describing functions measured: errors relative to N, their least squares, the search over the plane."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...drawing import draw
 from ..data.frequency_measurement import FrequencyMeasurement
-from ..residuals.compared import Compared
+from ..residuals.comparison_base import ComparisonBase
 from ..residuals.regions import Region, Regions
 from .fit import Points, counted, points_of, relative_error, rms, simulate_table
 
@@ -60,7 +60,7 @@ class TableComparison:
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyComparison(Compared):
+class FrequencyComparison(ComparisonBase):
     """Outcome of `compare` for tables: all points together in the figures, each table in `records`.
 
     Errors are relative to ``|N|``. `simulated` and `residual` are arrays for one table, tuples for several.

@@ -15,7 +15,7 @@ from ..estimation.common_friction import inertia
 from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
-from ..starting.attach import applicable
+from ..starting.extend import applicable
 from ..thresholds import (
     CONFIRMED_ON_TABLE,
     HOPELESS_ON_TABLE,
@@ -55,7 +55,7 @@ class TableTrial:
     error: np.ndarray
     table: np.ndarray
     evidence: float = 0.0
-    evidence_held: float = 0.0
+    evidence_validation: float = 0.0
     confirmed: bool = False
 
     @property
@@ -83,16 +83,16 @@ class TableSearch(Search):
     """
 
     significant = SIGNIFICANT_TABLE
-    significant_held = SIGNIFICANT_TABLE_HELD
+    significant_validation = SIGNIFICANT_TABLE_HELD
     measure = "N"
     words = Words("tables", "scatter", " of |N|", "the points of the plane", "")
     kind = FrequencyDiagnosis
 
-    def __init__(self, block, records, held, free):
+    def __init__(self, block, records, validation, free):
         self.block, self.free = block, tuple(free)
-        self._records, self._held = tuple(records), tuple(held)
-        self.points = points_of([*records, *held])
-        self.train = _train_mask(self.points, len(records), bool(held))
+        self._records, self._validation = tuple(records), tuple(validation)
+        self.points = points_of([*records, *validation])
+        self.train = _train_mask(self.points, len(records), bool(validation))
         if np.count_nonzero(self.train) <= len(self.free) // 2 + 1:
             raise ValueError(
                 f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to "
@@ -105,7 +105,7 @@ class TableSearch(Search):
     @property
     def records(self):
         """The tables to fit, and those held out."""
-        return self._records, self._held
+        return self._records, self._validation
 
     def _fit_base(self) -> FittedTable:
         """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
@@ -180,8 +180,10 @@ class TableSearch(Search):
         found = []
         for t in judged:
             gain = self._likelihood(t)[0] - before
-            held = float(np.sum(gain[~self.train]))
-            found.append(replace(t, evidence=float(np.sum(gain)) - t.extra * price, evidence_held=held))
+            validation = float(np.sum(gain[~self.train]))
+            found.append(
+                replace(t, evidence=float(np.sum(gain)) - t.extra * price, evidence_validation=validation)
+            )
         return sorted(found, key=lambda t: -t.evidence)
 
     def _likelihood(self, tried) -> tuple[np.ndarray, float]:
@@ -243,7 +245,7 @@ class TableSearch(Search):
     def _scattered(self, t) -> bool:
         """Whether neighbours err independently."""
         grids = []
-        for i, record in enumerate([*self._records, *self._held]):
+        for i, record in enumerate([*self._records, *self._validation]):
             grid, here = np.where(np.isfinite(record.N), 0, np.nan).astype(complex), self.points.record == i
             grid[counted(record)] = np.where(outlying(t.error)[here], np.nan, t.error[here])
             grids.append(grid)
@@ -266,7 +268,7 @@ class TableSearch(Search):
 
     def answer(self, best):
         """Return the refitted model, and the best, beside all tables."""
-        tables = [*self._records, *self._held]
+        tables = [*self._records, *self._validation]
         before = comparison_of_tables(self.base.block, tables)
         return {
             "before": before,
@@ -274,9 +276,9 @@ class TableSearch(Search):
         }
 
 
-def _train_mask(points: Points, records: int, held: bool) -> np.ndarray:
+def _train_mask(points: Points, records: int, validation: bool) -> np.ndarray:
     """Return which points are fitted: those of the training tables, or two of three over the plane."""
-    if held:
+    if validation:
         return points.record < records
     i = np.searchsorted(np.unique(points.A), points.A)
     k = np.searchsorted(np.unique(points.omega), points.omega)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
-from ..starting.attach import attach
+from ..starting.extend import extended
 from ..thresholds import HOPELESS_START, TABLE_SIZES, WORK_MEDIUM
 from .fit import Points, Scales, relative_error, simulate_table
 
@@ -118,7 +118,7 @@ def proposals(cls, block, points: Points) -> Iterator:
         less = block
         if share < 1.0 and level is not None and level.free:
             less = block.with_parameters({dry: share * level.value})
-        grown = attach(less, effect)
+        grown = extended(less, effect)
         if grown is not None:
             yield grown
 

@@ -274,6 +274,7 @@ def advance(
                 if curved:
                     skip = wait = min(2 * wait + 1, WAIT)
         if jumped or not known:
+            renewed(prog, mode, scale, -1)  # a jump may have made a speed of a margin that was a force
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
             if locate and (has_tracked or watch >= 0):
                 reach = REACH * (h if h > 0.0 else _first_step(x, k[0], limit - t, hmax))

@@ -1,4 +1,4 @@
-"""Fit a model to records: stages from short windows and a thinned input to whole ones at full rate."""
+"""Fit a model to records: stages from short segments and a thinned input to whole ones at full rate."""
 
 from __future__ import annotations
 
@@ -12,20 +12,18 @@ import numpy as np
 
 from ..data.measurement import Measurement
 from .covariance import covariance_of
-from .initial_states import FITTED
+from .initial_states import FREE
 from .multiple_shooting import Problem
 from .noise_model import NoiseModel
-from .segments import Windows, facts, make_windows, usual_window
-from .sensitivity import Tangent
+from .segments import Segments, facts, make_segments, usual_segment
+from .sensitivity import OutputSensitivity
 from .simulator import Simulator
 from .variables import default_free
 
-MODES = ("auto", "free", "windows")
 
-
-@dataclass
-class Candidate:
-    """Outcome of `fit_candidate`.
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """Outcome of `fit_records`.
 
     Attributes
     ----------
@@ -41,11 +39,11 @@ class Candidate:
         Values that the cost is of.
     unit : float
         Of these values, where they are not in the unit of `rmse`.
-    colour : NoiseModel or None
-        What the cost sees of the output where it is of forces (see `fit_windows`).
+    error_filter : NoiseModel or None
+        What the cost sees of the output where it is of forces (see `fit_segments`).
     rmse, nrmse : float
         Error over all records; nrmse over the rms of the centred outputs. Where the cost is of forces (see
-        `fit_windows`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
+        `fit_segments`): rms of the acceleration that is wrong [output unit/s^2], and over that measured.
     nfev : int
         Simulations of all records together.
     converged : bool
@@ -58,10 +56,10 @@ class Candidate:
         Natural scale of each parameter.
     starts : list of (nw, ns) array
         Initial states, as corrections (see `Simulator.run`).
-    windows : list of Windows
+    segments : list of Windows
         Where the model was started anew.
     linear : callable or None
-        Works out `tangent`, once it is asked for.
+        Works out `sensitivity`, once it is asked for.
     """
 
     model: Any
@@ -72,7 +70,7 @@ class Candidate:
     simulated: list
     count: int
     unit: float
-    colour: NoiseModel | None
+    error_filter: NoiseModel | None
     rmse: float
     nrmse: float
     nfev: int
@@ -81,11 +79,11 @@ class Candidate:
     null: list
     scale: np.ndarray
     starts: list
-    windows: list
-    linear: Callable[[], Tangent] | None = field(repr=False, default=None)
+    segments: list
+    linear: Callable[[], OutputSensitivity] | None = field(repr=False, default=None)
 
     @cached_property
-    def tangent(self) -> Tangent | None:
+    def sensitivity(self) -> OutputSensitivity | None:
         """The fitted model as a linear map of its parameters and initial states; None without parameters."""
         return self.linear() if self.linear is not None else None
 
@@ -95,17 +93,17 @@ class Candidate:
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
-        """The residual as evidence takes it: of every record, or every window where errors are of forces."""
-        return self.by_window(self.residual) if self.colour is not None else list(self.residual)
+        """The residual as evidence takes it: of every record, or every segment where errors are of forces."""
+        return self.by_segment(self.residual) if self.error_filter is not None else list(self.residual)
 
     @property
     def simulated_pieces(self) -> list[np.ndarray]:
         """The simulated output, as `residual_pieces`."""
-        return self.by_window(self.simulated) if self.colour is not None else list(self.simulated)
+        return self.by_segment(self.simulated) if self.error_filter is not None else list(self.simulated)
 
-    def by_window(self, signals) -> list[np.ndarray]:
-        """Return signals, one a record, window by window."""
-        return [x[where] for w, x in zip(self.windows, signals, strict=True) for where in w.slices]
+    def by_segment(self, signals) -> list[np.ndarray]:
+        """Return signals, one a record, segment by segment."""
+        return [x[where] for w, x in zip(self.segments, signals, strict=True) for where in w.slices]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -120,26 +118,20 @@ class Candidate:
         )
 
 
-def window_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
-    """Return per record the length of window [s] that `mode` means; None: the whole record."""
-    if mode not in MODES:
-        raise ValueError(f"mode must be one of {', '.join(MODES)}; got {mode!r}.")
-    if window is not None and not window > 0:
-        raise ValueError(
-            f"window needs a length > 0 [s]; got {window!r}. Leave it out for one that fits the motion."
-        )
+def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:
+    """Return per record the length of segment [s] that `mode` means; None: the whole record."""
     lengths: list[float | None] = []
     for record in records:
         simulator = Simulator(model, record)
-        usual = float(window) if window is not None else usual_window(record)
+        usual = float(window) if window is not None else usual_segment(record)
         free = mode == "free" or simulator.closed
         if mode == "auto" and window is None:
-            free = free or simulator.anchored or record.duration < 1.5 * usual
+            free = free or simulator.restoring or record.duration < 1.5 * usual
         lengths.append(None if free else usual)
     return lengths
 
 
-def fit_candidate(
+def fit_records(
     model,
     records: Sequence[Measurement],
     start: Mapping[str, float] | None = None,
@@ -156,7 +148,7 @@ def fit_candidate(
     tolerance: float = 1e-3,
     central: bool = False,
     iterations: int = 12,
-) -> Candidate:
+) -> FitResult:
     """Fit a model to records, fast.
 
     Parameters
@@ -177,48 +169,44 @@ def fit_candidate(
     polish : int
         Iterations at full rate at the end; 0 leaves the fit at the thinned input.
     coarse : bool or None
-        Whether to begin with short windows, which converge from far off; None: unless `start` is given.
+        Whether to begin with short segments, which converge from far off; None: unless `start` is given.
     robust : bool
         Huber's loss beyond four times the median deviation.
     starts : sequence of arrays or None
-        Initial states of an earlier fit with the same windows, to begin with.
+        Initial states of an earlier fit with the same segments, to begin with.
     tolerance : float
         Relative decrease of the cost that is not worth another iteration.
     central : bool
         Whether the last Jacobian is by central differences.
     iterations : int
-        Bound on the iterations over the full windows.
+        Bound on the iterations over the full segments.
     """
     records = list(records)
     first = Simulator(model, records[0])
     model = first.with_values(dict(start)) if start else model
     block = first.block if not start else Simulator(model, records[0]).block
     names = tuple(default_free(block) if free is None else free)
-    table = block.parameters
-    for name in names:
-        if name not in table:
-            raise ValueError(f"a free parameter must be one of {', '.join(table)}; got {name!r}.")
-    lengths = window_lengths(model, records, mode, window)
+    lengths = segment_lengths(model, records, mode, window)
     problem = Problem(model, records, names, budget)
     theta = problem.start()
     if coarse is None:
         coarse = start is None
     if coarse and names and not first.closed:
-        for short in _short_windows(first, records, lengths):
+        for short in _short_segments(first, records, lengths):
             problem.stage(_cut(records, short), thin)
             theta = problem.solve(theta, iterations=6, tolerance=0.02, robust=False)
     problem.stage(_cut(records, lengths), thin if polish else max(thin, 1), starts)
     theta = problem.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and thin > 1:
-        problem.stage(problem.windows, 1, problem.nuisance)
+        problem.stage(problem.segments, 1, problem.nuisance)
         theta = problem.solve(theta, iterations=polish, tolerance=tolerance, robust=robust)
     return _candidate(problem, theta, central)
 
 
-def fit_windows(
+def fit_segments(
     model,
     records: Sequence[Measurement],
-    windows: Sequence[Windows],
+    segments: Sequence[Segments],
     names: Sequence[str],
     *,
     thin: int = 4,
@@ -228,17 +216,17 @@ def fit_windows(
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
     errors: bool = False,
-    colour: NoiseModel | None = None,
-    begins: str = FITTED,
+    error_filter: NoiseModel | None = None,
+    begins: str = FREE,
     hopeless: float = math.inf,
     outlook: int = 0,
-) -> Candidate:
-    """Fit the named parameters over given windows in one stage.
+) -> FitResult:
+    """Fit the named parameters over given segments in one stage.
 
     Parameters
     ----------
     model : block
-    records, windows : sequences
+    records, segments : sequences
         Records and the parts of each that count.
     names : sequence of str
         Parameters to move; an empty one fits the initial states alone.
@@ -247,17 +235,17 @@ def fit_windows(
     starts : sequence of arrays or None
         Initial states to begin with.
     iterations, tolerance, robust
-        As for `fit_candidate`.
+        As for `fit_records`.
     limits : mapping or None
         Least and largest values of some parameters, within their ranges.
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
-    colour : NoiseModel or None
-        The `force_errors` whose squares are made least, where the machine's own forces make the error.
+    error_filter : NoiseModel or None
+        The `second_difference_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
-        How windows begin: `initial_states.FITTED`, `CHAINED` or `MEASURED`.
+        How segments begin: `initial_states.FITTED`, `CONTINUED` or `MEASURED`.
     hopeless : float
-        Error (see `Candidate.rmse`) above which the fit is of no use: it ends where it would stay there
+        Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
     outlook : int
         Iterations that are to follow in other fits.
@@ -266,23 +254,23 @@ def fit_windows(
     -------
     Candidate
     """
-    problem = Problem(model, records, names, 100_000, limits, colour, begins, (hopeless, outlook))
-    problem.stage(list(windows), thin, starts)
+    problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
+    problem.stage(list(segments), thin, starts)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)
     if not errors or problem.slopes is None or not names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
-    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    covariance, null = covariance_of(problem, problem.sensitivity(), *problem.slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
-def _cut(records, lengths) -> list[Windows]:
-    return [make_windows(r, n) for r, n in zip(records, lengths, strict=True)]
+def _cut(records, lengths) -> list[Segments]:
+    return [make_segments(r, n) for r, n in zip(records, lengths, strict=True)]
 
 
-def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
-    """Return the lengths of windows of the stages before the last, shortest first.
+def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
+    """Return the lengths of segments of the stages before the last, shortest first.
 
     Over half a stroke an error of a parameter has not grown beyond what its slope tells. An elastic joint
     rings faster than the drive turns: there a few periods of it come first, then more of them.
@@ -307,23 +295,23 @@ def _short_windows(simulator, records, lengths) -> list[list[float | None]]:
 # --- the answer -----------------------------------------------------------------------------------
 
 
-def _candidate(problem: Problem, theta, central) -> Candidate:
+def _candidate(problem: Problem, theta, central) -> FitResult:
     """Return the outcome with covariance, from derivatives about the solution."""
     if not problem.names:
         return _outcome(problem, theta, np.zeros((0, 0)), [])
     base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
     problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
-    covariance, null = covariance_of(problem, problem.tangent(), *problem.slopes)
+    covariance, null = covariance_of(problem, problem.sensitivity(), *problem.slopes)
     slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
 
 
-def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
+def _outcome(problem: Problem, theta, covariance, null) -> FitResult:
     values = problem.values(theta) or {}
     residual = problem.last
     total, count = problem.power(residual)
     spread, _ = problem.power([y - y.mean() for y in problem.measured])
-    return Candidate(
+    return FitResult(
         model=problem.simulators[0].with_values(values),
         names=problem.names,
         values=np.array([values[k] for k in problem.names]),
@@ -332,7 +320,7 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
         count=count,
         unit=problem.unit,
-        colour=problem.colour,
+        error_filter=problem.error_filter,
         rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
@@ -348,6 +336,6 @@ def _outcome(problem: Problem, theta, covariance, null) -> Candidate:
         null=null,
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
         starts=problem.nuisance,
-        windows=problem.windows,
-        linear=problem.tangent if problem.slopes is not None and problem.names else None,
+        segments=problem.segments,
+        linear=problem.sensitivity if problem.slopes is not None and problem.names else None,
     )

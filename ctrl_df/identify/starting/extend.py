@@ -17,7 +17,7 @@ def applicable(cls, block) -> bool:
     return cls.applicable(block)
 
 
-def attach(block, effect):
+def extended(block, effect):
     """Return the block with the effect added, or None where the two contradict each other.
 
     Static levels of the effect below the block's kinetic one are raised to it.

@@ -7,7 +7,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparisonBase:
     """A model beside records, each by itself in `records`.
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several.

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 
 from ..thresholds import ANGLE_WORTH, ANGLES
-from .candidate import Candidate
+from .fit import FitResult
 
 
-def rephased(near: Candidate, fit) -> Candidate:
+def reestimated_per_record(near: FitResult, fit) -> FitResult:
     """Return a model with its angles per record as this record has them, where it says so.
 
     Parameters
     ----------
-    near : Candidate
+    near : FitResult
         The model with its initial states fitted.
     fit : callable
-        ``fit(block, names, starts, iterations)`` over the same windows.
+        ``fit(block, names, starts, iterations)`` over the same segments.
     """
     best = near
     for name in [k for k, p in near.model.parameters.items() if p.per_record]:

@@ -1,0 +1,369 @@
+"""The data of a diagnosis, made ready for many fits: segments to fit, segments to validate on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...units import size
+from ..data import derivatives
+from ..data.measurement import Measurement
+from ..thresholds import (
+    BRIEF,
+    FILTERED,
+    FULL_SAMPLES,
+    HOLDOUT_PARTS,
+    LEVELS,
+    NOISE_FREE,
+    PARAMETER_RANGE,
+    PROCESS_NOISE,
+    SCREEN_SAMPLES,
+    SEGMENT_LEAST,
+    SHORTEST,
+)
+from .angles_per_record import reestimated_per_record
+from .fit import FitResult, fit_segments
+from .initial_states import CONTINUED, FREE, MEASURED
+from .noise_model import NoiseModel, second_difference_filter
+from .segments import Segments, cut, facts, split
+from .simulator import Simulator
+from .variables import RecordScales
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Typical sizes of force [N], position [m], speed [m/s] and mass [kg] in the records."""
+
+    force: float
+    position: float
+    speed: float
+    mass: float
+
+    def of(self, unit: str) -> float:
+        """Return the typical size of a parameter of that unit (of a machine on a line)."""
+        time = self.position / self.speed
+        return size(unit, {"N": self.force, "m": self.position, "s": time, "kg": self.mass})
+
+
+@dataclass(frozen=True)
+class SegmentedRecords:
+    """Records and the segments of each that count."""
+
+    records: tuple[Measurement, ...]
+    segments: tuple[Segments, ...]
+
+    def shorter(self, factor: int) -> SegmentedRecords:
+        """Return up to `factor` times as many segments over the same samples, none too short."""
+        pairs = zip(self.records, self.segments, strict=True)
+        return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
+
+    def every(self, step: int) -> SegmentedRecords:
+        """Return every `step`-th segment."""
+        return SegmentedRecords(
+            self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.segments)
+        )
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Measured outputs within the segments."""
+        return [r.y[w.samples] for r, w in zip(self.records, self.segments, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateFit:
+    """A model fitted to the segments fitted, and (once validated) run over those held out."""
+
+    key: str
+    train: FitResult
+    validation: FitResult | None = None
+    extra: int = 0  # parameters beyond the baseline's
+    evidence: float = 0.0
+    evidence_validation: float = 0.0  # of the segments held out alone
+    confirmed: bool = False
+
+    @property
+    def block(self):
+        """The fitted model."""
+        return self.train.model
+
+    @property
+    def validation_rmse(self) -> float:
+        """Error over the segments to validate on; NaN before it was run over them."""
+        return self.validation.rmse if self.validation is not None else math.nan
+
+    @property
+    def residuals(self) -> list[np.ndarray]:
+        """Of all segments, as evidence takes them."""
+        validation = self.validation.residual_pieces if self.validation is not None else ()
+        return [*self.train.residual_pieces, *validation]
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Simulated, of all segments, as evidence takes them."""
+        validation = self.validation.simulated_pieces if self.validation is not None else ()
+        return [*self.train.simulated_pieces, *validation]
+
+    @property
+    def size(self) -> float:
+        """Sum of squared residuals."""
+        return float(sum(np.sum(r * r) for r in self.residuals))
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentedData:
+    """Everything the fits of one diagnosis share: segments of one length, and those of others."""
+
+    train: SegmentedRecords
+    validation: SegmentedRecords
+    thin: int
+    scales: Scales
+    limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
+    filtered: RecordScales  # of effects
+    whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
+    step: int = 0  # samples a step of the input before this was made fine
+    error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
+    begins: str = FREE  # how segments begin
+
+    def level(self, factor: int) -> SegmentedData:
+        """Return the same data in segments `factor` times as many as the longest."""
+        train, validation = self.whole or (self.train, self.validation)
+        return replace(
+            self,
+            train=train.shorter(factor),
+            validation=validation.shorter(factor),
+            whole=(train, validation),
+        )
+
+    @property
+    def noise(self) -> float:
+        """Noise floor of the records fitted."""
+        return math.sqrt(float(np.mean([facts(r).noise ** 2 for r in self.train.records])))
+
+    @property
+    def segmentations(self) -> list[SegmentedData]:
+        """The same in segments of three lengths, the shortest first."""
+        return [self.level(f) for f in LEVELS]
+
+    @property
+    def noise_free(self) -> bool:
+        """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
+        return all(derivatives.grain(r.y) < NOISE_FREE * facts(r).spread for r in self.train.records)
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether disturbance forces (friction that drifts) outweigh the noise."""
+        return self.error_filter is not None
+
+    @property
+    def with_process_noise(self) -> SegmentedData:
+        """The same for a machine with disturbance forces.
+
+        The slow error that such forces leave would drown all else: what counts are the forces, averaged.
+        """
+        length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.segments])))
+        thin = max(self.thin // 2, 1)
+        return replace(
+            self,
+            error_filter=second_difference_filter(max(thin, round(length / FILTERED), 2)),
+            thin=thin,
+            begins=MEASURED,
+        )
+
+    @property
+    def short_segments(self) -> SegmentedData:
+        """The same by position over segments in which slow forces move nothing far: for parameters alone.
+
+        Disturbance forces blur parameters least there. What hides in a joint or in bristles is not told:
+        their states, fitted anew in every segment, pass for it. No limits: models of any rung of a ladder
+        begin near.
+        """
+        return replace(self.level(BRIEF), error_filter=None, begins=FREE, limits={})
+
+    @property
+    def continued(self) -> SegmentedData:
+        """The same with hidden states that go on from segment to segment."""
+        return replace(self, begins=CONTINUED)
+
+    @property
+    def sampled(self) -> SegmentedData:
+        """The same with every second segment to fit, for a first look."""
+        return replace(self, train=self.train.every(2))
+
+    @property
+    def fine(self) -> SegmentedData:
+        """The same at the records' full rate, or as many steps of a longer one as do."""
+        longest = max(len(r) for view in (self.train, self.validation) for r in view.records)
+        return replace(self, thin=min(max(1, round(longest / FULL_SAMPLES)), self.thin), step=self.thin)
+
+    def simulator(self, block, record, **keywords) -> Simulator:
+        """Return a model on one of the records, as these fits run it."""
+        return Simulator(block, record, thin=self.thin, begins=self.begins, **keywords)
+
+    def carries(self, block) -> bool:
+        """Whether the block has hidden states that go on from segment to segment."""
+        return any(self.simulator(block, r).continued for r in self.train.records)
+
+    def fit(
+        self,
+        block,
+        names,
+        *,
+        view=None,
+        starts=None,
+        iterations=12,
+        tolerance=1e-3,
+        hopeless=math.inf,
+        outlook=0,
+    ) -> FitResult:
+        """Fit the named parameters over the segments fitted (or those of `view`)."""
+        view = view or self.train
+        return fit_segments(
+            block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
+            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
+            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
+        )  # fmt: skip
+
+    def limits_of(self, block) -> dict[str, tuple[float, float]]:
+        """Return least and largest values: the model's own, and what the records show of its effects."""
+        limits = {}
+        for key, effect in block.named_effects.items():
+            for name, span in effect.ranges(self.filtered).items():
+                limits[f"{key}.{name}"] = span
+        return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
+
+    def moved(self, found: FitResult, iterations=6, tolerance=5e-3, hopeless=math.inf) -> FitResult:
+        """Fit a model found over other segments to these; those that begin at one sample share states."""
+        starts = same_begins(found, self.train.segments)
+        if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
+            # The initial states of new segments first: parameters would bend to make up for them.
+            states = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2, hopeless=hopeless)
+            starts = states.starts
+        return self.fit(
+            found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance,
+            hopeless=hopeless,
+        )  # fmt: skip
+
+    def validate(self, tried: CandidateFit) -> CandidateFit:
+        """Run a fitted model over the segments to validate on, from initial states of their own."""
+        return replace(tried, validation=self._ran(tried.block, "validation"))
+
+    def errors(self, model) -> tuple[float, float]:
+        """Return nrmse of a model as it is, over the segments fitted and those held out."""
+        return self._ran(model, "train").nrmse, self._ran(model, "validation").nrmse
+
+    def _ran(self, model, name) -> FitResult:
+        """Fit the initial states alone: short segments first, found without fail; the others begin there."""
+        rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
+        short = getattr(self.level(SHORTEST), name)
+        near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
+        if name == "validation" and view.records is not self.train.records:
+            near = reestimated_per_record(
+                near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
+            )
+            model = near.model
+        near = rough.fit(model, (), view=view, starts=same_begins(near, view.segments), iterations=3)
+        return self.fit(model, (), view=view, starts=near.starts, iterations=1)
+
+
+def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
+    """Cut records into segments; without records held out, every third ninth of each is."""
+    records = tuple(records)
+    if validation:
+        learn = SegmentedRecords(records, tuple(cut(r, _count(r)) for r in records))
+        judge = SegmentedRecords(tuple(validation), tuple(cut(r, _count(r)) for r in validation))
+    else:
+        whole = [cut(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
+        third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
+        if any(not np.any(t) or np.all(t) for t in third):
+            raise ValueError(
+                "diagnose needs records of at least 180 samples where none is held out; "
+                f"got {min(map(len, records))}. Give holdout=, or a longer record."
+            )
+        learn = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
+        judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+    thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
+    thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    while thin > 1 and any(_rough(r, thin) for r in (*records, *validation)):
+        thin //= 2
+    known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
+    limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
+    scales = _scales(block, records)
+    seen = RecordScales(
+        scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
+        max(r.duration for r in records),
+    )  # fmt: skip
+    return SegmentedData(learn, judge, thin, scales, limits, seen)
+
+
+def _within(own, shown) -> tuple[float, float]:
+    """Return what both ranges have in common, or the model's own where that is nothing."""
+    if shown is None:
+        return own
+    low, high = max(own[0], shown[0]), min(own[1], shown[1])
+    return (low, high) if low < high else own
+
+
+def _rough(record, thin: int) -> bool:
+    """Whether the input jumps about within the steps of a thinned one: its peaks decide what breaks away."""
+    u, t = record.u, record.t
+    off = np.abs(u - np.interp(t, t[::thin], u[::thin]))
+    # single jumps (steps of the force) are no harm: what counts is what most samples do
+    return float(np.quantile(off, 0.75)) > 0.05 * float(np.std(u))
+
+
+def _count(record) -> int:
+    """Return the number of segments: two to-and-fro motions and a half each, 60 samples at least."""
+    known, n = facts(record), len(record)
+    return int(min(max(round(record.duration / max(2.5 * known.swing, 60 * record.duration / n)), 4), 40))
+
+
+def _scales(block, records) -> Scales:
+    force = math.sqrt(np.mean([np.mean(r.u**2) for r in records]))
+    position = math.sqrt(np.mean([np.var(r.y) for r in records]))
+    speed = math.sqrt(np.mean([np.mean(facts(r).velocity ** 2) for r in records]))
+    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
+    return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
+
+
+def short_segment(model, records: Sequence[Measurement]) -> float | None:
+    """Return the length [s] of `SegmentedData.short_segments` where disturbance forces prevail; or None.
+
+    Not for models of which something is hidden, nor for records too short to tell.
+    """
+    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST:
+        return None
+    data = prepare(model, records, records)
+    near, disturbed = (
+        data.segmentations[0].fit(model, (), iterations=4, tolerance=2e-2),
+        data.with_process_noise,
+    )
+    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
+        return None
+    segments = disturbed.short_segments.train.segments
+    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]
+    return float(np.median(np.concatenate(spans)))
+
+
+def same_begins(found: FitResult, segments) -> list[np.ndarray]:
+    """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
+    starts = []
+    for old, new, states in zip(found.segments, segments, found.starts, strict=True):
+        at = np.searchsorted(old.begins, new.begins)
+        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
+        rows = np.zeros((len(new), states.shape[1]))
+        rows[same] = states[at[same]]
+        starts.append(rows)
+    return starts
+
+
+def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
+    """Return one model's initial states as those of another: what the first lacks begins as usual."""
+    given = dict(zip(before.nuisances, starts.T, strict=True))
+    columns = []
+    for name in simulator.nuisances:
+        usual = np.where(segments.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(segments))
+        columns.append(given.get(name, usual))
+    return np.array(columns).T.reshape(len(segments), len(columns))

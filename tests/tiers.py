@@ -1,0 +1,28 @@
+"""Write the list of slow tests from the times of a run; what was not run stays as it is listed.
+
+CTRL_DF_TIMES=times.txt pytest; python tests/tiers.py times.txt
+"""
+
+import sys
+from pathlib import Path
+
+from conftest import SLOW
+
+LONG = 1.0  # [s of processor]
+
+
+def main(path) -> None:
+    """Replace the lines of all tests that were timed."""
+    times = {}
+    for line in Path(path).read_text().splitlines():
+        seconds, _, name = line.partition(" ")
+        times[name] = max(times.get(name, 0.0), float(seconds))
+    listed = set(SLOW.read_text().split("\n")) - {""} if SLOW.exists() else set()
+    slow = {name for name in listed if name not in times} | {n for n, s in times.items() if s > LONG}
+    SLOW.write_text("\n".join(sorted(slow)) + "\n")
+    left = sum(s for n, s in times.items() if n not in slow)
+    print(f"{len(slow)} slow tests; the others take {left:.0f} s of processor")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
