@@ -92,7 +92,8 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     elif two_mass:
         joint = RIGID
     if joint is not None and not two_mass:
-        share = (compliance or backlash).load_fraction
+        dividing: Any = compliance or backlash
+        share = dividing.load_fraction
         masses = (share * masses[0], (1 - share) * masses[0])
     motor = len(masses) - 1
     names = ["x", "v"] + (["x_motor", "v_motor"] if motor else [])
