@@ -252,3 +252,48 @@ def test_a_motor_on_voltage_and_on_current():
 def test_bad_parameters_are_refused(made):
     with pytest.raises(ValueError, match="needs"):
         made()
+
+
+# --- found in records -------------------------------------------------------------------------------------
+
+
+def recorded(block, t, u, seed=0):
+    y = cdf.event_response(block, t, u, 0.0, input_hold="zoh").outputs[0]
+    y = y + 1e-3 * np.std(y) * np.random.default_rng(seed).standard_normal(len(t))
+    units = {
+        k: block.signals[name] for k, name in zip(("input_unit", "output_unit"), block.signals, strict=False)
+    }
+    return cdf.Measurement(t, u, y, **units)
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        cdf.LinearSpring(-12.0),
+        cdf.CubicSpring(-40.0),
+        cdf.LoadDependentFriction(0.12),
+        cdf.PositionDependentFriction(0.8, 0.3, 0.5),
+        cdf.Hysteresis(1.5, 0.02),
+    ],
+    ids=lambda e: e.id,
+)
+def test_it_is_named_among_its_likes(hidden):
+    few = (
+        "linear_spring",
+        "cubic_spring",
+        "load_dependent_friction",
+        "position_dependent_friction",
+        "hysteresis",
+    )
+    rng, t = np.random.default_rng(3), 2e-3 * np.arange(4000)
+    tones, phases = rng.uniform(0.3, 3, 8), rng.uniform(0, 6, 8)
+    u = sum(4 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
+    base = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0), cdf.LinearSpring(40.0, 0.05)])
+    if hidden.id == "linear_spring":
+        base = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0), cdf.CubicSpring(60.0)])
+    data = recorded(base.with_effect(hidden), t, u)
+    off = base.with_parameters({"mass": 2.6, "coulomb.level": 2.4})
+    found = cdf.diagnose(off, data, candidates=few)
+    assert found.verdict == "effect" and found.best.id == hidden.id
+    name, p = next(iter(hidden.parameters.items()))
+    assert found.best.parameters[name] == pytest.approx(p.value, rel=0.1)

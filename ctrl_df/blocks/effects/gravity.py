@@ -24,6 +24,12 @@ class Gravity(Effect):
         m g l [N m], >= 0: weight times distance of the centre of mass.
     angle0 : float
         Where it hangs [rad].
+
+    Examples
+    --------
+    >>> pendulum = cdf.Inertia(0.5).with_effect(cdf.Gravity(2.0))
+    >>> [round(float(pendulum.dynamics(0, [angle, 0.0], [0.0])[1]), 3) for angle in (0.5, 3.0)]
+    [-1.918, -0.564]
     """
 
     torque: float = parameter("N", meaning="weight times lever")

@@ -25,6 +25,13 @@ class Hysteresis(Effect):
         Over which it builds up [m], > 0.
     shape : float
         How sharply it bends over, >= 1: 1 as the exponential, large as a spring with a slider.
+
+    Examples
+    --------
+    >>> flexure = cdf.Mass(2.0).with_effect(cdf.Hysteresis(4.0, stroke=0.1))
+    >>> pushed = cdf.event_response(flexure, [0.0, 1.0], 3.0)  # below saturation: it swings about 1.1 strokes
+    >>> bool(pushed.states[2, -1] < 1.0)
+    True
     """
 
     force: float = parameter("N", meaning="saturated force")

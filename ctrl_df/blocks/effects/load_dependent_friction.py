@@ -22,6 +22,12 @@ class LoadDependentFriction(Effect):
         Friction level over force carried, >= 0.
     share : float
         Share of the inertia that lies behind the gears, 0 to 1; only forces besides the drive's tell of it.
+
+    Examples
+    --------
+    >>> screw = cdf.Mass(2.0).with_effect(cdf.LoadDependentFriction(0.2))
+    >>> [float(screw.dynamics(0, [0.0, 0.1], [F])[1]) for F in (10.0, -10.0)]  # pushing on, braking
+    [4.0, -6.0]
     """
 
     coefficient: float = parameter("", meaning="friction level over force carried")

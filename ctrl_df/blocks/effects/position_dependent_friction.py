@@ -26,6 +26,12 @@ class PositionDependentFriction(Effect):
         Period over position [m], > 0.
     phase : float
         Phase at x = 0 [rad].
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0, [cdf.Coulomb(3.0), cdf.PositionDependentFriction(1.0, wavelength=0.4)])
+    >>> [round(float(axis.dynamics(0, [x, 0.1], [0.0])[1]), 3) for x in (0.0, 0.1, 0.3)]
+    [-1.5, -2.0, -1.0]
     """
 
     amplitude: float = parameter("N", meaning="by how much the level rises and falls")

@@ -23,6 +23,14 @@ class TorqueConstant(Effect):
         Force over current [N/A], which is back-EMF over speed [V s/m]; > 0.
     resistance : float
         Of the winding [V/A]; 0: the input is a current.
+
+    Examples
+    --------
+    >>> motor = cdf.Inertia(1e-4).with_effect(cdf.TorqueConstant(0.05, resistance=2.0))
+    >>> motor.signals["torque"]
+    'V'
+    >>> round(float(motor.dynamics(0, [0.0, 100.0], [12.0])[1]))  # 0.05 N m/A (12 V - 5 V) / 2 ohm
+    1750
     """
 
     constant: float = parameter("N/A", strict=True, meaning="force over current")
