@@ -251,7 +251,7 @@ SETTLE, COUNTED, SINES = 12, 8, 6
 # --- the missing force as a signal ------------------------------------------------------------------
 
 SMOOTHER_STEPS = 2500
-"""Steps of a record: 4 ms of ten seconds, finer than what the noise of a position lets see of forces (rigs)."""
+"""Steps of a record: 4 ms of ten seconds, finer than noise of a position lets see of forces (rigs)."""
 
 SMOOTHER_ROUNDS = 12
 """Linearizations at most; rigs take three to seven."""
