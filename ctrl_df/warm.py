@@ -106,12 +106,13 @@ def _laws():
     from .blocks.effect import effect_library
     from .blocks.memoryless import cubic
     from .simulate.engine import Engine
+    from .simulate.program.nodes import signature_of
     from .simulate.program.pointers import address
 
     for effect in effect_library().values():
         law = getattr(effect, "law", None)
-        if law is not None and effect.role in ("force", "friction"):
-            address(law, effect.role)
+        if law is not None:
+            address(law, signature_of(effect))
     Engine(cubic(1.0))
 
 

@@ -23,8 +23,9 @@ from numba import njit
     SENSOR_DELAY, SENSOR_STEP, SENSOR_OFFSET, SENSOR_DRIFT,
     MASS_RATE, COULOMB_RATE, ZONE, ZONE_LOW, ZONE_HIGH, HYSTERESIS_K, HYSTERESIS_B, HUM, HUM_OMEGA, HUM_PHASE,
     FORCE_FRICTION, WARMING, GAIN_RIPPLE, GAIN_LENGTH, WELL, WELL_X, WELL_WIDTH, PUSH, PUSH_FROM, PUSH_TO,
+    PENDULUM, PENDULUM_ANGLE, PLACED, PLACED_LENGTH, PLACED_PHASE,
     N_NUMBERS,
-) = range(62)  # fmt: skip
+) = range(67)  # fmt: skip
 
 NO_JOINT, IMPACT, ELASTIC = 0, 1, 2
 # State: load and motor motion, bristle deflection, lagged force, hysteresis deflection, frictional work.
@@ -40,7 +41,7 @@ def numbers(**given: float) -> np.ndarray:
     """Return a parameter vector; every effect not named is absent."""
     p = np.zeros(N_NUMBERS)
     p[GAIN], p[SATURATION], p[STRIBECK_V], p[RIPPLE_LENGTH], p[GAIN_LENGTH] = 1.0, math.inf, 1.0, 1.0, 1.0
-    p[WELL_WIDTH] = 1.0
+    p[WELL_WIDTH] = p[PLACED_LENGTH] = 1.0
     for name, value in given.items():
         p[globals()[name]] = value
     return p
@@ -256,6 +257,8 @@ def _forces(p, t, s, u):
         f -= p[CUBIC] * (x - p[CUBIC_X]) ** 3
     if p[RIPPLE] != 0:
         f += p[RIPPLE] * math.sin(2 * math.pi * x / p[RIPPLE_LENGTH] + p[RIPPLE_PHASE])
+    if p[PENDULUM] != 0:
+        f -= p[PENDULUM] * math.sin(x - p[PENDULUM_ANGLE])
     if p[HUM] != 0:
         f += p[HUM] * math.sin(p[HUM_OMEGA] * t + p[HUM_PHASE])
     if p[WELL] != 0:
@@ -291,6 +294,9 @@ def _level(p, t, s, u, moving, direction):
     level = p[COULOMB] * (1.0 + p[COULOMB_RATE] * t) + p[WARMING] * s[WORK]
     if p[FORCE_FRICTION] != 0:
         level += p[FORCE_FRICTION] * abs(_drive_force(p, s, u))
+    if p[PLACED] != 0:
+        wave = math.sin(2 * math.pi * s[XM] / p[PLACED_LENGTH] + p[PLACED_PHASE])
+        level = max(level + p[PLACED] * wave, 0.0)
     if p[ZONE] != 0:
         edge = 0.1 * (p[ZONE_HIGH] - p[ZONE_LOW])
         level += (

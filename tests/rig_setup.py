@@ -10,6 +10,8 @@ import rig_physics as physics
 from rig_excitation import controller_for, excite, reference
 from rig_sizes import EFFECTS, OUTSIDE, base_needs
 
+from ctrl_df.blocks.effect import effect_class
+
 RATIO = (3.0, 200.0)
 
 
@@ -18,7 +20,8 @@ class Record:
     """One run: time [s], force [N] held over each sample, reported position [m], and what a test may know.
 
     `v` is a velocity channel [m/s] or None; `r` the reference of a closed loop or None; `clean` the position
-    without noise and encoder; `noise` the rms of noise and encoder together [m].
+    without noise and encoder; `noise` the rms of noise and encoder together [m]. Where the drive `turns`, all
+    is in units of rotation.
     """
 
     t: np.ndarray
@@ -30,12 +33,14 @@ class Record:
     noise: float
     excitation: str
     name: str
+    turns: bool = False
 
     def measurement(self):
         """Return the record as the library's `Measurement`."""
         from ctrl_df.identify.data.measurement import Measurement
 
-        return Measurement(self.t, self.u, self.y, name=self.name, velocity=self.v)
+        units = dict(input_unit="N m", output_unit="rad", velocity_unit="rad/s") if self.turns else {}
+        return Measurement(self.t, self.u, self.y, name=self.name, velocity=self.v, **units)
 
 
 def is_free(name):
@@ -55,6 +60,10 @@ _FIELDS = {
     "RESTITUTION", "compliance.stiffness": "JOINT_K", "compliance.damping": "JOINT_C", "input_gain.gain":
     "GAIN", "input_saturation.level": "SATURATION", "input_dead_zone.threshold": "DEAD_ZONE",
     "input_delay.delay": "DELAY", "input_lag.time_constant": "LAG", "sensor_delay.delay": "SENSOR_DELAY",
+    "gravity.torque": "PENDULUM", "gravity.angle0": "PENDULUM_ANGLE",
+    "position_dependent_friction.amplitude": "PLACED", "position_dependent_friction.wavelength":
+    "PLACED_LENGTH", "position_dependent_friction.phase": "PLACED_PHASE",
+    "load_dependent_friction.coefficient": "FORCE_FRICTION",
     "sensor_quantization.step": "SENSOR_STEP", "sensor_offset.offset": "SENSOR_OFFSET", "drift.rate":
     "SENSOR_DRIFT",
 }  # fmt: skip
@@ -68,6 +77,9 @@ def pack(values: dict[str, float]) -> np.ndarray:
             given[_FIELDS[name]] = value
         elif name.startswith("outside."):
             given[name.removeprefix("outside.").upper()] = value
+    if "hysteresis.force" in values:
+        stroke = values["hysteresis.stroke"]
+        given.update(HYSTERESIS_K=values["hysteresis.force"] / stroke, HYSTERESIS_B=1 / stroke)
     if "hard_stop.limit" in values:
         given.update(STOP=1.0, STOP_LOW=-values["hard_stop.limit"])
     joint = (
@@ -105,6 +117,8 @@ class Setup:
         self.w = 2 * math.pi * self.f0
         mass = float(np.exp(rng.uniform(np.log(0.5), np.log(100))))
         self.speed = float(np.exp(rng.uniform(np.log(0.05), np.log(0.5))))
+        if wants.stroke is not None:
+            self.speed = self.w * float(rng.uniform(*wants.stroke))
         self.stroke = self.speed / self.w
         self.inertia = mass * self.speed * self.w  # force that makes this speed at f0
         kinetic = self.inertia * float(rng.uniform(*wants.dry))
@@ -323,7 +337,8 @@ class Setup:
         if velocity:
             v = run["v"] + 10 ** (-self.snr_db / 20) * np.std(run["v"]) * rng.standard_normal(self.n)
         return Record(
-            t, run["u"], run["y"], v, given if self.closed_loop else None, run["clean"], sigma, kind, name
+            t, run["u"], run["y"], v, given if self.closed_loop else None, run["clean"], sigma, kind, name,
+            any(effect_class(i).turns for i in self.ids),
         )  # fmt: skip
 
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 # Effects of one rig act in this order (it matters for friction laws that build on each other and for drives).
 ORDER = (
-    "coulomb", "stribeck", "stiction", "asymmetric_coulomb", "load_friction", "bristle", "viscous",
-    "quadratic_drag", "asymmetric_viscous", "linear_spring", "cubic_spring", "position_ripple",
-    "constant_force", "hard_stop", "backlash", "compliance", "input_gain", "input_saturation",
+    "coulomb", "load_dependent_friction", "position_dependent_friction",
+    "stribeck", "stiction", "asymmetric_coulomb", "load_friction", "bristle", "viscous",
+    "quadratic_drag", "asymmetric_viscous", "linear_spring", "cubic_spring", "position_ripple", "gravity",
+    "hysteresis", "constant_force", "hard_stop", "backlash", "compliance", "input_gain", "input_saturation",
     "input_dead_zone", "input_delay", "input_lag", "sensor_delay", "sensor_quantization", "sensor_offset",
     "drift",
 )  # fmt: skip
@@ -62,6 +63,7 @@ class Needs:
     effects: tuple[str, ...] = ()
     dry: tuple[float, float] = (0.08, 0.3)  # kinetic level over inertia force
     drive: tuple[float, float] = (1.2, 2.5)  # peak force over inertia force
+    stroke: tuple[float, float] | None = None  # swing [rad], where it matters
 
 
 def base_needs(ids, outside) -> Needs:
@@ -74,7 +76,7 @@ def base_needs(ids, outside) -> Needs:
     slow = {"stiction", "stribeck", "bristle"} & set(ids)
     if slow:
         return Needs(tuple(effects), (0.3, 0.6), (0.7, 1.4))
-    return Needs(tuple(effects))
+    return Needs(tuple(effects), stroke=(0.5, 1.5) if "gravity" in ids else None)
 
 
 # --- friction -------------------------------------------------------------------------------------
@@ -126,6 +128,17 @@ def _(rng, c, s):
     return {"level": s * c.peak}
 
 
+@_effect("load_dependent_friction", 0.1, (1e-3, 0.6))
+def _(rng, c, s):
+    return {"coefficient": s}
+
+
+@_effect("position_dependent_friction", 0.3, (0.01, 1.0))
+def _(rng, c, s):
+    wavelength = c.stroke * math.exp(rng.uniform(math.log(0.3), math.log(5.0)))
+    return {"amplitude": s * c.kinetic, "wavelength": wavelength, "phase": rng.uniform(-math.pi, math.pi)}
+
+
 # --- forces over position -------------------------------------------------------------------------
 
 
@@ -133,6 +146,16 @@ def _(rng, c, s):
 def _(rng, c, s):
     wavelength = c.stroke * rng.uniform(0.15, 0.8)
     return {"amplitude": s * c.peak, "wavelength": wavelength, "phase": rng.uniform(-math.pi, math.pi)}
+
+
+@_effect("gravity", 0.2, (1e-4, 2.0))
+def _(rng, c, s):
+    return {"torque": s * c.peak, "angle0": rng.uniform(-0.5, 0.5)}
+
+
+@_effect("hysteresis", 0.1, (1e-3, 1.0))
+def _(rng, c, s):
+    return {"force": s * c.peak, "stroke": c.stroke * rng.uniform(0.1, 0.8)}
 
 
 @_effect("constant_force", 0.01, (1e-6, 0.3))
@@ -259,12 +282,6 @@ def _(rng, c, s):
     }
 
 
-@_outside("saturating_hysteresis", 0.1, (1e-3, 1.0), "after_reversal", "position", "direction", "amplitude")
-def _(rng, c, s):
-    stroke = rng.uniform(0.3, 0.8) * c.stroke
-    return {"hysteresis_k": s * c.peak / stroke, "hysteresis_b": 1 / stroke}
-
-
 @_outside("hum", 0.02, (1e-4, 0.3), "frequency", "time")
 def _(rng, c, s):
     return {"hum": s * c.peak, "hum_omega": c.w * rng.uniform(1.3, 4.0), "hum_phase": rng.uniform(0, 6.28)}
@@ -274,11 +291,6 @@ def _(rng, c, s):
 def _(rng, c, s):
     start, span = rng.uniform(0.25, 0.7) * c.n * c.dt, rng.uniform(0.05, 0.15) * c.n * c.dt
     return {"push": s * c.peak, "push_from": start, "push_to": start + span}
-
-
-@_outside("force_dependent_friction", 0.1, (1e-3, 0.6), "load")
-def _(rng, c, s):
-    return {"force_friction": s}
 
 
 @_outside("drive_gain_over_position", 0.1, (1e-3, 0.6), "position", "load")

@@ -20,6 +20,7 @@ from rig_sizes import EFFECTS, ORDER, OUTSIDE
 
 from ctrl_df.blocks.effect import effect_class
 from ctrl_df.blocks.mechanism import Mass
+from ctrl_df.blocks.rotary import Inertia
 
 EXCITATIONS = ("multisine", "chirp", "steps")
 NOISES = ("white", "coloured", "encoder")
@@ -184,9 +185,11 @@ def _attempt(setup, name, seed, ratio, velocity, off):
     known = ("mass",) if "input_gain" in setup.ids else ()
     nominal = {k: v if k in known else _shift(rng, k, v, off) for k, v in base.items() if is_free(k)}
     nominal.update({k: v for k, v in base.items() if not is_free(k)})
+    turns = any(effect_class(i).turns for i in setup.ids)
     return Rig(
         name=f"{name} #{seed}", seed=seed, hidden=setup.ids if setup.outside is None else (setup.outside,),
-        truth=truth, baseline=block(nominal), true_block=block(truth) if setup.outside is None else None,
+        truth=truth, baseline=block(nominal, turns),
+        true_block=block(truth) if setup.outside is None else None,
         train=(train,), holdout=(held,), known=known,
         equivalents={i: EQUIVALENT.get(i, frozenset()) for i in setup.ids},
         regions=OUTSIDE[setup.outside].regions if setup.outside else (), ratio=achieved, snr_db=setup.snr_db,
@@ -200,7 +203,7 @@ def _shift(rng, name, value, off):
     return min(value * factor, 0.95) if name.endswith("load_fraction") else value * factor
 
 
-def block(values: dict[str, float]):
+def block(values: dict[str, float], turns: bool = False):
     """Return the ctrl_df block with these parameters; effects in the rigs' canonical order."""
     groups: dict[str, dict[str, float]] = {}
     for key, value in values.items():
@@ -208,4 +211,6 @@ def block(values: dict[str, float]):
             effect, parameter = key.split(".")
             groups.setdefault(effect, {})[parameter] = value
     effects = [effect_class(i)(**groups[i]) for i in ORDER if i in groups]
+    if any(e.turns for e in effects) or turns:
+        return Inertia(values["mass"], effects, measured="load")
     return Mass(values["mass"], effects, measured="load")

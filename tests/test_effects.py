@@ -34,7 +34,9 @@ def test_laws_said_to_be_affine_are(key, cls):
 
         def at(x, v, direction=direction):
             if cls.role == "friction":
-                return cls.law(1.0, direction, abs(v), 2.0, effect.values)
+                return cls.law(
+                    1.0, direction, abs(v), 2.0, effect.values, *((x, 0.0, 0.0) if cls.asks else ())
+                )
             return cls.law(0.0, x, v, np.zeros(1), effect.values, np.zeros(1))
 
         for _ in range(20):
@@ -57,7 +59,8 @@ def test_effects_said_to_vanish_in_proportion_do(key, cls):
     def at(factor):
         p = _made(cls, factor).values
         if cls.role == "friction":
-            return cls.law(1.0, 1.0, 0.8, 20.0, p) - 20.0
+            told = (0.3, 5.0, -2.0) if cls.asks else ()
+            return cls.law(1.0, 1.0, 0.8, 20.0, p, *told) - 20.0
         return cls.law(0.0, 2.0, 0.8, np.zeros(1), p, np.zeros(1))
 
     assert at(0.1) == pytest.approx(0.1 * at(1.0), rel=1e-9)
@@ -74,7 +77,8 @@ def test_thresholds_are_static_levels():
 def _static(cls):
     """Whether a friction law holds a resting body by more than a moving one."""
     p = tuple(9.0 for _ in fields(cls))
-    return cls.law(0.0, 1.0, 0.0, 5.0, p) > cls.law(1.0, 1.0, 1e9, 5.0, p)
+    told = (0.3, 5.0, -2.0) if cls.asks else ()
+    return cls.law(0.0, 1.0, 0.0, 5.0, p, *told) > cls.law(1.0, 1.0, 1e9, 5.0, p, *told)
 
 
 def test_sizes_follow_from_the_unit_whatever_it_is():

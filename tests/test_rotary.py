@@ -31,6 +31,7 @@ def test_every_parameter_of_the_library_has_its_unit():
     units = {
         "N": "N m", "m": "rad", "m/s": "rad/s", "N/m": "N m/rad", "N s/m": "N m s/rad", "s": "s", "": "",
         "N/m^3": "N m/rad^3", "N s^2/m^2": "N m s^2/rad^2", "kg": "kg m^2", "rad": "rad",
+        "N/A": "N m/A", "V/A": "V/A",
     }  # fmt: skip
     for k, p in cdf.Mass(1.0, EFFECTS).parameters.items():
         if k != "mass":

@@ -40,7 +40,7 @@ def test_initial_states_and_their_corrections_are_one_map(name):
     for _ in range(50):
         usual = rng.normal(size=3) * (0.1, 0.5, 5.0)
         given = {k: 0.3 * rng.normal() for k in initial_states.names(core)}
-        given |= {"slack": rng.uniform(), "deflection": 0.0}
+        given |= {"slack": rng.uniform(), "bristle": 0.0}
         states = np.zeros(6)
         initial_states.fill(states[None], core, given, usual, 0.5)
         back = initial_states.corrections(states, core, usual, 0.5)

@@ -32,18 +32,27 @@ def rates(core: Core, t: float, x, u: float) -> list[float]:
     dx = [0.0] * core.nstates
     driven = core.driven
     force = [0.0] * core.bodies
-    force[driven] = run_channel(core.input_channel, t, x, u, dx)
+    force[driven] = drive = run_channel(core.input_channel, t, x, u, dx)
     for term in core.forces:
         b, z = term.body, term.state
         z_rate = [0.0] * term.effect.states
         law = type(term.effect).law
-        force[b] += law(t, x[2 * b], x[2 * b + 1], x[z : z + term.effect.states], term.effect.values, z_rate)  # type: ignore[misc]
+        value = law(t, x[2 * b], x[2 * b + 1], x[z : z + term.effect.states], term.effect.values, z_rate)  # type: ignore[misc]
+        force[b] += value
+        if term.effect.role == "input":
+            drive += value
         dx[z : z + term.effect.states] = z_rate
+    pull = _joint(core, t, x, dx)
+    told = _told(core, x, drive, force, pull)
+    if core.bodies == 2:
+        force[0] += pull
+        force[1] -= pull
     for b in range(core.bodies):
-        carried = core.bristle is not None and b == driven
-        force[b] += _bristle(core, x, dx) if carried else _creep(core.friction[b], x[2 * b + 1])
-    _joint(core, x, force)
-    _stops(core, x, force)
+        if core.presliding is not None and b == driven:
+            force[b] += _presliding(core, x, dx, told[b])
+        else:
+            force[b] += _creep(core.friction[b], x[2 * b + 1], told[b])
+    _stops(core, t, x, dx, force)
     for b in range(core.bodies):
         dx[2 * b] = x[2 * b + 1]
         dx[2 * b + 1] = force[b] / core.masses[b]
@@ -80,46 +89,69 @@ def run_channel(channel: tuple[tuple[Primitive, int], ...], t: float, x, u: floa
     return u
 
 
-def _creep(friction, v):
+def _told(core, x, drive, force, pull):
+    """Return place, drive and load of each body, for friction laws that ask."""
+    if core.joint == RIGID:
+        common = (drive, drive - sum(force))
+        return [(x[2 * b], *common) for b in range(core.bodies)]
+    driven = (x[2 * core.driven], drive, drive - force[core.driven] + pull)
+    return [driven] if core.bodies == 1 else [(x[0], pull, -force[0]), driven]
+
+
+def _creep(friction, v, told):
     if not friction:
         return 0.0
     vs = ct.config.defaults["ctrl_df.stick_velocity"]
     direction = 1.0 if v >= 0 else -1.0
-    kinetic = level(friction, 1.0, direction, abs(v))
-    static = level(friction, 0.0, direction, 0.0)
+    kinetic = level(friction, 1.0, direction, abs(v), *told)
+    static = level(friction, 0.0, direction, 0.0, *told)
     if abs(v) < vs:
         return -static * v / vs
     return -direction * (kinetic + (static - kinetic) * math.exp(-abs(v) / vs + 1))
 
 
-def _bristle(core, x, dx):
-    bristle, s, v = core.bristle, core.bristle_state, x[2 * core.driven + 1]
-    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v)) + bristle.level
-    dx[s] = type(bristle).rate(v, x[s], g, bristle.values)
-    return -(bristle.stiffness * x[s] + bristle.damping * dx[s])
+def _presliding(core, x, dx, told):
+    effect, first, v = core.presliding.effect, core.presliding.state, x[2 * core.driven + 1]
+    g = level(core.friction[core.driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v), *told)
+    inner, rates = slice(first, first + effect.states), [0.0] * effect.states
+    force = type(effect).law(v, g, x[inner], effect.values, rates)
+    dx[inner] = rates
+    return force
 
 
-def _joint(core, x, force):
+def _called(term, t, depth, rate, x, dx):
+    """Return the force of a law over a deflection."""
+    inner, rates = slice(term.state, term.state + term.effect.states), [0.0] * term.effect.states
+    force = type(term.effect).law(t, depth, rate, x[inner], term.effect.values, rates)
+    dx[inner] = rates
+    return force
+
+
+def _joint(core, t, x, dx):
+    """Return the force of the joint on the load."""
     if core.joint not in (IMPACT, ELASTIC):
-        return
+        return 0.0
     delta, rate = x[2] - x[0], x[3] - x[1]
     bend = delta - min(max(delta, 0.0), core.gap)
     if core.joint == ELASTIC:
-        k, c = core.stiffness, core.damping
-        f = k * bend + (c * rate if bend != 0 or core.gap == 0 else 0.0)
-    else:
-        f = _contact(bend, rate, core.masses[0] * core.masses[1] / sum(core.masses), core.restitution)
-    force[0] += f
-    force[1] -= f
+        closed = bend != 0 or core.gap == 0
+        force = _called(core.coupling, t, bend, rate if closed else 0.0, x, dx)
+        return force if closed else 0.0
+    return _contact(bend, rate, core.masses[0] * core.masses[1] / sum(core.masses), core.restitution)
 
 
-def _stops(core, x, force):
-    if core.stop is None:
+def _stops(core, t, x, dx, force):
+    if core.stop is None and core.contact is None:
         return
     b = core.driven
-    low, high = core.stop.span
+    low, high = core.wall
     bend = x[2 * b] - min(max(x[2 * b], low), high)
-    force[b] -= _contact(bend, x[2 * b + 1], core.masses[b], core.stop.restitution)
+    if core.contact is not None:
+        side = math.copysign(1.0, bend) if bend != 0.0 else 0.0
+        force[b] -= side * max(_called(core.contact, t, abs(bend), side * x[2 * b + 1], x, dx), 0.0)
+        return
+    assert core.stop is not None  # it bends something
+    force[b] -= _contact(bend, x[2 * b + 1], core.masses[b], core.stop.restitution)  # type: ignore[union-attr]
 
 
 def _contact(bend, rate, mass, restitution):

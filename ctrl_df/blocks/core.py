@@ -15,11 +15,12 @@ from .effect import Effect
 from .primitives import Delay, Lag, Play, Primitive, RateLimiter
 
 RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
+BOTH = -1
 
 
 @dataclass(frozen=True)
 class ForceTerm:
-    """A smooth force on one body, with the offset of its internal states."""
+    """A law with the body it acts on (`BOTH` of a joint) and the offset of its internal states."""
 
     effect: Effect
     body: int
@@ -41,6 +42,9 @@ class Core:
     stop: Any = None
     bristle: Any = None
     bristle_state: int = -1
+    presliding: ForceTerm | None = None
+    coupling: ForceTerm | None = None
+    contact: ForceTerm | None = None
     input_channel: tuple[tuple[Primitive, int], ...] = ()
     output_channel: tuple[tuple[Primitive, int], ...] = ()
     measured: int = 0
@@ -58,9 +62,17 @@ class Core:
         return ("x", "v", "x_motor", "v_motor")[: 2 * self.bodies]
 
     @property
+    def wall(self) -> tuple[float, float]:
+        """Where stops stand, rigid or yielding; zeros where there are none."""
+        wall: Any = self.stop if self.contact is None else self.contact.effect
+        return wall.span if wall is not None else (0.0, 0.0)
+
+    @property
     def position_dependent(self) -> bool:
         """Whether a law depends on the place, or may do so: where a run begins then matters."""
-        return self.stop is not None or any(not term.effect.place_free for term in self.forces)
+        asked = any("x" in effect.asks for chain in self.friction for effect in chain)
+        stopped = self.stop is not None or self.contact is not None
+        return stopped or asked or any(not term.effect.place_free for term in self.forces)
 
     @property
     def driven(self) -> int:
@@ -80,7 +92,8 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     elif two_mass:
         joint = RIGID
     if joint is not None and not two_mass:
-        share = (compliance or backlash).load_fraction  # type: ignore[union-attr]
+        dividing: Any = compliance or backlash
+        share = dividing.load_fraction
         masses = (share * masses[0], (1 - share) * masses[0])
     motor = len(masses) - 1
     names = ["x", "v"] + (["x_motor", "v_motor"] if motor else [])
@@ -89,7 +102,7 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     friction: list[list[Effect]] = [[] for _ in masses]
     for effect in effects:
         body = 0 if effect.side == "load" else motor
-        if effect.role == "force":
+        if effect.role == "force" or (effect.role == "input" and effect.law is not None):
             forces.append(ForceTerm(effect, body, len(names)))
             names += [f"{effect.id}_{i}" for i in range(effect.states)]
         elif effect.role == "friction":
@@ -97,7 +110,14 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     bristle, bristle_state = _only(e for e in effects if e.role == "presliding"), -1
     if bristle is not None:
         bristle_state = len(names)
-        names.append(bristle.id)
+    stop = _only(e for e in effects if e.role == "contact" and not e.divides)
+    yielding = stop if stop is not None and stop.law is not None else None
+    terms = {}
+    for effect, body in ((bristle, motor), (compliance, BOTH), (yielding, motor)):
+        if effect is not None:
+            terms[effect.role] = ForceTerm(effect, body, len(names))
+            many = effect.states > 1
+            names += [f"{effect.id}_{i}" if many else effect.id for i in range(effect.states)]
     channels: dict[str, list[tuple[Primitive, int]]] = {"input": [], "output": []}
     for effect in effects:
         if effect.role in channels:
@@ -113,11 +133,12 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         friction=tuple(tuple(sorted(group, key=lambda e: e.rank)) for group in friction),
         gap=backlash.gap if backlash else 0.0,
         restitution=backlash.restitution if backlash else 0.0,
-        stiffness=compliance.stiffness if compliance else 0.0,
-        damping=compliance.damping if compliance else 0.0,
-        stop=_only(e for e in effects if e.role == "contact" and not e.divides),
+        stiffness=getattr(compliance, "stiffness", 0.0),
+        damping=getattr(compliance, "damping", 0.0),
+        stop=stop if yielding is None else None,
         bristle=bristle,
         bristle_state=bristle_state,
+        **terms,
         input_channel=tuple(channels["input"]),
         output_channel=tuple(channels["output"]),
         measured=motor if measured == "motor" else 0,
@@ -126,11 +147,20 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
     )
 
 
-def level(effects: Sequence[Effect], moving: float, direction: float, speed: float) -> float:
-    """Dry friction level [N] of a chain of friction effects."""
+def level(
+    effects: Sequence[Effect],
+    moving: float,
+    direction: float,
+    speed: float,
+    place: float = 0.0,
+    drive: float = 0.0,
+    load: float = 0.0,
+) -> float:
+    """Dry friction level [N] of a chain of friction effects; laws that ask are told place, drive, load."""
     value = 0.0
     for effect in effects:
-        value = type(effect).law(moving, direction, speed, value, effect.values)  # type: ignore[misc]
+        told = (place, drive, load) if effect.asks else ()
+        value = type(effect).law(moving, direction, speed, value, effect.values, *told)  # type: ignore[misc]
     return value
 
 

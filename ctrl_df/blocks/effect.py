@@ -11,12 +11,18 @@ role          what the class provides
 ``force``     ``law(t, x, v, z, p, dz) -> force`` [N] along +x, smooth; ``states`` internal states
               z, whose rates the law writes into dz
 ``friction``  ``law(moving, direction, speed, base, p) -> level`` [N]: the dry friction level given the
-              level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static
-``contact``   the engine's law of impact: fields ``gap``, ``restitution``, ``load_fraction`` of one that
-              `divides` the mass (`Backlash`); else ``restitution`` and a property ``span`` (`HardStop`)
-``coupling``  the engine's elastic joint: fields ``stiffness``, ``damping``, ``load_fraction`` (`Compliance`)
-``presliding`` the engine's bristles: fields ``stiffness``, ``damping``, ``level`` (`Bristle`)
-``input``     ``channel() -> tuple of primitives`` that the applied force passes through
+              level `base` of the effects before it; ``moving`` 1.0 kinetic, 0.0 static. One that
+              `asks` for more is called ``law(moving, direction, speed, base, p, x, drive, load)``
+``contact``   ``law(t, depth, rate, z, p, dz) -> force`` [N] of stops at ``span`` = (lower, upper) [m] that
+              yield by `depth`: they push, and what the law pulls is left out. Without a law the engine's law
+              of impact: fields ``gap``, ``restitution``, ``load_fraction`` of one that `divides` the mass
+              (`Backlash`); else ``restitution`` and ``span`` (`HardStop`)
+``coupling``  ``law(t, x, v, z, p, dz) -> force`` [N] on the load, of a joint whose motor side is `x` ahead;
+              beside `Backlash` outside the gap only. A field ``load_fraction`` divides a single mass
+``presliding`` ``law(v, level, z, p, dz) -> force`` [N] of friction that yields before it slides, in the
+              place of sticking; `level` is that of the block's dry friction
+``input``     ``channel() -> tuple of primitives`` that the applied force passes through; may have the
+              ``law`` of a force besides, as the drive's own (back-EMF)
 ``output``    ``channel() -> tuple of primitives`` that the measured position passes through
 ============  ==================================================================================
 """
@@ -35,6 +41,7 @@ from ..checks import shown
 from .parameter import Parameter, checked
 from .primitives import Primitive
 
+TOLD = ("x", "drive", "load")
 ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
 
 _LIBRARY: dict[str, type[Effect]] = {}
@@ -55,6 +62,12 @@ class Effect:
         How the effect shows in the residual of a model without it, in plain words.
     source : str
         Where the law comes from.
+    asks : tuple of str
+        What a friction law has to know besides the motion, out of `TOLD`: ``x``, where the body is [m];
+        ``drive`` and ``load`` [N], what drives the body and what else acts on it, but dry friction, taken
+        positive against the drive. A transmission carries the drive where all inertia lies behind it, the
+        load where all lies before it. A law that asks for any of them is told all. Such laws run by
+        adaptive steps.
     rank : int
         Order among friction effects: levels that add (0) before laws that shape them (1).
     side : str
@@ -75,6 +88,10 @@ class Effect:
         ones.
     repeatable : bool
         Whether a block may hold several; a second of any other is the first one again.
+    turns : bool
+        Whether machines that turn alone have it.
+    input_unit : str
+        Unit of what goes in, where an input effect makes a force of something else.
     divides : bool
         Whether a contact is a joint, which divides a single mass in motor and load.
     costly : bool
@@ -95,6 +112,7 @@ class Effect:
     role: ClassVar[str] = ""
     shows: ClassVar[str] = ""
     source: ClassVar[str] = ""
+    asks: ClassVar[tuple[str, ...]] = ()
     rank: ClassVar[int] = 0
     side: ClassVar[str] = "motor"
     states: ClassVar[int] = 0
@@ -104,6 +122,8 @@ class Effect:
     nonsmooth: ClassVar[bool] = False
     multimodal: ClassVar[bool] = False
     repeatable: ClassVar[bool] = False
+    turns: ClassVar[bool] = False
+    input_unit = ""
     divides: ClassVar[bool] = False
     costly: ClassVar[bool] = False
     table_starts: ClassVar[int] = 3
@@ -171,6 +191,10 @@ class Effect:
         """
         return True
 
+    def steady(self, level: float) -> tuple[float, ...]:
+        """Return the internal states that motion along +x comes to, under a dry friction of `level` [N]."""
+        return (0.0,) * self.states
+
     @property
     def parameters(self) -> dict[str, Parameter]:
         """Its parameters by field name."""
@@ -230,6 +254,11 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
         )
     if cls.role not in ROLES:
         raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
+    if not set(cls.asks) <= set(TOLD) or (cls.asks and cls.role != "friction"):
+        raise ValueError(
+            f"{cls.__name__} may ask for {', '.join(TOLD)}, if its role is friction; got role {cls.role!r}, "
+            f"asks={cls.asks!r}."
+        )
     known = _LIBRARY.get(cls.id)
     if known is not None and _origin(known) != _origin(cls):
         raise ValueError(

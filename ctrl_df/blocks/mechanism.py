@@ -58,6 +58,12 @@ class Mechanism(ct.NonlinearIOSystem):
         self._measured = measured
         self._keys = _effect_keys(self._effects)
         _check_levels(self._effects)
+        for effect in self._effects if self._coordinates is LINE else ():
+            if effect.turns:
+                raise ValueError(
+                    f"{effect.id} needs a machine that turns (Inertia, TwoInertias); got {owner}. "
+                    f"{effect.remedy}"
+                )
         self._core = self._build(self._values, self._effects)
         core, called = self._core, self._coordinates.name
         out = [called(signal) for signal in core.motions]
@@ -106,7 +112,8 @@ class Mechanism(ct.NonlinearIOSystem):
     @property
     def signals(self) -> Mapping[str, str]:
         """Unit of its input and of each output, by label."""
-        units = {"F": "N", "x": "m", "v": "m/s", "x_motor": "m", "v_motor": "m/s"}
+        given = next((e.input_unit for e in self._effects if e.input_unit), "N")
+        units = {"F": given, "x": "m", "v": "m/s", "x_motor": "m", "v_motor": "m/s"}
         mine = self._coordinates
         return {mine.name(k): mine.unit_of(units[k]) for k in ("F", *self._core.motions)}
 

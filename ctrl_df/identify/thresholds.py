@@ -247,3 +247,29 @@ PLAN_MARGIN = 0.9
 
 SETTLE, COUNTED, SINES = 12, 8, 6
 """Periods before and while a point is measured, and points of a plan."""
+
+# --- the missing force as a signal ------------------------------------------------------------------
+
+SMOOTHER_STEPS = 2500
+"""Steps of a record: 4 ms of ten seconds, finer than noise of a position lets see of forces (rigs)."""
+
+SMOOTHER_ROUNDS = 12
+"""Linearizations at most; rigs take three to seven."""
+
+SMOOTHER_ESTIMATED = 6
+"""Of these, those in which size and time of the force and the sensor's noise are estimated anew."""
+
+SMOOTHER_STILL = 0.05
+"""Change of the force from round to round, in its standard deviations, that nobody would see."""
+
+SMOOTHER_LEAK = 0.1
+"""Of the sensor's noise: what continuity of the position may give way over a whole record."""
+
+FORCE_KNOWN = 0.8
+"""Of the force's size: a standard deviation beyond it tells of no more than what was assumed."""
+
+CURVE_BINS, CURVE_LEAST = 25, 4
+"""Steps of a curve over a quantity, at most and at least."""
+
+CURVE_ALONE = 4
+"""Instants that know of different forces, for each step of a curve: its error is half their spread."""

@@ -8,15 +8,20 @@ from .compliance import Compliance
 from .constant_force import ConstantForce
 from .coulomb import Coulomb
 from .cubic_spring import CubicSpring
+from .gravity import Gravity
 from .hard_stop import HardStop
+from .hysteresis import Hysteresis
 from .input_channel import InputDeadZone, InputDelay, InputGain, InputLag, InputSaturation
 from .linear_spring import LinearSpring
+from .load_dependent_friction import LoadDependentFriction
 from .load_friction import LoadFriction
+from .position_dependent_friction import PositionDependentFriction
 from .position_ripple import PositionRipple
 from .quadratic_drag import QuadraticDrag
 from .sensor_channel import Drift, SensorDelay, SensorOffset, SensorQuantization
 from .stiction import Stiction
 from .stribeck import Stribeck
+from .torque_constant import TorqueConstant
 from .viscous import Viscous
 
 __all__ = [
@@ -29,14 +34,18 @@ __all__ = [
     "Coulomb",
     "CubicSpring",
     "Drift",
+    "Gravity",
     "HardStop",
+    "Hysteresis",
     "InputDeadZone",
     "InputDelay",
     "InputGain",
     "InputLag",
     "InputSaturation",
     "LinearSpring",
+    "LoadDependentFriction",
     "LoadFriction",
+    "PositionDependentFriction",
     "PositionRipple",
     "QuadraticDrag",
     "SensorDelay",
@@ -44,5 +53,6 @@ __all__ = [
     "SensorQuantization",
     "Stiction",
     "Stribeck",
+    "TorqueConstant",
     "Viscous",
 ]

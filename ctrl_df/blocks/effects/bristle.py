@@ -47,11 +47,18 @@ class Bristle(Effect):
     source: ClassVar[str] = "Canudas de Wit, Olsson, Astrom & Lischinsky (1995), eqs. (1)-(4)"
 
     @staticmethod
-    def rate(v, z, g, p):
-        """Return dz/dt [m/s] for velocity `v`, deflection `z`, level `g` [N]."""
-        if g <= 0.0 or math.isinf(g):
-            return v
-        return v - p[0] * abs(v) * z / g
+    def law(v, level, z, p, dz):
+        """Return the force [N] of bristles bent by z[0], under a dry friction of `level` [N]."""
+        g = level + p[2]
+        rate = v
+        if g > 0.0 and not math.isinf(g):
+            rate -= p[0] * abs(v) * z[0] / g
+        dz[0] = rate
+        return -(p[0] * z[0] + p[1] * rate)
+
+    def steady(self, level):
+        """Return how far they are bent where they slip [m]."""
+        return ((level + self.level) / self.stiffness,)
 
     @classmethod
     def applicable(cls, block):

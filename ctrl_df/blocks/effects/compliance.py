@@ -43,10 +43,16 @@ class Compliance(Effect):
 
     role: ClassVar[str] = "coupling"
     multimodal: ClassVar[bool] = True
+    affine: ClassVar[bool] = True
     table_starts: ClassVar[int] = 2
     shows: ClassVar[str] = "a resonance in the error spectrum, ringing after every step of force"
     source: ClassVar[str] = "two-mass drive, e.g. Vukosavic & Stojic (1998)"
     remedy: ClassVar[str] = "For a stiff joint leave the effect out."
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        """Return the force on the load [N]; `x` and `v` are those of the motor beyond the load."""
+        return p[0] * x + p[1] * v
 
     @classmethod
     def suggest(cls, screen):

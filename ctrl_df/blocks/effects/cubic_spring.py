@@ -1,4 +1,4 @@
-"""A hardening spring to ground."""
+"""A spring to ground that hardens or softens."""
 
 import math
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from ..parameter import parameter
 @register_effect
 @dataclass(frozen=True)
 class CubicSpring(Effect):
-    """A spring that hardens with the cube of the stroke, ``F = -k3 (x - center)^3``.
+    """A spring that hardens, or softens, with the cube of the stroke, ``F = -k3 (x - center)^3``.
 
     Parameters
     ----------
     stiffness : float
-        k3 [N/m^3], >= 0.
+        k3 [N/m^3]; negative: beside a linear spring one that softens.
     center : float
         Position of zero force [m].
 
@@ -27,7 +27,7 @@ class CubicSpring(Effect):
     -0.5
     """
 
-    stiffness: float = parameter("N/m^3", meaning="cubic stiffness")
+    stiffness: float = parameter("N/m^3", lower=-math.inf, meaning="cubic stiffness")
     center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
 
     role: ClassVar[str] = "force"

@@ -16,7 +16,7 @@ class LinearSpring(Effect):
     Parameters
     ----------
     stiffness : float
-        k [N/m], >= 0.
+        k [N/m]; negative: it pushes away from the center.
     center : float
         Position of zero force [m].
 
@@ -27,7 +27,7 @@ class LinearSpring(Effect):
     0.006667
     """
 
-    stiffness: float = parameter("N/m", meaning="spring stiffness")
+    stiffness: float = parameter("N/m", lower=-math.inf, meaning="spring stiffness")
     center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
 
     role: ClassVar[str] = "force"

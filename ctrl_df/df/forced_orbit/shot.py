@@ -207,7 +207,7 @@ def mirror(shot, x, mode):
             elastic = prog.ints[prog.nodes[n, L.AUX] + L.A_JOINT] == L.J_ELASTIC
             if not (elastic and prog.par[prog.nodes[n, L.PAR] + L.P_GAP] == 0.0):
                 mode[at + L.JOINT] = -mode[at + L.JOINT]
-            mode[at + L.WALL] = -mode[at + L.WALL]
+            mode[at + L.WALL], mode[at + L.TOUCH] = -mode[at + L.WALL], -mode[at + L.TOUCH]
         elif kind == L.PWA:
             mode[at] = prog.ints[prog.nodes[n, L.AUX]] - 2 - mode[at]
         elif kind == L.QUANTIZER or kind == L.PLAY or kind == L.RATE:

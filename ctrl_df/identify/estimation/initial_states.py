@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, level
+from ...blocks.effect import Effect
 
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
-
-SETTLING: frozenset[str] = frozenset({"stretch", "stretch_rate", "deflection"})
-"""Names of those hidden that come to be what the motion makes them, wherever they began."""
 
 FREE, CONTINUED, MEASURED = "fitted", "chained", "measured"
 """How segments begin: every state is fitted, segment by segment; all but those that settle are, which go on
@@ -34,16 +32,19 @@ def names(core) -> tuple[str, ...]:
         found += ["slack", "slack_rate"]
     elif core.joint == ELASTIC:
         found += ["stretch", "stretch_rate"]
-    if core.bristle is not None:
-        found.append("deflection")
-    return tuple(found)
+    return (*found, *(name for name, _, _ in _inner(core)))
+
+
+def settling(core) -> frozenset[str]:
+    """Return the names of those hidden that come to be what the motion makes them, wherever they began."""
+    return frozenset(("stretch", "stretch_rate", *(name for name, _, _ in _inner(core))))
 
 
 def fitted_names(core, begins: str) -> tuple[str, ...]:
     """Return the names of those that are fitted where segments begin so."""
     if begins == MEASURED:
         return ()
-    return tuple(n for n in names(core) if begins == FREE or n not in SETTLING)
+    return tuple(n for n in names(core) if begins == FREE or n not in settling(core))
 
 
 def carried_names(core, begins: str) -> tuple[str, ...]:
@@ -63,8 +64,7 @@ def reach(which, core, known, segments) -> np.ndarray:
         "v": 2 * segments.v_error + 0.01 * known.speed,
         "slack": one,
         "slack_rate": 0.7 * known.speed * one,
-        "deflection": 0.5 * one,
-    }
+    } | {name: 0.5 * one for name, _, _ in _inner(core)}
     if core.joint == ELASTIC:
         bend = known.force / max(core.stiffness, 1e-300)
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
@@ -100,10 +100,10 @@ def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
         beyond = np.clip(states[:, 2], *core.stop.span) - states[:, 2]
         states[:, 2] += beyond
         states[:, 0] += beyond
-    if core.bristle is not None:
-        slip, full = np.array([_bristles(row, core) for row in states]).T
-        share = np.tanh(3 * slip / speed) + given.get("deflection", 0.0)
-        states[:, core.bristle_state] = np.clip(share, -1.0, 1.0) * full
+    for name, term, at in _inner(core):
+        slip, full = np.array([_settled(row, core, term, at) for row in states]).T
+        share = np.tanh(3 * slip / speed) + given.get(name, 0.0)
+        states[:, term.state + at] = np.clip(share, -1.0, 1.0) * full
 
 
 def corrections(states, core, usual, speed: float) -> dict[str, float]:
@@ -115,17 +115,17 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
         stretch, rate = states[2] - states[0], states[3] - states[1]
         found |= {"slack": stretch / core.gap if core.gap else 0.0, "slack_rate": rate}
         found |= {"stretch": stretch - _joint(core, a)[0], "stretch_rate": rate}
-    if core.bristle is not None:
-        slip, full = _bristles(states, core)
-        share = states[core.bristle_state] / full if full > 0 else 0.0
-        found["deflection"] = share - math.tanh(3 * slip / speed)
+    for name, term, at in _inner(core):
+        slip, full = _settled(states, core, term, at)
+        share = states[term.state + at] / full if full > 0 else 0.0
+        found[name] = share - math.tanh(3 * slip / speed)
     return found
 
 
 def at_rest(core, usual, speed: float) -> dict[str, float]:
     """Return the corrections, by name, of a mechanism at rest at the measured position, nothing bent."""
-    states = np.zeros(4 + (core.bristle_state + 1 if core.bristle is not None else 0))
-    states[[0, 2]] = float(usual[0])
+    states = np.zeros(core.nstates)
+    states[: 2 * core.bodies : 2] = float(usual[0])
     return corrections(states, core, usual, speed)
 
 
@@ -139,8 +139,20 @@ def _joint(core, acceleration) -> tuple[Any, float]:
     return 0.0, 0.0
 
 
-def _bristles(states, core) -> tuple[float, float]:
-    """Return the speed over the bristles, and their full deflection [m]."""
-    slip = float(states[2 * core.driven + 1])
-    full = level(core.friction[core.driven], 1.0, math.copysign(1.0, slip), abs(slip)) + core.bristle.level
-    return slip, full / core.bristle.stiffness
+def _inner(core) -> list[tuple[str, Any, int]]:
+    """Return the internal states that come to a steady value: name, law, and which of its states."""
+    terms = (*core.forces, core.presliding, core.coupling, core.contact)
+    return [
+        (core.state_names[term.state + i], term, i)
+        for term in terms
+        if term is not None and type(term.effect).steady is not Effect.steady
+        for i in range(term.effect.states)
+    ]
+
+
+def _settled(states, core, term, at) -> tuple[float, float]:
+    """Return the speed that an internal state follows, and what it comes to."""
+    body = core.driven if term.body < 0 else term.body
+    slip = float(states[2 * body + 1])
+    dry = level(core.friction[body], 1.0, math.copysign(1.0, slip), abs(slip), float(states[2 * body]))
+    return slip, float(term.effect.steady(dry)[at])

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BINS = 25  # of a curve, at most
-ALONE = 4  # samples that know of different forces, for each bin
-FEWEST = 4
+from ..thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST
 
 
 @dataclass(frozen=True)
@@ -49,13 +47,13 @@ def curve_over(values, force, std, own, known) -> Curve:
     """
     use = np.flatnonzero(known & np.isfinite(values))
     none = np.zeros(0)
-    if len(use) < 2 * FEWEST:
+    if len(use) < 2 * CURVE_LEAST:
         return Curve(none, none, none, np.zeros((2, 0)), 0.0)
     order = np.argsort(values[use], kind="stable")
     root = 1.0 / std[use]
     scale = np.linalg.norm(own[use], axis=0)
     rest = own[use][:, scale > 0] / scale[scale > 0] * root[:, None]
-    y, count, together = force[use] * root, BINS, 1.0
+    y, count, together = force[use] * root, CURVE_BINS, 1.0
     bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
     for _ in range(
         2
@@ -66,7 +64,7 @@ def curve_over(values, force, std, own, known) -> Curve:
         fit = np.linalg.lstsq(both, y, rcond=1e-9)[0]
         left = y - both @ fit
         together = _together(left)
-        count = int(np.clip(len(use) / together / ALONE, FEWEST, count))
+        count = int(np.clip(len(use) / together / CURVE_ALONE, CURVE_LEAST, count))
     count = int(bins.max()) + 1
     alone = np.column_stack([rest, root])
     before = y - alone @ np.linalg.lstsq(alone, y, rcond=1e-9)[0]

@@ -13,11 +13,11 @@ from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
 from ..residuals.motion_phases import reversals
+from ..thresholds import FORCE_KNOWN
 from .curves import Curve, curve_over
 from .smoother import smooth_record
 
 AGAINST = ("time", "position", "velocity", "load", "reversal")
-KNOWN = 0.8  # of the size of the process: a standard deviation beyond tells of no more than what was assumed
 REFERENCE = ("reference", "r")
 
 
@@ -63,7 +63,7 @@ class MissingForce:
     @property
     def known(self) -> np.ndarray:
         """Where the record tells of the force, (n,) bool."""
-        return self.std < KNOWN * self.size
+        return self.std < FORCE_KNOWN * self.size
 
     @cached_property
     def shares(self) -> dict[str, float]:

@@ -19,14 +19,15 @@ from scipy.optimize import minimize
 from ...blocks.mechanism import Mechanism
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
+from ..thresholds import (
+    SMOOTHER_ESTIMATED,
+    SMOOTHER_LEAK,
+    SMOOTHER_ROUNDS,
+    SMOOTHER_STEPS,
+    SMOOTHER_STILL,
+)
 from .kalman import smoothed
 from .steps import Linearized, Steps
-
-MOST = 2500  # steps of a record
-ROUNDS = 12  # linearizations
-STILL = 0.05  # change of the force between rounds, in its standard deviations, at which they end
-TUNED = 6  # rounds in which size, time and noise are estimated anew
-LEAK = 0.1  # of the sensor's noise: what continuity of position may give way over a record
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Smoothed:
 def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     """Smooth the force that is missing of a block beside one record."""
     known = facts(record)
-    steps = Steps(block, record, math.ceil(len(record) / MOST))
+    steps = Steps(block, record, math.ceil(len(record) / SMOOTHER_STEPS))
     mean, std = steps.guess()
     scale = np.median(std, axis=0)
     scale[-1] = known.force
@@ -70,15 +71,15 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     first = cov[0]
     sizes = np.log([0.3, 0.1 * known.swing, known.noise])
     evidence = -math.inf
-    for turn in range(ROUNDS):
+    for turn in range(SMOOTHER_ROUNDS):
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
         told = _Told(lin, steps, leak, mean[0], first, known)
-        if turn < TUNED:
+        if turn < SMOOTHER_ESTIMATED:
             sizes = told.likeliest(sizes, 0.7 if turn < 2 else 0.2)
         new, cov, evidence = told.smoothed(sizes)
         moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
         mean = new
-        if turn > 1 and moved < STILL:
+        if turn > 1 and moved < SMOOTHER_STILL:
             break
     return Smoothed(
         steps.times, mean[:, :-1] * scale[:-1], mean[:, -1] * scale[-1],
@@ -93,7 +94,7 @@ def _leak(steps: Steps, known, scale) -> np.ndarray:
     q = (1e-4 * scale[:-1]) ** 2
     for body in range(steps.core.bodies):
         dt = float(np.median(np.diff(steps.times)))
-        q[2 * body] = (LEAK * known.noise) ** 2 / len(steps)
+        q[2 * body] = (SMOOTHER_LEAK * known.noise) ** 2 / len(steps)
         q[2 * body + 1] = (1e-3 * known.force * dt / sum(steps.core.masses)) ** 2
     return q[:n] / scale[:-1] ** 2
 

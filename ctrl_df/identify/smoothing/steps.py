@@ -62,6 +62,17 @@ class Linearized:
     r: np.ndarray
 
 
+@dataclass(frozen=True)
+class Begun:
+    """Standard deviations of position and velocity where steps begin, (N + 1,) each."""
+
+    x_error: np.ndarray
+    v_error: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.x_error)
+
+
 class Steps:
     """A record cut into short steps, each begun from any state.
 
@@ -113,34 +124,31 @@ class Steps:
         x, v, a = self._motion(known)
         states = np.zeros((len(self.edges), self.part.engine.nstates))
         initial_states.fill(states, self.core, {}, (x, v, a), known.speed)
-        spread = np.zeros_like(states)
-        at = 2 if self.core.bodies == 2 and self.core.measured == 1 else 0
-        slow = known.noise / math.sqrt(2 * known.half + 1)
-        wide = {
-            "x": 3 * slow + 1e-3 * known.spread, "v": 3 * slow / (known.half * known.dt) + 0.05 * known.speed,
-        }  # fmt: skip
-        for body in range(self.core.bodies):
-            spread[:, 2 * body], spread[:, 2 * body + 1] = wide["x"], wide["v"]
-        if self.core.bodies == 2:
-            other = 0 if at else 2
-            if self.core.joint == IMPACT:
-                spread[:, other], spread[:, other + 1] = 0.5 * self.core.gap, 0.7 * known.speed
-            elif self.core.stiffness > 0:
-                bend = known.force / self.core.stiffness
-                spread[:, other] += 0.6 * bend
-                spread[:, other + 1] += 0.3 * known.speed
-        if self.core.bristle is not None:
-            full = (
-                np.max(np.abs(states[:, self.core.bristle_state]))
-                or known.force / self.core.bristle.stiffness
-            )
-            spread[:, self.core.bristle_state] = 0.5 * full
-        spread[:, np.max(spread, axis=0) == 0] = known.force
+        spread = self._spread(states, (x, v, a), known)
         d = np.zeros((len(self.edges), 1))
         return (
             np.hstack([states[:, self.free], d]),
             np.hstack([spread[:, self.free], d + known.force]),
         )
+
+    def _spread(self, states, usual, known) -> np.ndarray:
+        """Return how far states may be from the guess: what changes with each correction of it."""
+        one = np.ones(len(states))
+        slow = known.noise / math.sqrt(2 * known.half + 1)
+        begun = Begun(slow * one, slow / (known.half * known.dt) * one)
+        names = initial_states.names(self.core)
+        reach = initial_states.reach(names, self.core, known, begun)
+        square = np.zeros_like(states)
+        for name, far in zip(names, reach.T, strict=True):
+            found = []
+            for sign in (-1.0, 1.0):
+                moved = states.copy()
+                initial_states.fill(moved, self.core, {name: sign * far}, usual, known.speed)
+                found.append(np.abs(moved - states))
+            square += np.maximum(*found) ** 2
+        # states that no correction moves: those of laws that begin at rest
+        square[:, np.max(square, axis=0) == 0] = known.force**2
+        return np.sqrt(square)
 
     def _motion(self, known):
         from ..data.derivatives import automatic_cutoff, derivative

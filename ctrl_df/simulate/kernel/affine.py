@@ -112,12 +112,11 @@ def _acting(prog) -> np.ndarray:
         return np.zeros(0, np.int64)
     node = next(row for row in prog.nodes if row[KIND] == MECHANISM)
     aux = prog.ints[node[AUX] :]
-    bodies, first = int(aux[A_BODIES]), int(aux[L.A_LAWS])
-    count = int(aux[L.A_NFORCE] + aux[L.A_NFRIC0] + aux[L.A_NFRIC1])
+    bodies, first, count = int(aux[A_BODIES]), int(aux[L.A_LAWS]), int(aux[L.A_COUNT])
     laws = prog.ints[first : first + count * L.R_SIZE].reshape(count, L.R_SIZE)
     pushed = {int(law[L.R_BODY]) for law in laws if law[L.R_SORT] == CURVED}
-    if aux[L.A_BRISTLE] >= 0:
-        pushed.add(bodies - 1)
+    if L.BOTH in pushed:
+        pushed = {0, 1}
     inner = int(node[X]) + 2 * bodies
     return np.array([*sorted(pushed), *range(2 + inner, 2 + inner + int(aux[A_INNER]))], np.int64)
 
@@ -255,14 +254,14 @@ def extend(prog, mode, work, g, out):
             if mode[mo + b] != STUCK or at_wall or (joined and b == DIR0):
                 continue
             up, down, force = (
-                dry_level(prog, n, b, 0.0, 1.0, 0.0),
-                dry_level(prog, n, b, 0.0, -1.0, 0.0),
+                dry_level(prog, n, b, 0.0, 1.0, 0.0, f),
+                dry_level(prog, n, b, 0.0, -1.0, 0.0, f),
                 f[b],
             )
             if joined:
                 force = f[0] + f[1]
-                up += dry_level(prog, n, 0, 0.0, 1.0, 0.0)
-                down += dry_level(prog, n, 0, 0.0, -1.0, 0.0)
+                up += dry_level(prog, n, 0, 0.0, 1.0, 0.0, f)
+                down += dry_level(prog, n, 0, 0.0, -1.0, 0.0, f)
             at = prog.nodes[n, G] + (G_BODY1 if b == DIR1 else 0)
             out[at] = up - force
             out[ng + b] = down + force

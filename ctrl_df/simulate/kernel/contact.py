@@ -8,6 +8,7 @@ from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
     A_BRISTLE,
+    A_CONTACT,
     A_JOINT,
     A_NFRIC0,
     AUX,
@@ -31,6 +32,7 @@ from ..program.layout import (
     P_STOP_REST,
     PAR,
     STUCK,
+    TOUCH,
     WALL,
     X,
 )
@@ -60,9 +62,9 @@ def tendency(f, up, down, wall):
 @part
 def body_tendency(prog, node, body, f, wall):
     """Tendency of one body by itself."""
-    up = dry_level(prog, node, body, 0.0, 1.0, 0.0)
-    down = dry_level(prog, node, body, 0.0, -1.0, 0.0)
-    return tendency(f, up, down, wall)
+    up = dry_level(prog, node, body, 0.0, 1.0, 0.0, f)
+    down = dry_level(prog, node, body, 0.0, -1.0, 0.0, f)
+    return tendency(f[body], up, down, wall)
 
 
 @part
@@ -79,8 +81,11 @@ def resolve(prog, node, t, x, mode, force, f, dx):
     driven = bodies - 1
     joint = aux[nodes[node, AUX] + A_JOINT]
     old0, old1, old_joint, old_wall = mode[mo], mode[mo + 1], mode[mo + JOINT], mode[mo + WALL]
+    old_touch = mode[mo + TOUCH]
     if joint == J_ELASTIC:
         _elastic_region(prog, node, x, mode)
+    if aux[nodes[node, AUX] + A_CONTACT] >= 0:
+        _touched(prog, node, x[xo + 2 * driven], mode)
     smooth_forces(prog, node, t, x, mode, force, f, dx)
     if bodies == 2 and closed(prog, node, mode):
         _resolve_joined(prog, node, x, mode, f)
@@ -95,7 +100,7 @@ def resolve(prog, node, t, x, mode, force, f, dx):
             elif wall == 0 and not has_dry(prog, node, b):
                 mode[mo + b] = FREE
             else:
-                d = body_tendency(prog, node, b, f[b], wall)
+                d = body_tendency(prog, node, b, f, wall)
                 mode[mo + b] = STUCK if d == 0 else _direction(prog, node, b, d)
                 if b == driven and d != 0:
                     mode[mo + WALL] = 0
@@ -104,6 +109,7 @@ def resolve(prog, node, t, x, mode, force, f, dx):
         or old1 != mode[mo + 1]
         or old_joint != mode[mo + JOINT]
         or old_wall != mode[mo + WALL]
+        or old_touch != mode[mo + TOUCH]
     )
 
 
@@ -124,6 +130,18 @@ def _elastic_region(prog, node, x, mode):
 
 
 @part
+def _touched(prog, node, position, mode):
+    """Which yielding wall is touched; at its very face the mode stays."""
+    po, at = prog.nodes[node, PAR], prog.nodes[node, MODE] + TOUCH
+    if position > prog.par[po + P_HIGH]:
+        mode[at] = 1
+    elif position < prog.par[po + P_LOW]:
+        mode[at] = -1
+    elif prog.par[po + P_LOW] < position < prog.par[po + P_HIGH]:
+        mode[at] = 0
+
+
+@part
 def _resolve_joined(prog, node, x, mode, f):
     """Two bodies in contact: move together, stay stuck, or separate."""
     par = prog.par
@@ -140,16 +158,16 @@ def _resolve_joined(prog, node, x, mode, f):
         mode[mo + DIR0] = _direction(prog, node, 0, d)
         mode[mo + DIR1] = _direction(prog, node, 1, d)
         if impact:
-            f0 = f[0] - d * dry_level(prog, node, 0, 1.0, float(d), abs(v))
-            f1 = f[1] - d * dry_level(prog, node, 1, 1.0, float(d), abs(v))
+            f0 = f[0] - d * dry_level(prog, node, 0, 1.0, float(d), abs(v), f)
+            f1 = f[1] - d * dry_level(prog, node, 1, 1.0, float(d), abs(v), f)
             if side * (m0 * (f0 + f1) / (m0 + m1) - f0) < 0.0:
                 mode[mo + JOINT] = 0
         return
-    d0 = body_tendency(prog, node, 0, f[0], 0)
-    d1 = body_tendency(prog, node, 1, f[1], wall)
+    d0 = body_tendency(prog, node, 0, f, 0)
+    d1 = body_tendency(prog, node, 1, f, wall)
     if impact:
-        a0 = 0.0 if d0 == 0 else (f[0] - d0 * dry_level(prog, node, 0, 1.0, float(d0), 0.0)) / m0
-        a1 = 0.0 if d1 == 0 else (f[1] - d1 * dry_level(prog, node, 1, 1.0, float(d1), 0.0)) / m1
+        a0 = 0.0 if d0 == 0 else (f[0] - d0 * dry_level(prog, node, 0, 1.0, float(d0), 0.0, f)) / m0
+        a1 = 0.0 if d1 == 0 else (f[1] - d1 * dry_level(prog, node, 1, 1.0, float(d1), 0.0, f)) / m1
         if side * (a1 - a0) < 0.0:
             mode[mo + JOINT] = 0
             mode[mo + DIR0] = _separate(prog, node, 0, d0, 0)
@@ -157,8 +175,8 @@ def _resolve_joined(prog, node, x, mode, f):
             if d1 != 0:
                 mode[mo + WALL] = 0
             return
-    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0) + dry_level(prog, node, 1, 0.0, 1.0, 0.0)
-    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0) + dry_level(prog, node, 1, 0.0, -1.0, 0.0)
+    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0, f) + dry_level(prog, node, 1, 0.0, 1.0, 0.0, f)
+    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0, f) + dry_level(prog, node, 1, 0.0, -1.0, 0.0, f)
     d = tendency(f[0] + f[1], up, down, wall)
     if d == 0:
         mode[mo + DIR0] = mode[mo + DIR1] = STUCK

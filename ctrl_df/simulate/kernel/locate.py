@@ -11,6 +11,7 @@ import numpy as np
 from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
+    A_CONTACT,
     A_JOINT,
     A_STOP,
     AUX,
@@ -35,11 +36,12 @@ from ..program.layout import (
     PWA,
     RATE,
     STUCK,
+    TOUCH,
     G,
     X,
 )
 from .flow import input_rates, rates
-from .mechanics import closed, dry_level
+from .mechanics import closed, dry_level_at
 from .stepper import inside
 
 GRAIN = 4.0 * np.finfo(float).eps
@@ -93,8 +95,9 @@ def tolerances(prog, x, mode, scale, gtol):
                 gtol[go + G_JOINT_HIGH] += rounding
             for b in range(prog.ints[prog.nodes[n, AUX] + A_BODIES]):
                 if mode[prog.nodes[n, MODE] + b] == STUCK:
-                    level = dry_level(prog, n, b, 0.0, 1.0, 0.0) + dry_level(prog, n, b, 0.0, -1.0, 0.0)
-                    gtol[go + b] += GRAIN * level
+                    place = x[first + 2 * b]
+                    for side in (1.0, -1.0):
+                        gtol[go + b] += GRAIN * dry_level_at(prog, n, b, 0.0, side, 0.0, place, 0.0, 0.0)
             gtol[go + G_WALL_LOW] += GRAIN * abs(prog.par[po + P_LOW])
             gtol[go + G_WALL_HIGH] += GRAIN * abs(prog.par[po + P_HIGH])
         elif kind == PWA:
@@ -177,7 +180,8 @@ def may_touch(prog, x, x1, mode, length):
             gap = prog.par[po + P_GAP]
             if _tangents_meet_below(d0, v0, d1, v1) or _tangents_meet_below(gap - d0, -v0, gap - d1, -v1):
                 return True
-        if prog.ints[ao + A_STOP] == 1:
+        yielding = prog.ints[ao + A_CONTACT] >= 0 and mode[prog.nodes[n, MODE] + TOUCH] == 0
+        if prog.ints[ao + A_STOP] == 1 or yielding:
             at = first + 2 * (bodies - 1)
             low, high = prog.par[po + P_LOW], prog.par[po + P_HIGH]
             v0, v1 = length * x[at + 1], length * x1[at + 1]

@@ -8,26 +8,32 @@ import math
 
 from ..compiler.compiled import part
 from ..program.layout import (
+    A_ASKING,
     A_BODIES,
     A_BRISTLE,
+    A_CONTACT,
+    A_COUPLING,
     A_JOINT,
     A_LAWS,
     A_NFORCE,
     A_NFRIC0,
+    A_PRESLIDING,
     A_STOP,
+    ASKING,
     AUX,
     CURVED,
     DIR0,
     DIR1,
+    DRIVING,
     F_ASKED,
     F_GIVEN,
+    F_TOLD,
     FREE,
     G_BODY1,
     G_JOINT_HIGH,
     G_JOINT_LOW,
     G_WALL_HIGH,
     G_WALL_LOW,
-    J_ELASTIC,
     J_IMPACT,
     J_NONE,
     J_RIGID,
@@ -35,15 +41,10 @@ from ..program.layout import (
     KIND,
     MECHANISM,
     MODE,
-    P_C,
     P_GAP,
     P_HIGH,
-    P_K,
     P_LOW,
     P_M0,
-    P_SIGMA0,
-    P_SIGMA1,
-    P_SIGMA_LEVEL,
     PAR,
     R_ADDRESS,
     R_BODY,
@@ -51,23 +52,26 @@ from ..program.layout import (
     R_SIZE,
     R_SORT,
     R_STATE,
-    STRAIGHT,
     STUCK,
+    TOUCH,
     WALL,
     G,
     X,
 )
-from ..program.pointers import call_force, call_friction
+from ..program.pointers import call_asking, call_force, call_friction, call_presliding
 
 
 @part(inline=True)
-def level(prog, first, count, moving, direction, speed):
+def level(prog, first, count, moving, direction, speed, place, drive, load):
     """Dry friction level of a chain of laws [N]."""
     value = 0.0
     base = prog.par.address
     for i in range(first, first + count * R_SIZE, R_SIZE):
-        at = base + 8 * prog.ints[i + R_PAR]
-        value = call_friction(prog.ints[i + R_ADDRESS], moving, direction, speed, value, at)
+        law, at = prog.ints[i + R_ADDRESS], base + 8 * prog.ints[i + R_PAR]
+        if prog.ints[i + R_SORT] & ASKING != 0:
+            value = call_asking(law, moving, direction, speed, value, at, place, drive, load)
+        else:
+            value = call_friction(law, moving, direction, speed, value, at)
     return value
 
 
@@ -83,40 +87,70 @@ def smooth_forces(prog, node, t, x, mode, force, f, dx):
     asked = int(f[F_ASKED])
     f[0], f[1] = f[F_GIVEN], f[F_GIVEN + 1]
     f[driven] += force
-    first = aux[ao + A_LAWS]
-    base_p, base_x, base_dx = par.address, x.address, dx.address
+    first, drive = aux[ao + A_LAWS], force
     for i in range(first, first + aux[ao + A_NFORCE] * R_SIZE, R_SIZE):
-        if aux[i + R_SORT] & asked == 0:
-            continue
-        b = aux[i + R_BODY]
-        z = 8 * (xo + aux[i + R_STATE])
-        f[b] += call_force(
-            aux[i + R_ADDRESS],
-            t,
-            x[xo + 2 * b],
-            x[xo + 2 * b + 1],
-            base_x + z,
-            base_p + 8 * aux[i + R_PAR],
-            base_dx + z,
-        )
-    if aux[ao + A_BRISTLE] >= 0 and asked & CURVED != 0:
-        z = xo + aux[ao + A_BRISTLE]
-        v = x[xo + 2 * driven + 1]
-        start = friction_start(prog, node, driven)
-        g = level(prog, start, aux[ao + A_NFRIC0 + driven], 1.0, 1.0 if v >= 0 else -1.0, abs(v))
-        g += par[po + P_SIGMA_LEVEL]
-        rate = v
-        if g > 0:
-            rate -= par[po + P_SIGMA0] * abs(v) * x[z] / g
-        dx[z] = rate
-        f[driven] -= par[po + P_SIGMA0] * x[z] + par[po + P_SIGMA1] * rate
-    if aux[ao + A_JOINT] == J_ELASTIC and asked & STRAIGHT != 0:
-        region = mode[nodes[node, MODE] + JOINT]
-        if region != 0:
-            bend = x[xo + 2] - x[xo] - (par[po + P_GAP] if region > 0 else 0.0)
-            pull = par[po + P_K] * bend + par[po + P_C] * (x[xo + 3] - x[xo + 1])
+        if aux[i + R_SORT] & asked != 0:
+            b = aux[i + R_BODY]
+            value = _force(prog, i, xo, t, x[xo + 2 * b], x[xo + 2 * b + 1], x, dx)
+            f[b] += value
+            if aux[i + R_SORT] & DRIVING != 0:
+                drive += value
+    if aux[ao + A_CONTACT] >= 0:
+        i, side = first + aux[ao + A_CONTACT] * R_SIZE, mode[nodes[node, MODE] + TOUCH]
+        if aux[i + R_SORT] & asked != 0:
+            at, depth = xo + 2 * driven, 0.0
+            if side != 0:
+                # a step may end beyond the release that is yet to be located
+                depth = max(x[at] - par[po + P_HIGH] if side > 0 else par[po + P_LOW] - x[at], 0.0)
+            # away from the wall its states go on
+            f[driven] -= side * max(_force(prog, i, xo, t, depth, side * x[at + 1], x, dx), 0.0)
+    pull = 0.0
+    if aux[ao + A_COUPLING] >= 0:
+        i, region = first + aux[ao + A_COUPLING] * R_SIZE, mode[nodes[node, MODE] + JOINT]
+        if aux[i + R_SORT] & asked != 0:
+            bend = rate = 0.0
+            if region != 0:
+                bend = x[xo + 2] - x[xo] - (par[po + P_GAP] if region > 0 else 0.0)
+                rate = x[xo + 3] - x[xo + 1]
+            pull = _force(prog, i, xo, t, bend, rate, x, dx)
+            if region == 0:
+                pull = 0.0  # in the gap; its states go on
             f[0] += pull
             f[1] -= pull
+    if aux[ao + A_ASKING] != 0:
+        _tell(prog, node, x, mode, drive, pull, f)
+    if aux[ao + A_PRESLIDING] >= 0 and asked & CURVED != 0:
+        v = x[xo + 2 * driven + 1]
+        start = friction_start(prog, node, driven)
+        told, count = F_TOLD + 3 * driven, aux[ao + A_NFRIC0 + driven]
+        sense = 1.0 if v >= 0 else -1.0
+        g = level(prog, start, count, 1.0, sense, abs(v), f[told], f[told + 1], f[told + 2])
+        i, z = first + aux[ao + A_PRESLIDING] * R_SIZE, 8 * (xo + aux[ao + A_BRISTLE])
+        p = par.address + 8 * aux[i + R_PAR]
+        f[driven] += call_presliding(aux[i + R_ADDRESS], v, g, x.address + z, p, dx.address + z)
+
+
+@part(inline=True)
+def _force(prog, law, first, t, x, v, states, dx):
+    """Call the force law of a record; `first` is where the states of its mechanism begin."""
+    z = 8 * (first + prog.ints[law + R_STATE])
+    p = prog.par.address + 8 * prog.ints[law + R_PAR]
+    return call_force(prog.ints[law + R_ADDRESS], t, x, v, states.address + z, p, dx.address + z)
+
+
+@part
+def _tell(prog, node, x, mode, push, pull, f):
+    """Write what friction laws that ask are told: place, drive, and the load against it.
+
+    The load's drive is the elastic joint. Bodies that move as one have drive and load in common.
+    """
+    xo, driven = prog.nodes[node, X], prog.ints[prog.nodes[node, AUX] + A_BODIES] - 1
+    joined = driven == 1 and closed(prog, node, mode)
+    for b in range(driven + 1):
+        at, drive = F_TOLD + 3 * b, push if b == driven else pull
+        f[at], f[at + 1], f[at + 2] = x[xo + 2 * b], drive, drive - f[b]
+        if joined:
+            f[at + 1], f[at + 2] = push, push - f[0] - f[1]
 
 
 @part(inline=True)
@@ -153,17 +187,25 @@ def curved_forces(prog, node, t, x, mode, f, dx):
     for b in range(prog.ints[prog.nodes[node, AUX] + A_BODIES]):
         d = mode[mo + b]
         if (d == 1 or d == -1) and _asked(prog, node, b, f):
-            f[b] -= d * dry_level(prog, node, b, 1.0, float(d), abs(x[xo + 2 * b + 1]))
+            f[b] -= d * dry_level(prog, node, b, 1.0, float(d), abs(x[xo + 2 * b + 1]), f)
 
 
 @part(inline=True)
-def dry_level(prog, node, body, moving, direction, speed):
+def dry_level_at(prog, node, body, moving, direction, speed, place, drive, load):
     """Dry friction level of a body that is not carried by a bristle [N]."""
     ao = prog.nodes[node, AUX]
     count = prog.ints[ao + A_NFRIC0 + body]
     if count == 0 or (prog.ints[ao + A_BRISTLE] >= 0 and body == prog.ints[ao + A_BODIES] - 1):
         return 0.0
-    return level(prog, friction_start(prog, node, body), count, moving, direction, speed)
+    first = friction_start(prog, node, body)
+    return level(prog, first, count, moving, direction, speed, place, drive, load)
+
+
+@part(inline=True)
+def dry_level(prog, node, body, moving, direction, speed, f):
+    """Return the same where `smooth_forces` has left in `f` what laws that ask are told."""
+    at = F_TOLD + 3 * body
+    return dry_level_at(prog, node, body, moving, direction, speed, f[at], f[at + 1], f[at + 2])
 
 
 @part(inline=True)
@@ -176,8 +218,8 @@ def closed(prog, node, mode):
 @part(inline=True)
 def hold_margin(prog, node, body, f, wall):
     """How far a stuck body is from breaking away [N]; at a wall only away from it."""
-    up = dry_level(prog, node, body, 0.0, 1.0, 0.0) - f
-    down = dry_level(prog, node, body, 0.0, -1.0, 0.0) + f
+    up = dry_level(prog, node, body, 0.0, 1.0, 0.0, f) - f[body]
+    down = dry_level(prog, node, body, 0.0, -1.0, 0.0, f) + f[body]
     if wall > 0:
         return down
     if wall < 0:
@@ -202,7 +244,7 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
     for b in range(bodies):
         d = mode[mo + b]
         if (d == 1 or d == -1) and _asked(prog, node, b, f):
-            drag = d * dry_level(prog, node, b, 1.0, float(d), abs(x[xo + 2 * b + 1]))
+            drag = d * dry_level(prog, node, b, 1.0, float(d), abs(x[xo + 2 * b + 1]), f)
             if b == 0:
                 friction0 = drag
             else:
@@ -226,7 +268,7 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
             if want_g:
                 d = mode[mo + b]
                 if still:
-                    g[go + b] = hold_margin(prog, node, b, f[b], wall if b == driven else 0)
+                    g[go + b] = hold_margin(prog, node, b, f, wall if b == driven else 0)
                 elif d != FREE:
                     g[go + b] = d * x[xo + 2 * b + 1]
         if want_g and bodies == 2 and joint != J_NONE:
@@ -247,6 +289,12 @@ def mechanism_rates(prog, node, t, x, mode, force, f, dx, g, want_g):
         position = x[xo + 2 * driven]
         g[go + G_WALL_LOW] = position - par[po + P_LOW]
         g[go + G_WALL_HIGH] = par[po + P_HIGH] - position
+    if want_g and aux[ao + A_CONTACT] >= 0:
+        position, touched = x[xo + 2 * driven], mode[mo + TOUCH]
+        if touched <= 0:
+            g[go + G_WALL_LOW] = (position - par[po + P_LOW]) * (1.0 if touched == 0 else -1.0)
+        if touched >= 0:
+            g[go + G_WALL_HIGH] = (par[po + P_HIGH] - position) * (1.0 if touched == 0 else -1.0)
 
 
 @part
@@ -265,8 +313,8 @@ def _joined_margins(prog, node, x, mode, f, f0, a, g):
             # the load is pushed, never pulled
             g[go + G_JOINT_LOW] = side * (par[po + P_M0] * a - f0)
         return
-    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0) + dry_level(prog, node, 1, 0.0, 1.0, 0.0)
-    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0) + dry_level(prog, node, 1, 0.0, -1.0, 0.0)
+    up = dry_level(prog, node, 0, 0.0, 1.0, 0.0, f) + dry_level(prog, node, 1, 0.0, 1.0, 0.0, f)
+    down = dry_level(prog, node, 0, 0.0, -1.0, 0.0, f) + dry_level(prog, node, 1, 0.0, -1.0, 0.0, f)
     net = f[0] + f[1]
     if wall > 0:
         g[go + G_BODY1] = down + net
@@ -276,8 +324,8 @@ def _joined_margins(prog, node, x, mode, f, f0, a, g):
         g[go + G_BODY1] = min(up - net, down + net)
     if impact:
         # neither does the motor draw back, nor the load run ahead
-        g[go + G_JOINT_LOW] = side * f[1] + dry_level(prog, node, 1, 0.0, -float(side), 0.0)
-        g[go + G_JOINT_HIGH] = dry_level(prog, node, 0, 0.0, float(side), 0.0) - side * f[0]
+        g[go + G_JOINT_LOW] = side * f[1] + dry_level(prog, node, 1, 0.0, -float(side), 0.0, f)
+        g[go + G_JOINT_HIGH] = dry_level(prog, node, 0, 0.0, float(side), 0.0, f) - side * f[0]
 
 
 @part

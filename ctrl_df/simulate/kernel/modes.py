@@ -9,6 +9,7 @@ import numpy as np
 from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
+    A_CONTACT,
     A_JOINT,
     AUX,
     E_BREAKAWAY,
@@ -41,6 +42,7 @@ from ..program.layout import (
     QUANTIZER,
     RATE,
     STUCK,
+    TOUCH,
     X,
 )
 from .contact import impact, resolve, stop
@@ -241,4 +243,10 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         return impact(
             prog, drive, segment, t, x, mode, work, dx, g, node, 1 if slot == G_JOINT_HIGH else -1, height
         )
+    if aux[nodes[node, AUX] + A_CONTACT] >= 0:
+        if mode[mo + TOUCH] != 0:
+            mode[mo + TOUCH] = 0
+            return E_RELEASE
+        mode[mo + TOUCH] = 1 if slot == G_WALL_HIGH else -1
+        return E_CONTACT
     return stop(prog, drive, segment, t, x, mode, work, dx, g, node, 1 if slot == G_WALL_HIGH else -1, height)

@@ -84,7 +84,9 @@ def grains(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, gr
         if kind == MECHANISM:
             force = abs(node_input(prog, node, 0, w))
             for b in range(prog.ints[prog.nodes[node, AUX] + A_BODIES]):
-                held = dry_level(prog, node, b, 0.0, 1.0, 0.0) + dry_level(prog, node, b, 0.0, -1.0, 0.0)
+                held = dry_level(prog, node, b, 0.0, 1.0, 0.0, work[1]) + dry_level(
+                    prog, node, b, 0.0, -1.0, 0.0, work[1]
+                )
                 grain[first + 2 * b + 1] = GRAIN * (force + held) / prog.par[po + P_M0 + b]
         elif kind == LTI:
             nx, ni = prog.nodes[node, NX], prog.nodes[node, NIN]

@@ -17,19 +17,24 @@ LTI, PWA, QUANTIZER, SMOOTH, MECHANISM, SAMPLED, PLAY, RATE, SYSTEM, DELAY, RAMP
 # columns of the node table
 KIND, NIN, NOUT, IN, OUT, X, NX, PAR, MODE, G, NG, AUX, FEED = range(13)
 
-# modes of a mechanism (offsets in the mode vector): direction of body 0 and 1, joint, wall
-DIR0, DIR1, JOINT, WALL = range(4)
+# modes of a mechanism (offsets in the mode vector): direction of body 0 and 1, joint, rigid wall,
+# yielding wall
+DIR0, DIR1, JOINT, WALL, TOUCH = range(5)
 STUCK, FREE = 0, 2  # besides the directions -1 and +1
 
 # integer layout of a mechanism in the aux table
 A_BODIES, A_JOINT, A_STOP, A_BRISTLE, A_MEASURED, A_NFORCE, A_NFRIC0, A_NFRIC1, A_LAWS = range(9)
 A_INNER = 9  # states of its laws, which follow those of its bodies
+A_ASKING = 10  # whether a friction law asks for more than the motion
+# number of laws; places in the list of the laws of a bristle, a joint, a yielding wall (-1: none). They stand
+# behind those of forces and friction.
+A_COUNT, A_PRESLIDING, A_COUPLING, A_CONTACT = range(11, 15)
 # joint kinds
 J_NONE, J_RIGID, J_IMPACT, J_ELASTIC = range(4)
 
 # float layout of a mechanism in the parameter table
-P_M0, P_M1, P_GAP, P_REST, P_K, P_C, P_LOW, P_HIGH, P_STOP_REST, P_SIGMA0, P_SIGMA1, P_SIGMA_LEVEL = range(12)
-P_BUMP0, P_BUMP1 = 12, 13  # narrowest feature of each body's friction over speed [m/s], inf: none
+P_M0, P_M1, P_GAP, P_REST, P_LOW, P_HIGH, P_STOP_REST = range(7)
+P_BUMP0, P_BUMP1 = 7, 8  # narrowest feature of each body's friction over speed [m/s], inf: none
 
 # event slots of a mechanism
 G_BODY0, G_BODY1, G_JOINT_LOW, G_JOINT_HIGH, G_WALL_LOW, G_WALL_HIGH = range(6)
@@ -74,15 +79,18 @@ EVENT_KINDS = (
 H_NX, H_NS, H_NR, H_NY, H_NM, H_NG, H_NIN, H_TRACK, H_OUT, H_U, H_SCRATCH, H_BUMP = range(12)
 H_AFFINE, H_DELAYS, H_HISTORY = 12, 13, 14
 
-# a law's record in the integer table
+# a law's record in the integer table. A joint's acts on BOTH bodies
 R_ADDRESS, R_PAR, R_STATE, R_BODY, R_SORT, R_SIZE = range(6)
+BOTH = -1
 # sorts of laws: affine in place and speed while the mode lasts, or not; a friction law is of the sort of its
 # whole chain
 STRAIGHT, CURVED = 1, 2
+ASKING = 4  # added to the sort of a friction law that asks for more than the motion
+DRIVING = 8  # added to that of a force which is the drive's own (back-EMF)
 
 # forces of a mechanism in the scratch of a run: on its two bodies; those given from outside on either; which
-# sorts of laws are asked
-F_GIVEN, F_ASKED, F_SIZE = 2, 4, 5
+# sorts of laws are asked; what friction laws that ask are told of either body: place, drive, load
+F_GIVEN, F_ASKED, F_TOLD, F_SIZE = 2, 4, 5, 11
 
 # the history of a delay in the work vector: three numbers, then a ring of records: start, length,
 # generation, values; see `ctrl_df.simulate.kernel.history`

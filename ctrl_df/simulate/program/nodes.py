@@ -143,31 +143,29 @@ def _has_feedthrough(output, nx, nu, params) -> bool:
 
 def core_node(core: Core, x0: int) -> Node:
     """Node of a mechanism."""
-    two = core.bodies == 2
-    low, high = core.stop.span if core.stop else (0.0, 0.0)
-    bristle = core.bristle
-    par = [
-        core.masses[0],
-        core.masses[1] if two else 1.0,
-        core.gap,
-        core.restitution,
-        core.stiffness,
-        core.damping,
-    ]
-    par += [low, high, core.stop.restitution if core.stop else 0.0]
-    par += [bristle.stiffness, bristle.damping, bristle.level] if bristle else [0.0, 0.0, 0.0]
-    par += [_narrowest(chain) for chain in (core.friction + ((),))[:2]]
-    laws = []
+    low, high = core.wall
+    numbers: list[float] = [core.masses[0], core.masses[1] if core.bodies == 2 else 1.0, core.gap]
+    numbers += [core.restitution, low, high, core.stop.restitution if core.stop else 0.0]
+    par = [*numbers, *(_narrowest(chain) for chain in (core.friction + ((),))[:2])]
+    laws, effects = [], []
+
+    def add(effect, state=0, body=0, sort=None):
+        law = address(type(effect).law, signature_of(effect))  # type: ignore[arg-type]
+        laws.append((law, len(par), state, body, sort or _sort([effect])))
+        effects.append(effect)
+        par.extend(effect.values)
+
     for term in core.forces:
-        law = address(type(term.effect).law, "force")  # type: ignore[arg-type]
-        laws.append((law, len(par), term.state, term.body, _sort([term.effect])))
-        par += term.effect.values
+        driving = L.DRIVING if term.effect.role == "input" else 0
+        add(term.effect, term.state, term.body, _sort([term.effect]) | driving)
     for body, chain in enumerate(core.friction):
         for effect in chain:
-            law = address(type(effect).law, "friction")  # type: ignore[arg-type]
-            laws.append((law, len(par), 0, body, _sort(chain)))
-            par += effect.values
-    effects = [term.effect for term in core.forces] + [e for chain in core.friction for e in chain]
+            add(effect, 0, body, _sort(chain) | (L.ASKING if effect.asks else 0))
+    places = []
+    for term in (core.presliding, core.coupling, core.contact):
+        places.append(-1 if term is None else len(laws))
+        if term is not None:
+            add(term.effect, term.state, term.body)
     chains = [len(c) for c in core.friction] + [0]
     aux = [
         core.bodies,
@@ -179,13 +177,16 @@ def core_node(core: Core, x0: int) -> Node:
         chains[0],
         chains[1],
         0,  # index of its first law, filled when packed
-        sum(term.effect.states for term in core.forces) + (bristle is not None),
+        sum(effect.states for effect in effects),
+        int(any(effect.asks for effect in effects)),
+        len(laws),
+        *places,
     ]
-    mode = [L.FREE, L.FREE, 0, 0]
+    mode = [L.FREE, L.FREE, 0, 0, 0]
     return Node(
         L.MECHANISM,
         1,
-        4 if two else 2,
+        2 * core.bodies,
         x0,
         core.nstates,
         par,
@@ -195,8 +196,15 @@ def core_node(core: Core, x0: int) -> Node:
         feed=0,
         laws=laws,
         start=mode,
-        affine=bristle is None and _sort(effects) == L.STRAIGHT,
+        affine=_sort(effects) == L.STRAIGHT,
     )
+
+
+def signature_of(effect) -> str:
+    """Return how the law of an effect, or of a class of them, is called: a key of `SIGNATURES`."""
+    if effect.role == "friction":
+        return "asking" if effect.asks else "friction"
+    return "presliding" if effect.role == "presliding" else "force"
 
 
 def _sort(effects) -> int:

@@ -108,7 +108,11 @@ def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str
     curved = [n.kind for n in nodes if not n.affine]
     if kinds.count(L.MECHANISM) <= 1 and not curved and nx <= WIDEST_AFFINE:
         ints[L.H_AFFINE] = 1
-    elif curved == [L.MECHANISM] == [k for k in kinds if k == L.MECHANISM] and nx <= WIDEST_CURVED:
+    elif (
+        curved == [L.MECHANISM] == [k for k in kinds if k == L.MECHANISM]
+        and nx <= WIDEST_CURVED
+        and not any(n.kind == L.MECHANISM and n.aux[L.A_ASKING] for n in nodes)
+    ):
         ints[L.H_AFFINE] = 2
     ints[L.H_BUMP] = int(
         any(n.kind == L.MECHANISM and min(n.par[L.P_BUMP0 : L.P_BUMP1 + 1]) < np.inf for n in nodes)

@@ -31,6 +31,10 @@ SIGNATURES = {
     "force": _D(_D, _D, _D, _P, _P, _P),
     # moving, direction, speed, base, p -> level
     "friction": _D(_D, _D, _D, _D, _P),
+    # the same, x, drive, load -> level
+    "asking": _D(_D, _D, _D, _D, _P, _D, _D, _D),
+    # v, level, z, p, dz -> force
+    "presliding": _D(_D, _D, _P, _P, _P),
     # u, p -> y
     "smooth": _D(_D, _P),
 }
@@ -38,6 +42,8 @@ _C_D, _C_P = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
 _CALLBACKS = {
     "force": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_P, _C_P, _C_P),
     "friction": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_D, _C_P),
+    "asking": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_D, _C_D, _C_P, _C_D, _C_D, _C_D),
+    "presliding": ctypes.CFUNCTYPE(_C_D, _C_D, _C_D, _C_P, _C_P, _C_P),
     "smooth": ctypes.CFUNCTYPE(_C_D, _C_D, _C_P),
     # t, x, u, dx, y, what: 0 outputs, 1 rates
     "system": ctypes.CFUNCTYPE(None, _C_D, _C_P, _C_P, _C_P, _C_P, ctypes.c_long),
@@ -185,6 +191,28 @@ def call_friction(typingctx, address, moving, direction, speed, base, p):
 
     def codegen(context, builder, signature, args):
         return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 0, 0, 1))
+
+    return sig, codegen
+
+
+@intrinsic
+def call_asking(typingctx, address, moving, direction, speed, base, p, x, drive, load):
+    """Call a friction law that asks for place and load; p is an address."""
+    sig = types.float64(types.int64, _D, _D, _D, _D, types.int64, _D, _D, _D)
+
+    def codegen(context, builder, signature, args):
+        return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 0, 0, 1, 0, 0, 0))
+
+    return sig, codegen
+
+
+@intrinsic
+def call_presliding(typingctx, address, v, level, z, p, dz):
+    """Call a presliding law; z, p, dz are addresses."""
+    sig = types.float64(types.int64, _D, _D, types.int64, types.int64, types.int64)
+
+    def codegen(context, builder, signature, args):
+        return _call(builder, ir.DoubleType(), args[0], args[1:], (0, 0, 1, 1, 1))
 
     return sig, codegen
 

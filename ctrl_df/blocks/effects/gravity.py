@@ -1,0 +1,63 @@
+"""Gravity on what swings about an axis."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class Gravity(Effect):
+    """Gravity on a body that turns about an axis out of the vertical, ``-torque sin(angle - angle0)``.
+
+    It hangs still at `angle0` and stands, unstably, half a turn from there. On a line gravity is a
+    `ConstantForce`.
+
+    Parameters
+    ----------
+    torque : float
+        m g l [N m], >= 0: weight times distance of the centre of mass.
+    angle0 : float
+        Where it hangs [rad].
+
+    Examples
+    --------
+    >>> pendulum = cdf.Inertia(0.5).with_effect(cdf.Gravity(2.0))
+    >>> [round(float(pendulum.dynamics(0, [angle, 0.0], [0.0])[1]), 3) for angle in (0.5, 3.0)]
+    [-1.918, -0.564]
+    """
+
+    torque: float = parameter("N", meaning="weight times lever")
+    angle0: float = parameter("m", lower=-math.inf, default=0.0, meaning="angle at which it hangs")
+
+    role: ClassVar[str] = "force"
+    turns: ClassVar[bool] = True
+    proportional: ClassVar[bool] = True
+    wavelength: ClassVar[float] = 2.0 * math.pi
+    shows: ClassVar[str] = "error that goes with the sine of the angle, in motion and at rest"
+    source: ClassVar[str] = "Newton"
+    remedy: ClassVar[str] = "On a line gravity is a ConstantForce."
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        """Return the torque [N m]."""
+        return -p[0] * math.sin(x - p[1])
+
+    @classmethod
+    def applicable(cls, block):
+        """Return whether the machine turns."""
+        return block.coordinates.position == "angle"
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return pendulums that hang where the force regressed on sine and cosine of the angle says."""
+        m, s = screen.motion, screen.scales
+        columns = [m.a, m.v, np.sign(m.v), np.sin(m.x), np.cos(m.x)]
+        weights = np.linalg.lstsq(np.column_stack(columns), m.u, rcond=None)[0]
+        size, angle = math.hypot(*weights[3:]), math.atan2(-weights[4], weights[3])
+        return [cls(f * size, a) for f in (1.0, 0.3) for a in (angle, 0.0)] + [cls(0.1 * s.force)]

@@ -1,0 +1,47 @@
+"""Dry friction that grows with the force carried."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ..effect import Effect, register_effect
+from ..parameter import parameter
+
+
+@register_effect
+@dataclass(frozen=True)
+class LoadDependentFriction(Effect):
+    """Dry friction of gears, screws and guides that grows with the force carried, ``coefficient |carried|``.
+
+    Carried is what passes from the drive to what it moves: with a `share` of the inertia behind the gears,
+    ``share drive + (1 - share) load``, where `load` is what springs, gravity and the like push against the
+    drive. In a block with an elastic joint it is the friction of the motor.
+
+    Parameters
+    ----------
+    coefficient : float
+        Friction level over force carried, >= 0.
+    share : float
+        Share of the inertia that lies behind the gears, 0 to 1; only forces besides the drive's tell of it.
+
+    Examples
+    --------
+    >>> screw = cdf.Mass(2.0).with_effect(cdf.LoadDependentFriction(0.2))
+    >>> [float(screw.dynamics(0, [0.0, 0.1], [F])[1]) for F in (10.0, -10.0)]  # pushing on, braking
+    [4.0, -6.0]
+    """
+
+    coefficient: float = parameter("", meaning="friction level over force carried")
+    share: float = parameter(
+        "", upper=1.0, default=1.0, free=False, meaning="share of the inertia behind the gears"
+    )
+
+    role: ClassVar[str] = "friction"
+    asks: ClassVar[tuple[str, ...]] = ("drive", "load")
+    proportional: ClassVar[bool] = True
+    shows: ClassVar[str] = "friction that is larger where the drive works harder"
+    source: ClassVar[str] = "Coulomb; of geared servos Duclusaud et al. (2025), Better Actuator Models"
+
+    @staticmethod
+    def law(moving, direction, speed, base, p, x, drive, load):
+        """Return the level [N]."""
+        return base + p[0] * abs(p[1] * drive + (1.0 - p[1]) * load)
