@@ -45,6 +45,9 @@ def write(folder):
             text += section("Effects", [f"ctrl_df.{n}" for n in chosen if n in effects])
     made = [f"ctrl_df.{module}.{name}" for module, group in RESULTS.items() for name in group]
     text += section("Answers", made)
+    for old in (folder / "generated").glob("*.rst"):  # of names that are gone
+        if f"   {old.stem}\n" not in text:
+            old.unlink()
     target = folder / "index.md"
     if not target.exists() or target.read_text() != text:
         target.write_text(text)
