@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import math
 import os
@@ -16,11 +17,14 @@ from .model_file import EXAMPLE, ModelFile, read_model
 from .versions import version
 
 BAD_INPUT = 2
+_SECTIONS = f"MODEL.toml, all sections:\n\n{EXAMPLE}"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, or 2 for unusable input (one line on stderr)."""
     options = _parser().parse_args(argv)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # whoever waits at a pipe sees lines as they come
     try:
         code = options.run(options)
         sys.stdout.flush()
@@ -29,41 +33,68 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except (ValueError, TypeError, OSError, RuntimeError) as error:
-        print(f"ctrl-df: error: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"ctrl-df: error: {_sentence(error)}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("ctrl-df: interrupted", file=sys.stderr)
         return 130
 
 
+def _sentence(error: Exception) -> str:
+    """Return an error as one line; those of the system by the file and what is wrong with it."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror.lower()}. Check the path."
+    return " ".join(str(error).split())
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="ctrl-df",
         description="Limit cycles of drives with friction and backlash, and the effect a model is missing.",
-        epilog="MODEL.toml, all sections:\n\n" + EXAMPLE,
+        epilog=f"example:\n  ctrl-df demo --out pictures\n\n{_SECTIONS}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"ctrl-df {version()}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    shape: dict[str, Any] = dict(epilog=parser.epilog, formatter_class=argparse.RawDescriptionHelpFormatter)
 
-    demo = commands.add_parser("demo", help="the paper's systems and a hidden-effect study: tables, pictures")
+    def command(name: str, text: str, example: str, sections: str = ""):
+        return commands.add_parser(
+            name,
+            help=text,
+            description=f"{text[0].upper()}{text[1:]}.",
+            epilog=f"example:\n  {example}\n\n{sections}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+
+    demo = command(
+        "demo",
+        "the paper's systems and a hidden-effect study: tables, pictures",
+        "ctrl-df demo --out pictures",
+    )
     demo.add_argument(
         "--out", default="ctrl-df-demo", metavar="DIR", help="where the pictures go (default %(default)s)"
     )
     demo.set_defaults(run=_demo)
 
-    cycles = commands.add_parser(
-        "limit-cycles", help="limit cycles of a model: predicted, exact, simulated", **shape
+    cycles = command(
+        "limit-cycles",
+        "limit cycles of a model: predicted, exact, simulated",
+        "ctrl-df limit-cycles axis.toml --json > axis.json",
+        _SECTIONS,
     )
     cycles.add_argument("model", metavar="MODEL.toml")
     cycles.add_argument("--json", action="store_true", help="machine-readable answer")
     cycles.set_defaults(run=_limit_cycles)
 
-    warm = commands.add_parser("warm-up", help="compile ahead what is compiled on first use")
+    warm = command("warm-up", "compile ahead what is compiled on first use", "ctrl-df warm-up")
     warm.set_defaults(run=_warm_up)
 
-    better = commands.add_parser("improve", help="find what a model is missing, from a record", **shape)
+    better = command(
+        "improve",
+        "find what a model is missing, from a record",
+        "ctrl-df improve run3.csv --model axis.toml --report run3.html",
+        _SECTIONS,
+    )
     better.add_argument("data", metavar="DATA.csv")
     better.add_argument("--model", required=True, metavar="MODEL.toml")
     better.add_argument("--report", metavar="OUT.html", help="write one self-contained HTML page")

@@ -4,7 +4,14 @@ from enum import Enum
 
 
 class Status(Enum):
-    """Why a solver stopped; ``status.ok`` tells success, ``str(status)`` the message with its remedy."""
+    """Why a solver stopped; ``status.ok`` tells success, ``str(status)`` the message with its remedy.
+
+    Examples
+    --------
+    >>> orbit = cdf.find_limit_cycle(cdf.closed_loop(cdf.pid(2000, 0, 130), cdf.friction_mass(9, 5)))
+    >>> orbit.status.ok
+    False
+    """
 
     CONVERGED = "converged"
     NO_SOLUTION = "the whole box was scanned and holds no solution"

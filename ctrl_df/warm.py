@@ -27,6 +27,10 @@ def warm_up(progress: bool | None = None) -> None:
     ------
     RuntimeError
         A step failed; its message is the last line of what it wrote.
+
+    Examples
+    --------
+    >>> cdf.warm_up()  # doctest: +SKIP
     """
     if progress is not None:
         flag("warm_up", "progress", progress)

@@ -1,21 +1,26 @@
-# %% [markdown]
-# # How do I add physics that the library does not have?
+r"""
+How do I add physics that the library does not have?
+====================================================
 
-# %%
+**Problem.** A carriage of 2 kg on a spring is slowed by a magnetic brake. Its drag grows with speed, has
+its greatest value at a critical speed and falls again. No effect of the library does that.
+
+**Equations.**
+
+.. math:: F_\text{brake} = -2 P \, \frac{v/v_c}{1 + (v/v_c)^2}
+
+**Method.** One class says it all: parameters with units, the role, the law. From then on it is an effect as
+any other: simulated, described, fitted, diagnosed.
+"""
+
 from dataclasses import dataclass
 from typing import ClassVar
 
+import matplotlib.pyplot as plt
 import numpy as np
-from _shown import finish
 from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
-
-# %% [markdown]
-# A magnetic brake: its drag grows with speed, has its greatest value at a critical speed and falls again. One
-# class says it all: parameters with units, the role, the law.
-
-# %%
 
 
 @cdf.register_effect
@@ -36,22 +41,20 @@ class EddyBrake(cdf.Effect):
         return -2.0 * p[0] * ratio / (1.0 + ratio * ratio)
 
 
-# %% [markdown]
-# From here on it is an effect like any other.
-
 # %%
+# The answer to sines of three amplitudes, over frequency:
+
 block = cdf.Mass(2.0).with_effect(EddyBrake(3.0, velocity=0.1)).with_effect(cdf.LinearSpring(200.0))
 family = cdf.describing_function_family(block, np.array([2.0, 4.0, 8.0]), np.geomspace(4, 20, 9))
 print(family)
 N = cdf.describing_function(block, 4.0, 8.0)
 print(f"N(4 N, 8 rad/s) = {N:.6e} m/N")
-finish(family.plot().figure)
-
-# %% [markdown]
-# A check that shares nothing with the engine: let SciPy integrate 200 periods, so that the start is
-# forgotten, and take the fundamental.
+family.plot()
 
 # %%
+# **Check.** A way that shares nothing with the engine: let SciPy integrate 200 periods, so that the start
+# is forgotten, and take the fundamental.
+
 omega, a = 8.0, 4.0
 period = 2 * np.pi / omega
 
@@ -66,3 +69,4 @@ x = solve_ivp(rates, (0, t[-1]), [0, 0], "DOP853", t, rtol=1e-10, atol=1e-13).y[
 brute = 2 / a * np.mean((x * np.exp(-1j * omega * t))[:-1])
 print(f"difference from brute force: {abs(N / brute - 1):.1e}")
 assert abs(N / brute - 1) < 1e-6
+plt.show()

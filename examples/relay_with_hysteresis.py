@@ -1,20 +1,31 @@
-# %% [markdown]
-# # How much does the describing function miss for a thermostat?
+r"""
+How much does the describing function miss for a thermostat?
+============================================================
 
-# %%
+**Problem.** A relay with hysteresis drives an integrator with a lag. How far off is the predicted
+oscillation?
+
+.. code-block:: text
+
+    0 --->( + )---[ relay, hysteresis 0.1 ]---u--->[ 1 / (s (s + 1)) ]---+---> y
+           - ^                                                           |
+             +-----------------------------------------------------------+
+
+**Equations.** The relay's output is a square wave whatever the loop does, so that the exact frequency
+follows from one equation (Tsypkin): at the instant of switching up the input stands at the hysteresis h,
+
+.. math:: -\frac{4 L}{\pi} \sum_{k = 1, 3, \dots} \frac{\operatorname{Im} H(j k \omega)}{k} = h .
+
+**Method.** Three ways: Tsypkin's equation, the describing function, the exact orbit.
+"""
+
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
-from _shown import finish
 from scipy.optimize import brentq
 
 import ctrl_df as cdf
 
-# %% [markdown]
-# A relay with hysteresis drives an integrator with a lag. Its output is a square wave whatever the loop
-# does, so the exact cycle follows from one equation in omega (Tsypkin): at the instant of switching up the
-# input stands at the hysteresis.
-
-# %%
 H, level, hysteresis = ct.tf([1], [1, 1, 0]), 1.0, 0.1
 k = np.arange(1, 20_001, 2)
 
@@ -32,18 +43,21 @@ resp = cdf.describing_function_response(H, relay, np.geomspace(0.11, 5, 20))
 cycle = resp.limit_cycles[0]
 low, high = cycle.omega_band
 print(f"describing function: {cycle.omega:.6f} rad/s, band {low:.4f} to {high:.4f}")
+resp.plot()
 
 # %%
 orbit = cdf.find_limit_cycle(cdf.closed_loop(H, relay), guess=cycle)
 print(f"exact orbit:         {orbit.omega:.6f} rad/s, {'stable' if orbit.stable else 'unstable'}")
-finish(orbit.plot().figure)
-
-# %% [markdown]
-# The square wave's harmonics come back through a plant that attenuates them by 9 or more: the prediction is
-# off by less than the band it states.
+orbit.plot()
 
 # %%
+# **Result.** The square wave's harmonics come back through a plant that attenuates them by 9 or more: the
+# prediction is off by less than the band it states.
+#
+# **Check.** The orbit against Tsypkin's equation:
+
 error = cycle.omega / tsypkin - 1
 print(f"error of the describing function: {100 * error:+.2f} %")
 assert abs(orbit.omega / tsypkin - 1) < 1e-6
 assert cycle.omega_band[0] < tsypkin < cycle.omega_band[1]
+plt.show()

@@ -130,3 +130,17 @@ def test_demo_refuses_a_file_as_directory(tmp_path, capsys):
     path.write_text("")
     assert main(["demo", "--out", str(path)]) == 2
     assert "directory" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["demo", "limit-cycles", "improve", "warm-up"])
+def test_help_of_every_command_has_an_example(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    said = capsys.readouterr().out
+    assert f"example:\n  ctrl-df {command}" in said
+
+
+def test_a_missing_file_is_named(capsys):
+    assert main(["limit-cycles", "nowhere.toml"]) == 2
+    said = capsys.readouterr().err
+    assert "nowhere.toml: no such file" in said and "Errno" not in said

@@ -81,6 +81,14 @@ class Effect:
         Whether a point of a table N(A, omega) takes many times as long with it as with others.
     table_starts : int
         Starts on a table from which it is fitted.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> [(e.id, e.role) for e in axis.effects]
+    [('coulomb', 'friction'), ('viscous', 'force')]
+    >>> axis.effects[0].replace(level=6.0)
+    Coulomb(level=6.0)
     """
 
     id: ClassVar[str] = ""
@@ -200,6 +208,20 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
         If it is no dataclass derived from `Effect`.
     ValueError
         If the id is taken or the role unknown.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @cdf.register_effect
+    ... @dataclass(frozen=True)
+    ... class SquareRootDrag(cdf.Effect):
+    ...     level: float = cdf.parameter("N s/m")
+    ...     role = "force"
+    ...     @staticmethod
+    ...     def law(t, x, v, z, p, dz):
+    ...         return -p[0] * v / (1.0 + abs(v)) ** 0.5
+    >>> cdf.Mass(2.0).with_effect(SquareRootDrag(3.0)).parameters["square_root_drag.level"].value
+    3.0
     """
     if not (isinstance(cls, type) and issubclass(cls, Effect) and dataclasses.is_dataclass(cls)):
         raise TypeError(
@@ -224,12 +246,26 @@ def _origin(cls) -> tuple[str, str]:
 
 
 def effect_library() -> dict[str, type[Effect]]:
-    """Return every registered effect class by id, built-in and user-registered."""
+    """Return every registered effect class by id, built-in and user-registered.
+
+    Examples
+    --------
+    >>> "stribeck" in cdf.effect_library()
+    True
+    >>> cdf.effect_library()["stribeck"].shows
+    'error concentrated at low speed: more friction there than at full speed'
+    """
     return dict(_LIBRARY)
 
 
 def effect_class(effect_id: str) -> type[Effect]:
-    """Look an effect class up by id; an unknown id raises ValueError with the list of those known."""
+    """Look an effect class up by id; an unknown id raises ValueError with the list of those known.
+
+    Examples
+    --------
+    >>> cdf.effect_class("linear_spring")(200.0)
+    LinearSpring(stiffness=200.0, center=0.0)
+    """
     if not isinstance(effect_id, str) or effect_id not in _LIBRARY:
         raise (ValueError if isinstance(effect_id, str) else TypeError)(
             f"an effect id must be one of the library's; got {shown(effect_id)}. "

@@ -22,6 +22,16 @@ class DescribingFunctionNonlinearity(_PythonControlNonlinearity):
 
     Subclass it, define ``__call__(u)`` and ``describing_function(A)``, as with python-control's class of the
     same name, which it extends. Without ``describing_function`` the numerical computation is used.
+
+    Examples
+    --------
+    >>> class Square(cdf.DescribingFunctionNonlinearity):
+    ...     def __call__(self, A):
+    ...         return A * abs(A)
+    ...     def describing_function(self, A):
+    ...         return 8 * A / (3 * np.pi)
+    >>> print(f"{cdf.describing_function(Square(), 3.0).real:.4f}")
+    2.5465
     """
 
 

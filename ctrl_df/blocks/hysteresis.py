@@ -54,6 +54,12 @@ def play(gap, *, name=None) -> Element:
     References
     ----------
     Gelb & Vander Velde (1968), appendix B, nonlinearity 48.
+
+    Examples
+    --------
+    >>> N = cdf.describing_function(cdf.play(1.0), 1.0)  # half of the gap is lost on either side
+    >>> print(f"{abs(N):.4f}, {np.degrees(np.angle(N)):.1f} deg")
+    0.5927, -32.5 deg
     """
     spec = finite(lower=0.0, strict=True, meaning="total clearance")
     gap = checked("play", "gap", gap, spec, "For a tight joint leave the block out.")
@@ -91,6 +97,12 @@ def relay_with_hysteresis(level, hysteresis, *, name=None) -> Element:
     References
     ----------
     Astrom & Murray, Feedback Systems, 2nd ed., example 10.12.
+
+    Examples
+    --------
+    >>> N = cdf.describing_function(cdf.relay_with_hysteresis(1.0, 0.5), 1.0)
+    >>> print(f"{abs(N):.4f}, {np.degrees(np.angle(N)):.1f} deg")  # arcsin(0.5) late
+    1.2732, -30.0 deg
     """
     specs = dict(
         level=finite(lower=0.0, strict=True, meaning="output level"),
@@ -126,6 +138,12 @@ def rate_limiter(rate, *, name=None) -> Element:
     References
     ----------
     Klyde, McRuer & Myers (1997), J. Guidance, Control, and Dynamics 20(1), 81-89; Duda (1997), ibid. 20(3).
+
+    Examples
+    --------
+    >>> N = cdf.describing_function(cdf.rate_limiter(1.0), 1.0, 4.0)  # a triangle wave
+    >>> print(f"{abs(N):.4f}")
+    0.3183
     """
     spec = finite(lower=0.0, strict=True, meaning="largest speed of the output")
     rate = checked("rate_limiter", "rate", rate, spec)
@@ -198,6 +216,12 @@ class friction_backlash_nonlinearity(_PlayElement):
     ----------
     b : float
         Total clearance, > 0.
+
+    Examples
+    --------
+    >>> play = cdf.friction_backlash_nonlinearity(1.0)
+    >>> print(f"{np.degrees(np.angle(cdf.describing_function(play, 1.0))):.1f} deg")
+    -32.5 deg
     """
 
     def __init__(self, b):
@@ -219,6 +243,12 @@ class relay_hysteresis_nonlinearity(_RelayElement):
         Output level, > 0.
     c : float
         Half width of the hysteresis, > 0.
+
+    Examples
+    --------
+    >>> relay = cdf.relay_hysteresis_nonlinearity(1.0, 0.5)
+    >>> print(f"{np.degrees(np.angle(cdf.describing_function(relay, 1.0))):.1f} deg")
+    -30.0 deg
     """
 
     def __init__(self, b, c):

@@ -29,6 +29,14 @@ class Mechanism(ct.NonlinearIOSystem):
 
     Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form of `ctrl_df.blocks.compliant`; the event engine
     runs the exact laws.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5)
+    >>> isinstance(axis, cdf.Mechanism), isinstance(axis, ct.NonlinearIOSystem)
+    (True, True)
+    >>> axis.effects
+    (Coulomb(level=5.0), Viscous(coefficient=0.0))
     """
 
     _inertias: tuple[str, ...] = ()
@@ -251,6 +259,16 @@ class Mass(Mechanism):
     ------
     ValueError
         Mass not positive, contradictory effects; the message gives rule, value, remedy.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(9).with_effect(cdf.Coulomb(5)).with_effect(cdf.Viscous(0.5))
+    >>> axis.input_labels, axis.output_labels, axis.state_labels
+    (['F'], ['x', 'v'], ['x', 'v'])
+    >>> {name: p.value for name, p in axis.parameters.items()}
+    {'mass': 9.0, 'coulomb.level': 5.0, 'viscous.coefficient': 0.5}
+    >>> axis.without_effect("viscous").with_parameters({"mass": 10})
+    Mass(mass=10).with_effect(Coulomb(level=5.0))
     """
 
     _inertias = ("mass",)
@@ -276,6 +294,12 @@ class TwoMass(Mechanism):
         [kg], > 0.
     effects, measured, name
         As in `Mass`.
+
+    Examples
+    --------
+    >>> drive = cdf.TwoMass(1.0, 8.0).with_effect(cdf.Compliance(500.0))
+    >>> drive.output_labels
+    ['x', 'v', 'x_motor', 'v_motor']
     """
 
     _inertias = ("load_mass", "motor_mass")
@@ -313,6 +337,12 @@ def friction_mass(mass, coulomb, viscous=0.0, static=None, *, name=None) -> Mass
     References
     ----------
     Azenha & Machado (1997), Fig. 2 and eq. (6).
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=7.5)
+    >>> [e.id for e in axis.effects]
+    ['coulomb', 'viscous', 'stiction']
     """
     effects: list[Effect] = [Coulomb(coulomb), Viscous(viscous)]
     if static is not None:
@@ -335,6 +365,11 @@ def backlash_masses(motor_mass, load_mass, gap, restitution=0.0, *, name=None) -
     References
     ----------
     Azenha & Machado (1997), Fig. 6 and eqs. (9)-(13).
+
+    Examples
+    --------
+    >>> cdf.backlash_masses(motor_mass=1, load_mass=8, gap=0.018, restitution=0.2)
+    TwoMass(load_mass=8, motor_mass=1).with_effect(Backlash(gap=0.018, restitution=0.2, load_fraction=0.5))
     """
     return TwoMass(motor_mass, load_mass, [Backlash(gap, restitution)], name=name)
 

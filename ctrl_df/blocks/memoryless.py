@@ -51,6 +51,11 @@ def saturation(ub=1.0, lb=None, *, name=None) -> Element:
     References
     ----------
     Gelb & Vander Velde (1968), appendix B, nonlinearity 9; unequal levels by direct integration.
+
+    Examples
+    --------
+    >>> print(f"{cdf.describing_function(cdf.saturation(1.0), 2.0):.6f}")
+    0.608998+0.000000j
     """
     ub = checked("saturation", "ub", ub, finite(meaning="upper level"))
     if lb is None and ub <= 0:
@@ -96,6 +101,11 @@ def dead_zone(width, *, name=None) -> Element:
     References
     ----------
     Gelb & Vander Velde (1968), appendix B, nonlinearity 10.
+
+    Examples
+    --------
+    >>> print(f"{cdf.describing_function(cdf.dead_zone(1.0), [0.4, 5.0])[1].real:.4f}")
+    0.8729
     """
     spec = finite(lower=0.0, meaning="total width of the dead band")
     width = checked("dead_zone", "width", width, spec)
@@ -129,6 +139,11 @@ def relay(level=1.0, *, name=None) -> Element:
     References
     ----------
     Tsypkin (1984), Relay Control Systems; Gelb & Vander Velde (1968), appendix B: N = 4 level / (pi A).
+
+    Examples
+    --------
+    >>> print(f"{cdf.describing_function(cdf.relay(1.0), 2.0).real:.6f}")  # 4 / (pi 2)
+    0.636620
     """
     spec = finite(lower=0.0, strict=True, meaning="output level")
     level = checked("relay", "level", level, spec)
@@ -163,6 +178,12 @@ def relay_with_dead_zone(level, dead_zone, *, name=None) -> Element:
     References
     ----------
     Gelb & Vander Velde (1968), appendix B: N = (4 level / (pi A)) sqrt(1 - (dead_zone / 2A)^2).
+
+    Examples
+    --------
+    >>> relay = cdf.relay_with_dead_zone(1.0, dead_zone=0.5)
+    >>> [float(relay.output(0, [], [u])[0]) for u in (0.2, 0.3, -0.3)]
+    [0.0, 1.0, -1.0]
     """
     specs = dict(
         level=finite(lower=0.0, strict=True, meaning="output level"),
@@ -201,6 +222,11 @@ def quantizer(step, *, name=None) -> Element:
     References
     ----------
     Gelb & Vander Velde (1968), appendix B, uniform quantizer.
+
+    Examples
+    --------
+    >>> [float(cdf.quantizer(0.1).output(0, [], [u])[0]) for u in (0.04, 0.06)]
+    [0.0, 0.1]
     """
     spec = finite(lower=0.0, strict=True, meaning="width and height of a stair")
     step = checked("quantizer", "step", step, spec)
@@ -236,6 +262,11 @@ def preload(level, slope=1.0, *, name=None) -> Element:
     References
     ----------
     Gelb & Vander Velde (1968), appendix B: N = slope + 4 level / (pi A).
+
+    Examples
+    --------
+    >>> float(cdf.preload(0.5, slope=2.0).output(0, [], [1.0])[0])
+    2.5
     """
     specs = dict(level=finite(lower=0.0, meaning="half the jump at zero"), slope=finite(meaning="gain"))
     level = checked("preload", "level", level, specs["level"])
@@ -261,6 +292,12 @@ def piecewise_linear(x, y, *, name=None) -> Element:
     ------
     ValueError
         Fewer than two points, unequal lengths, x not ascending, a number that is not finite.
+
+    Examples
+    --------
+    >>> curve = cdf.piecewise_linear([-1, 0, 1], [-2, 0, 1])
+    >>> [float(curve.output(0, [], [u])[0]) for u in (-0.5, 0.5, 2.0)]
+    [-1.0, 0.5, 2.0]
     """
     xs, ys = (real_array("piecewise_linear", k, v) for k, v in (("x", x), ("y", y)))
     if xs.ndim != 1 or xs.shape != ys.shape or xs.size < 2:
@@ -298,6 +335,11 @@ def cubic(coefficient=1.0, *, name=None) -> Element:
     References
     ----------
     N = (3/4) coefficient A^2, third harmonic (1/4) coefficient A^3: the identity for cos^3.
+
+    Examples
+    --------
+    >>> print(f"{cdf.describing_function(cdf.cubic(1.0), 2.0).real:.4f}")  # 3/4 a^2
+    3.0000
     """
     spec = finite(meaning="coefficient of the cube")
     coefficient = checked("cubic", "coefficient", coefficient, spec)
@@ -319,6 +361,12 @@ class saturation_nonlinearity(Element):
     lb : float or None
         Lower level; None: ``-abs(ub)`` to ``abs(ub)``, as there. Unequal levels warn, as python-control's
         class does: the output then has a mean, which a loop analysis by the first harmonic leaves out.
+
+    Examples
+    --------
+    >>> F = cdf.saturation_nonlinearity(1)
+    >>> float(F(3.0))
+    1.0
     """
 
     def __init__(self, ub=1, lb=None):

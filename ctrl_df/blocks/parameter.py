@@ -38,6 +38,12 @@ class Parameter:
         Whether outputs change in steps with it: no least squares moves it, it is read off the record.
     line_unit : str
         Unit of the same parameter in a machine on a line, `unit` by default; its size follows from that.
+
+    Examples
+    --------
+    >>> level = cdf.friction_mass(mass=9, coulomb=5).parameters["coulomb.level"]
+    >>> level.value, level.unit, level.lower
+    (5.0, 'N', 0.0)
     """
 
     value: float
@@ -79,6 +85,15 @@ def parameter(
     ------
     ValueError
         The unit is unknown: the sizes that a fit begins with follow from it.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Spring(cdf.Effect):
+    ...     stiffness: float = cdf.parameter("N/m", meaning="of the spring")
+    >>> Spring(200.0).parameters["stiffness"].unit
+    'N/m'
     """
     dimension(unit)
     stated = dict(

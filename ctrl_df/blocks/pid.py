@@ -28,6 +28,11 @@ def pid(kp, ki=0.0, kd=0.0, tf=0.0, *, name=None) -> ct.TransferFunction:
     References
     ----------
     Azenha & Machado (1997), eqs. (7)-(8).
+
+    Examples
+    --------
+    >>> cdf.pid(2000, 44250, 130)(10j)  # 2000 + 44250 / 10j + 130 * 10j
+    np.complex128(2000-3125j)
     """
     system_name("pid", name)
     kp, ki, kd = (

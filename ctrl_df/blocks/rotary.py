@@ -61,6 +61,12 @@ class TwoInertias(Mechanism):
         [kg m^2], > 0, both seen from the same side of a gear.
     effects, measured, name
         As in `Mass`.
+
+    Examples
+    --------
+    >>> gear = cdf.TwoInertias(0.001, 0.02).with_effect(cdf.Backlash(0.01, restitution=0.3))
+    >>> gear.parameters["backlash.gap"].unit
+    'rad'
     """
 
     _inertias = ("load_inertia", "motor_inertia")

@@ -60,6 +60,13 @@ def describing_function(
         A negative or not finite, omega not positive, omega missing, a law that is not zero at zero.
     TypeError
         F is no block and no callable, or an unknown keyword.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> N = cdf.describing_function(axis, 9.0, 15.0)
+    >>> print(f"{1e3 * 9.0 * abs(N):.4f} mm, {np.degrees(np.angle(N)):.2f} deg")
+    2.2957 mm, -137.69 deg
     """
     N, regime, A, omega = _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)
     warn_of(N, regime, A, omega)
@@ -151,6 +158,15 @@ def describing_function_family(
         A worker process died, or the executor is shut down.
     OSError
         `save` is no place for a file, or written by another process.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> family = cdf.describing_function_family(axis, [4.0, 9.0, 14.0], [10.0, 15.0])
+    >>> family.N.shape
+    (3, 2)
+    >>> print(family.regime[:, 1])
+    ['stuck' 'stick-slip' 'slip']
     """
     A = _axis("A", _amplitudes(A), "unit of the input")
     if (A <= 0).any():

@@ -43,6 +43,15 @@ class Family:
         The block in words.
     output : str
         Name of the output described.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> family = cdf.describing_function_family(axis, [9.0, 14.0], np.geomspace(4, 40, 10))
+    >>> family.counts
+    {'slip': 10, 'stick-slip': 10}
+    >>> family.frd(9.0).ninputs
+    1
     """
 
     amplitudes: np.ndarray
@@ -120,7 +129,7 @@ class Family:
         return draw("family", self, **kwargs)
 
     def plot_harmonics(self, **kwargs) -> ct.ControlPlot:
-        """Draw |Y_k| / A over frequency or over amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
+        """Draw ``|Y_k| / A`` over frequency or amplitude, as Figs. 4 and 8 of Azenha & Machado (1997)."""
         return draw("harmonics", self, **kwargs)
 
     def save(self, path) -> Path:
@@ -146,6 +155,17 @@ def load_family(path) -> Family:
     ValueError
         The file is damaged, holds no family or no complete one (interrupted work is finished by the call that
         began it), or needs pickle.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5)
+    >>> family = cdf.describing_function_family(axis, [9.0, 14.0], [10.0, 15.0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = family.save(pathlib.Path(folder) / "axis.npz")
+    ...     again = cdf.load_family(path)
+    >>> bool((again.N == family.N).all())
+    True
     """
     path = path_of("load_family", "path", path)
     if is_journal(path):

@@ -8,7 +8,17 @@ import numpy as np
 
 
 class DescribingFunctionWarning(RuntimeWarning):
-    """N is NaN, or that of a motion that repels, travels or has no period."""
+    """N is NaN, or that of a motion that repels, travels or has no period.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     N = cdf.describing_function(cdf.friction_mass(mass=9, coulomb=5), 4.0, 10.0)  # too weak
+    >>> said[0].category.__name__
+    'DescribingFunctionWarning'
+    """
 
 
 _MEANING = {

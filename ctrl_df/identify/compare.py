@@ -32,6 +32,17 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     -------
     Comparison
         For tables a `FrequencyComparison`.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0)
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> comparison = cdf.compare(cdf.friction_mass(2.0, 2.5, 5.0), record)
+    >>> comparison.fit_percent < 90, bool(comparison.white)
+    (True, False)
     """
     unknown_keywords(keywords)
     dataset = dataset_of(data)

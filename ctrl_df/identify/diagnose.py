@@ -51,6 +51,18 @@ def diagnose(
     ------
     TypeError, ValueError
         Data that are no measurements, an unknown effect id, a model that is no block.
+
+    Examples
+    --------
+    >>> names = ["constant_force", "quadratic_drag"]
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.ConstantForce(1.0))
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> diagnosis = cdf.diagnose(cdf.friction_mass(2.0, 2.5, 5.0), record, candidates=names)
+    >>> diagnosis.verdict, diagnosis.best.id, round(diagnosis.best.parameters["force"], 1)
+    ('effect', 'constant_force', 1.0)
     """
     unknown_keywords(keywords)
     checked_executor("diagnose", executor)

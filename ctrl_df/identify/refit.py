@@ -67,6 +67,17 @@ def refit(
     References
     ----------
     Bock (1983), multiple shooting; Golub & Pereyra (1973), variable projection; Ljung (1999), sec. 9.4.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0)
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> fit = cdf.refit(cdf.friction_mass(2.0, 2.5, 5.0), record)
+    >>> {name: round(p.value, 1) for name, p in fit.parameters.items()}
+    {'mass': 2.2, 'coulomb.level': 3.0, 'viscous.coefficient': 6.0}
     """
     unknown_keywords(keywords)
     dataset = dataset_of(data)

@@ -127,6 +127,14 @@ class Check:
     fate : Fate
         What the loop does from the starts simulated: a row a start, ``rests``, ``cycles`` (on which orbit) or
         ``diverges``, and the sizes at which that changes.
+
+    Examples
+    --------
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> resp = cdf.describing_function_response(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> check = cdf.verify(resp)
+    >>> check.rows[0].verdict, check.rows[0].exact
+    ('confirmed', <Orbit: 3.39494 @ 1.406702 rad/s, stable>)
     """
 
     rows: tuple[Row, ...]

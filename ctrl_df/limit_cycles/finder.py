@@ -69,6 +69,13 @@ def find_limit_cycle(
     ValueError
         A pure delay stands in the loop: its state is a whole history, no vector that Newton could move. Its
         motion is found by simulation: `event_response`, or `verify`, whose rows tell what it settles to.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=5.5)
+    >>> loop = cdf.closed_loop(cdf.pid(2000, 44250, 130), axis)
+    >>> cdf.find_limit_cycle(loop, guess=(8.0, 11.6))
+    <Orbit: 7.945402 @ 11.62868 rad/s, stable>
     """
     unknown_keywords(keywords)
     check_search(

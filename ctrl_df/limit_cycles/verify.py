@@ -52,6 +52,13 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
         points, or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure
         delay, whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why``
         tells how. An unstable cycle cannot be seen that way and stays ``not tested``.
+
+    Examples
+    --------
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> resp = cdf.describing_function_response(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> [row.verdict for row in cdf.verify(resp)]
+    ['confirmed']
     """
     unknown_keywords(keywords)
     check_search("verify", search_time=search_time, search=search)

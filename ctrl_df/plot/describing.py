@@ -77,6 +77,15 @@ def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **k
         Wrong positional arguments, legend keywords.
     ValueError
         `label` neither string, False nor None.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> picture = cdf.describing_function_plot(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> picture.axes.size
+    1
+    >>> plt.close(picture.figure)
     """
     if label not in (False, None) and not isinstance(label, str):
         raise ValueError("label must be formatting string, False, or None")

@@ -50,6 +50,13 @@ class BatchResponse:
     input_labels, output_labels, state_labels : tuple of str
     name : str
         Of the system.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5)
+    >>> runs = cdf.batch_response(axis, np.linspace(0, 1, 11), [[10.0] * 11, [4.0] * 11])
+    >>> len(runs), runs[1].outputs.shape
+    (2, (2, 11))
     """
 
     time: np.ndarray

@@ -71,6 +71,12 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     ValueError
         MIMO controller, improper controller without a velocity to act on, sample times that differ, algebraic
         loop.
+
+    Examples
+    --------
+    >>> loop = cdf.closed_loop(cdf.pid(2000, 0, 130), cdf.friction_mass(mass=9, coulomb=5))
+    >>> loop.input_labels, loop.output_labels
+    (['r'], ['x', 'F'])
     """
     system_name("closed_loop", name)
     block = _as_block(block)

@@ -33,6 +33,13 @@ class EventResponse(ct.TimeResponseData):
         no event could lie inside: exactly where all laws are affine between events, else by an exponential
         Runge-Kutta method within the tolerance; 0 for systems with delays, plays, rate limits, static laws
         that are smooth or more than one mechanism, and without a grid of samples or outputs.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5)
+    >>> run = cdf.event_response(axis, np.linspace(0, 1, 11), 10.0)
+    >>> isinstance(run, ct.TimeResponseData), np.asarray(run.outputs).shape
+    (True, (2, 11))
     """
 
     events: list[Event]
@@ -115,6 +122,14 @@ def event_response(
         Text, complex numbers or truth values in the place of numbers; unknown keywords.
     RuntimeError
         A user-written law or input raised, or returned NaN; its exception is the cause.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, static=5.5)
+    >>> t = np.linspace(0, 2, 201)
+    >>> run = cdf.event_response(axis, t, 7 * np.sin(3 * t))
+    >>> [(round(float(e.time), 4), e.kind) for e in run.events]
+    [(0.3013, 'breakaway'), (1.0564, 'stick'), (1.3485, 'breakaway')]
     """
     unknown_keywords(keywords)
     for name, value in dict(keep_events=keep_events, return_states=return_states, squeeze=squeeze).items():

@@ -55,6 +55,12 @@ def sampled(system, **keywords) -> Sampled:
     ----------
     system : ct.TransferFunction or ct.StateSpace
         Discrete, with a sample time ``dt`` > 0.
+
+    Examples
+    --------
+    >>> controller = cdf.sampled(ct.tf([1.0, -0.5], [1, 0], 0.01))
+    >>> controller.dt == 0 or controller.dt is None  # a block for continuous loops
+    True
     """
     if not isinstance(system, ct.TransferFunction | ct.StateSpace) or not system.isdtime(strict=True):
         raise (ValueError if isinstance(system, ct.TransferFunction | ct.StateSpace) else TypeError)(

@@ -20,6 +20,12 @@ class AsymmetricCoulomb(Effect):
     ----------
     difference : float
         Level for v > 0 minus level for v < 0 [N], either sign.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.AsymmetricCoulomb(1.0))
+    >>> axis.parameters["asymmetric_coulomb.difference"].unit
+    'N'
     """
 
     difference: float = parameter("N", lower=-math.inf, meaning="level for v > 0 minus level for v < 0")

@@ -17,6 +17,12 @@ class AsymmetricViscous(Effect):
     ----------
     difference : float
         Slope for v > 0 minus slope for v < 0 [N s/m], either sign.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Viscous(5.0)).with_effect(cdf.AsymmetricViscous(1.0))
+    >>> [float(a) for a in axis.dynamics(0, [0.0, 0.2], [0.0])]
+    [0.2, -0.55]
     """
 
     difference: float = parameter("N s/m", lower=-math.inf, meaning="slope for v > 0 minus slope for v < 0")

@@ -24,6 +24,12 @@ class Backlash(Effect):
         Rebound speed over approach speed, 0 to 1.
     load_fraction : float
         Share of a single mass that lies behind the gap, in (0, 1); no meaning in a two-mass block.
+
+    Examples
+    --------
+    >>> drive = cdf.TwoMass(1.0, 8.0).with_effect(cdf.Backlash(0.018, restitution=0.2))
+    >>> drive.state_labels
+    ['x', 'v', 'x_motor', 'v_motor']
     """
 
     gap: float = parameter("m", strict=True, meaning="total clearance")

@@ -25,6 +25,12 @@ class Bristle(Effect):
         Bristle damping sigma1 [N s/m], >= 0.
     level : float
         Level in addition to the block's dry friction [N], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.Bristle(5e4, damping=300))
+    >>> axis.nstates  # position, speed, bend of the bristles
+    3
     """
 
     stiffness: float = parameter("N/m", strict=True, meaning="bristle stiffness")

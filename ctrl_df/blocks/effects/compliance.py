@@ -25,6 +25,14 @@ class Compliance(Effect):
         c [N s/m], >= 0.
     load_fraction : float
         Share of a single mass that lies behind the joint, in (0, 1); no meaning in a two-mass block.
+
+    Examples
+    --------
+    >>> drive = cdf.TwoMass(1.0, 8.0).with_effect(cdf.Compliance(500.0, damping=0.5))
+    >>> print(f"{abs(cdf.describing_function(drive, 1.0, 5.0)):.6f}")  # linear: the same at every amplitude
+    0.004651
+    >>> print(f"{abs(cdf.describing_function(drive, 9.0, 5.0)):.6f}")
+    0.004651
     """
 
     stiffness: float = parameter("N/m", strict=True, meaning="joint stiffness")

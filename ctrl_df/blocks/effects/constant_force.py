@@ -17,6 +17,12 @@ class ConstantForce(Effect):
     ----------
     force : float
         [N], positive along +x.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.ConstantForce(-19.6))
+    >>> float(axis.dynamics(0, [0.0, 0.0], [0.0])[1])
+    -9.8
     """
 
     force: float = parameter("N", lower=-math.inf, meaning="constant force along +x")

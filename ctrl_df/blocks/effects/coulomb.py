@@ -12,15 +12,25 @@ from ..parameter import parameter
 class Coulomb(Effect):
     """Dry friction of constant level; at rest it holds any force up to that level.
 
-          F│
-         K ┤──────── v > 0
-        ───┼──────── v
-    ───────┤ -K
+    ::
+
+              F│
+             K ┤──────── v > 0
+        ───────┼──────── v
+        ───────┤ -K
 
     Parameters
     ----------
     level : float
         K [N], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0))
+    >>> [float(axis.dynamics(0, [0.0, v], [5.0])[1]) for v in (0.1, -0.1)]  # (5 -+ 3) N / 2 kg
+    [1.0, 4.0]
+    >>> float(np.asarray(cdf.event_response(axis, [0, 1], 2.9).outputs)[0, -1])  # held
+    0.0
     """
 
     level: float = parameter("N", meaning="Coulomb level")

@@ -19,6 +19,12 @@ class CubicSpring(Effect):
         k3 [N/m^3], >= 0.
     center : float
         Position of zero force [m].
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.CubicSpring(1000.0))
+    >>> float(axis.dynamics(0, [0.1, 0.0], [0.0])[1])
+    -0.5
     """
 
     stiffness: float = parameter("N/m^3", meaning="cubic stiffness")

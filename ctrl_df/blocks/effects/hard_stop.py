@@ -24,6 +24,13 @@ class HardStop(Effect):
         Rebound speed over impact speed, 0 to 1.
     lower : float or None
         Lower stop [m] < limit.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.HardStop(0.1, restitution=0.5))
+    >>> run = cdf.event_response(axis, [0, 1], 1.0)
+    >>> [(round(float(e.time), 4), e.kind) for e in run.events[:1]]
+    [(0.6325, 'stop')]
     """
 
     limit: float = parameter("m", lower=-math.inf, meaning="upper end of the stroke")

@@ -19,6 +19,12 @@ class InputSaturation(Effect):
     ----------
     level : float
         [N], > 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.InputSaturation(10.0))
+    >>> [float(axis.dynamics(0, [0.0, 0.0], [F])[1]) for F in (8.0, 30.0)]
+    [4.0, 5.0]
     """
 
     level: float = parameter("N", strict=True, meaning="largest force")
@@ -54,6 +60,12 @@ class InputDeadZone(Effect):
     ----------
     threshold : float
         Half width of the dead zone [N], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.InputDeadZone(1.0))
+    >>> [float(axis.dynamics(0, [0.0, 0.0], [F])[1]) for F in (0.9, 3.0)]
+    [0.0, 1.0]
     """
 
     threshold: float = parameter("N", meaning="half width of the dead zone")
@@ -85,6 +97,12 @@ class InputGain(Effect):
     ----------
     gain : float
         Actual over nominal drive gain, > 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.InputGain(0.8))
+    >>> float(axis.dynamics(0, [0.0, 0.0], [5.0])[1])
+    2.0
     """
 
     gain: float = parameter("", strict=True, meaning="actual over nominal drive gain")
@@ -117,6 +135,13 @@ class InputLag(Effect):
     ----------
     time_constant : float
         [s], > 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.InputLag(0.1))
+    >>> N = cdf.describing_function(axis, 1.0, 10.0)
+    >>> print(f"{np.degrees(np.angle(-N)):.3f}")  # 0.1 s at 10 rad/s
+    -45.000
     """
 
     time_constant: float = parameter("s", strict=True, meaning="time constant of the drive")
@@ -151,6 +176,13 @@ class InputDelay(Effect):
     ----------
     delay : float
         [s], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.InputDelay(0.1))
+    >>> N = cdf.describing_function(axis, 1.0, 5.0)
+    >>> print(f"{np.degrees(np.angle(-N)):.3f}")  # 0.1 s at 5 rad/s
+    -28.648
     """
 
     delay: float = parameter("s", meaning="dead time of the drive")

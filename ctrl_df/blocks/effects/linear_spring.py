@@ -19,6 +19,12 @@ class LinearSpring(Effect):
         k [N/m], >= 0.
     center : float
         Position of zero force [m].
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.LinearSpring(200.0))
+    >>> print(f"{cdf.describing_function(axis, 1.0, 5.0).real:.6f}")  # 1 / (200 - 2 * 25)
+    0.006667
     """
 
     stiffness: float = parameter("N/m", meaning="spring stiffness")

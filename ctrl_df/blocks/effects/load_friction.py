@@ -16,6 +16,12 @@ class LoadFriction(Effect):
     ----------
     level : float
         Level [N], >= 0.
+
+    Examples
+    --------
+    >>> drive = cdf.TwoMass(1.0, 8.0).with_effect(cdf.Backlash(0.01)).with_effect(cdf.LoadFriction(2.0))
+    >>> drive.parameters["load_friction.level"].value
+    2.0
     """
 
     level: float = parameter("N", meaning="Coulomb level on the load")

@@ -21,6 +21,12 @@ class PositionRipple(Effect):
         Period over position [m], > 0.
     phase : float
         Phase at x = 0 [rad].
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.PositionRipple(1.5, wavelength=0.12))
+    >>> print(f"{axis.dynamics(0, [0.03, 0.0], [0.0])[1]:.3f}")  # a quarter of a wave: 1.5 N / 2 kg
+    0.750
     """
 
     amplitude: float = parameter("N", meaning="ripple amplitude")

@@ -16,6 +16,12 @@ class QuadraticDrag(Effect):
     ----------
     coefficient : float
         c [N s^2/m^2], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.QuadraticDrag(4.0))
+    >>> [float(axis.dynamics(0, [0.0, v], [0.0])[1]) for v in (0.5, -0.5)]
+    [-0.5, 0.5]
     """
 
     coefficient: float = parameter("N s^2/m^2", meaning="drag coefficient")

@@ -18,6 +18,13 @@ class SensorDelay(Effect):
     ----------
     delay : float
         [s], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.SensorDelay(0.1))
+    >>> N = cdf.describing_function(axis, 1.0, 5.0)
+    >>> print(f"{np.degrees(np.angle(-N)):.3f}")  # 0.1 s at 5 rad/s
+    -28.648
     """
 
     delay: float = parameter("s", meaning="delay of the sensor")
@@ -46,6 +53,12 @@ class SensorQuantization(Effect):
     ----------
     step : float
         [m], > 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.SensorQuantization(0.01))
+    >>> print(f"{axis.output(0, [0.1234, 0.0], [0.0])[0]:.3f}")
+    0.120
     """
 
     step: float = parameter("m", strict=True, meaning="resolution of the sensor", stepped=True)
@@ -82,6 +95,12 @@ class SensorOffset(Effect):
     ----------
     offset : float
         Reported minus true position [m].
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.SensorOffset(0.002))
+    >>> print(f"{axis.output(0, [0.1, 0.0], [0.0])[0]:.3f}")
+    0.102
     """
 
     offset: float = parameter("m", lower=-math.inf, meaning="reported minus true position")
@@ -110,6 +129,13 @@ class Drift(Effect):
     ----------
     rate : float
         [m/s].
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.LinearSpring(50.0)).with_effect(cdf.Drift(1e-3))
+    >>> x = np.asarray(cdf.event_response(axis, [0, 10], 0).outputs)[0]
+    >>> print(f"{x[-1]:.3f}")  # m after 10 s at rest
+    0.010
     """
 
     rate: float = parameter("m/s", lower=-math.inf, meaning="rate of the sensor's drift")

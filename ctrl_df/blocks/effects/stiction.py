@@ -17,6 +17,12 @@ class Stiction(Effect):
     ----------
     level : float
         Breakaway level Ks [N], >= the kinetic level of the block it is added to.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.Stiction(4.0))
+    >>> [round(float(np.asarray(cdf.event_response(axis, [0, 1], F).outputs)[0, -1]), 3) for F in (3.9, 5.0)]
+    [0.0, 0.5]
     """
 
     level: float = parameter("N", meaning="breakaway level", threshold=True)

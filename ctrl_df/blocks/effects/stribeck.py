@@ -24,6 +24,12 @@ class Stribeck(Effect):
         Static level Fs [N], >= the Coulomb level of the block.
     velocity : float
         Stribeck velocity vs [m/s], > 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Coulomb(3.0)).with_effect(cdf.Stribeck(5.0, velocity=0.05))
+    >>> [round(-2 * float(axis.dynamics(0, [0.0, v], [0.0])[1]), 3) for v in (0.001, 0.05, 0.5)]  # [N]
+    [4.999, 3.736, 3.0]
     """
 
     level: float = parameter("N", meaning="static level", threshold=True)

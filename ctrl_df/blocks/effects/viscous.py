@@ -16,6 +16,12 @@ class Viscous(Effect):
     ----------
     coefficient : float
         B [N s/m], >= 0.
+
+    Examples
+    --------
+    >>> axis = cdf.Mass(2.0).with_effect(cdf.Viscous(4.0))
+    >>> float(axis.dynamics(0, [0.0, 0.5], [0.0])[1])
+    -1.0
     """
 
     coefficient: float = parameter("N s/m", meaning="viscous coefficient")

@@ -39,6 +39,14 @@ class FrequencyMeasurement:
     ValueError
         Wrong shape, an amplitude or frequency that is not positive and increasing, a table without any
         measured point, a noise that is not positive.
+
+    Examples
+    --------
+    >>> A, omega = np.array([8.0, 16.0]), np.geomspace(4, 20, 6)
+    >>> N = cdf.describing_function_family(cdf.friction_mass(2.2, 3.0, 6.0), A, omega).N
+    >>> table = cdf.FrequencyMeasurement(A, omega, N)
+    >>> table.N.shape
+    (2, 6)
     """
 
     A: np.ndarray

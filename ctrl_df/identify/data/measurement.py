@@ -53,6 +53,13 @@ class Measurement:
     ValueError
         NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a constant
         input or output, fewer than 10 samples, an unknown unit; the message gives rule, value, remedy.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 2, 0.01)
+    >>> record = cdf.Measurement(1e3 * t, np.sin(3 * t), 5 * np.cos(3 * t), time_unit="ms", output_unit="mm")
+    >>> record
+    Measurement('measurement': 200 samples, 0 to 1.99 s, dt 0.01 s, input [N] zoh, output [m])
     """
 
     t: np.ndarray

@@ -47,7 +47,7 @@ class TimeDataset(Dataset):
         rows = []
         for record, w, start in zip(self.records, segments, starts, strict=True):
             simulated = Simulator(model, record).run(w, None, start, rounded=True)
-            rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted))
+            rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted, model))
         return Comparison(model, tuple(rows))
 
     def fit(self, model, names, start, *, whole, mode, window, robust, budget):

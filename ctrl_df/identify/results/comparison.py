@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from ..residuals.residual_tests import (
     rmse,
     whiteness,
 )
+from ..smoothing.missing_force import MissingForce, missing_force
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,8 @@ class RecordComparison:
         Samples at which the model was started anew; two for a free run.
     fitted : int
         Parameters fitted to these data.
+    model : block or loop
+        What was compared.
     """
 
     record: Measurement
@@ -45,6 +49,16 @@ class RecordComparison:
     residual: np.ndarray
     edges: np.ndarray
     fitted: int = 0
+    model: Any = None
+
+    @cached_property
+    def missing_force(self) -> MissingForce:
+        """The force that would have to be added, at every instant, for the model to follow the record.
+
+        By fixed-interval smoothing over the model; seconds. See
+        `ctrl_df.identify.smoothing.missing_force.missing_force` for what it refuses.
+        """
+        return missing_force(self.model, self.record)
 
     @property
     def rmse(self) -> float:
@@ -124,6 +138,17 @@ class Comparison(ComparisonBase):
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several; `white` and
     `where` are those of the record with the largest error.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0)
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> comparison = cdf.compare(machine, record)
+    >>> round(comparison.fit_percent), bool(comparison.white)
+    (100, True)
     """
 
     records: tuple[RecordComparison, ...]
@@ -158,6 +183,11 @@ class Comparison(ComparisonBase):
     def where(self) -> Regions:
         """Regions of the worst record, ranked by their share of the error."""
         return self.worst.where
+
+    @property
+    def missing_force(self) -> MissingForce:
+        """The force that would have to be added for the model to follow the worst record."""
+        return self.worst.missing_force
 
     @property
     def windows(self) -> int:

@@ -43,6 +43,18 @@ class CandidateEffect:
         Whether it was refitted at the full rate and tried on held-out data (the best few are).
     errors : dict
         Standard errors of `parameters`, for residuals of any colour; only of confirmed candidates.
+
+    Examples
+    --------
+    >>> names = ["constant_force", "quadratic_drag"]
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.ConstantForce(1.0))
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> best = cdf.diagnose(cdf.friction_mass(2.0, 2.5, 5.0), record, candidates=names).best
+    >>> best.id, best.confirmed, best.probability > 0.99
+    ('constant_force', True, True)
     """
 
     effect: Effect
@@ -97,6 +109,18 @@ class Diagnosis:
         outweigh the noise of the sensor) its acceleration, averaged over some samples.
     remains : str
         Of 'unknown' over time: how much the library does not explain, and where, in sentences.
+
+    Examples
+    --------
+    >>> names = ["constant_force", "quadratic_drag"]
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.ConstantForce(1.0))
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> diagnosis = cdf.diagnose(cdf.friction_mass(2.0, 2.5, 5.0), record, candidates=names)
+    >>> [candidate.id for candidate in diagnosis.ranking]
+    ['constant_force', 'quadratic_drag']
     """
 
     verdict: str

@@ -69,6 +69,17 @@ class Fit:
         False: stopped at the bound on work.
     simulations : int
         How many were run.
+
+    Examples
+    --------
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0)
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> fit = cdf.refit(cdf.friction_mass(2.0, 2.5, 5.0), record)
+    >>> fit.parameters["mass"].unit, bool(fit.comparison.white)
+    ('kg', True)
     """
 
     model: Any

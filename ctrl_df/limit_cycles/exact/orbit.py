@@ -44,6 +44,15 @@ class Orbit:
         One period, sampled; outputs (ny, nt), states (n, nt).
     note : str
         Empty, or that the guess led to another orbit than the one it speaks of.
+
+    Examples
+    --------
+    >>> axis = cdf.friction_mass(mass=9, coulomb=5, viscous=0.5, static=5.5)
+    >>> orbit = cdf.find_limit_cycle(cdf.closed_loop(cdf.pid(2000, 44250, 130), axis), guess=(8.0, 11.6))
+    >>> print(f"{orbit.period:.4f} s, {1e3 * orbit.peak:.3f} mm, multiplier {orbit.multiplier:.4f}")
+    0.5403 s, 2.375 mm, multiplier 0.9875
+    >>> [e.kind for e in orbit.events]
+    ['stick', 'breakaway', 'stick', 'breakaway']
     """
 
     omega: float
@@ -110,6 +119,12 @@ class NoOrbit:
         belong to no orbit. CENTRE: motions of every size repeat, none of them a limit cycle.
     tried : tuple of Try
         Every start, and what it came to.
+
+    Examples
+    --------
+    >>> answer = cdf.find_limit_cycle(cdf.closed_loop(cdf.pid(2000, 0, 130), cdf.friction_mass(9, 5)))
+    >>> bool(answer), {outcome for start, outcome in answer.tried}
+    (False, {'comes to rest'})
     """
 
     status: Status

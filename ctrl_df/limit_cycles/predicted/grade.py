@@ -47,7 +47,7 @@ class LimitCycle:
     amplitude : float
         Peak value of the fundamental at the block's input.
     output_amplitude : float
-        The same at the block's output, |N| a.
+        The same at the block's output, ``|N| a``.
     omega : float
         [rad/s].
     stable : bool or None
@@ -55,7 +55,7 @@ class LimitCycle:
         proof; None where the curves are nearly tangent. False also where the block leaves the motion of
         `branch` under the force alone. The exact verdict is the Floquet multipliers of the orbit.
     residual : float
-        |1 + N H| that remains.
+        ``|1 + N H|`` that remains.
     sensitivity : Sensitivity
         ``(amplitude, omega)``: d ln a and d ln omega per relative error in N.
     distortion : float
@@ -82,6 +82,16 @@ class LimitCycle:
         Of a motion known as a branch: its largest multiplier over a period of the force, alone; NaN else.
     motion : ForcedMotion or None
         That motion, where `branch` names one and it is known.
+
+    Examples
+    --------
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> resp = cdf.describing_function_response(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> cycle = resp.limit_cycles[0]
+    >>> cycle.grade, cycle.stable
+    ('trusted', True)
+    >>> print(f"{cycle.amplitude:.4f} at {cycle.omega:.4f} rad/s, harmonics {cycle.distortion:.3f}")
+    3.3440 at 1.4142 rad/s, harmonics 0.013
     """
 
     amplitude: float

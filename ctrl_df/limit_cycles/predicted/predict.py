@@ -50,6 +50,15 @@ class DescribingFunctionResponse(_PythonControlResponse):
     positions : list of complex
         H at the crossings.
     intersections : list of (amplitude, omega)
+
+    Examples
+    --------
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> resp = cdf.describing_function_response(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> isinstance(resp, ct.DescribingFunctionResponse)
+    True
+    >>> len(resp.limit_cycles), resp.status
+    (1, 'scanned A 1 to 5, omega 0.01 to 100 rad/s (500499 cells): 1 solution')
     """
 
     def __init__(
@@ -168,6 +177,13 @@ def describing_function_response(
     References
     ----------
     Gelb & Vander Velde (1968), ch. 3; Azenha & Machado (1997), eq. (5).
+
+    Examples
+    --------
+    >>> H = ct.tf([8], [1, 2, 2, 1])
+    >>> resp = cdf.describing_function_response(H, cdf.saturation(1), np.linspace(1, 5, 20))
+    >>> resp.limit_cycles
+    [<LimitCycle: 3.344 @ 1.4142 rad/s, stable, trusted>]
     """
     linear = LinearPart(H)
     if not isinstance(orders, int | np.integer) or isinstance(orders, bool) or orders < 2:

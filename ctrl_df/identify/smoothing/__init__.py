@@ -1,0 +1,1 @@
+"""The force that is missing, as a signal: fixed-interval smoothing over the event-located model."""

@@ -1,0 +1,92 @@
+"""A force as a curve over one quantity, beside what known regressors could do: a partial residual.
+
+Source of partial residuals: Larsen & McCleary, Technometrics 14 (1972) 781.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+BINS = 25  # of a curve, at most
+ALONE = 4  # samples that know of different forces, for each bin
+FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A force over a quantity.
+
+    Attributes
+    ----------
+    at, force, std : (m,) arrays
+        The curve: places, mean force and its standard error.
+    points : (2, n) array
+        Quantity and force of every instant.
+    share : float
+        Of the variance that the regressors leave, how much the curve explains, 0 to 1.
+    """
+
+    at: np.ndarray
+    force: np.ndarray
+    std: np.ndarray
+    points: np.ndarray
+    share: float
+
+
+def curve_over(values, force, std, own, known) -> Curve:
+    """Fit a force by a step curve over a quantity and by the model's own parameters together.
+
+    Parameters
+    ----------
+    values, force, std : (n,) arrays
+        Quantity, force and its standard deviation.
+    own : (n, p) array
+        Regressors of the model's own parameters.
+    known : (n,) bool array
+        Which instants count.
+    """
+    use = np.flatnonzero(known & np.isfinite(values))
+    none = np.zeros(0)
+    if len(use) < 2 * FEWEST:
+        return Curve(none, none, none, np.zeros((2, 0)), 0.0)
+    order = np.argsort(values[use], kind="stable")
+    root = 1.0 / std[use]
+    scale = np.linalg.norm(own[use], axis=0)
+    rest = own[use][:, scale > 0] / scale[scale > 0] * root[:, None]
+    y, count, together = force[use] * root, BINS, 1.0
+    bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
+    for _ in range(
+        2
+    ):  # what neither explains tells how many instants know the same; so many bins can be told
+        bins = np.empty(len(use), int)
+        bins[order] = np.arange(len(use)) * count // len(use)
+        both = np.column_stack([rest, (bins[:, None] == np.arange(count)) * root[:, None]])
+        fit = np.linalg.lstsq(both, y, rcond=1e-9)[0]
+        left = y - both @ fit
+        together = _together(left)
+        count = int(np.clip(len(use) / together / ALONE, FEWEST, count))
+    count = int(bins.max()) + 1
+    alone = np.column_stack([rest, root])
+    before = y - alone @ np.linalg.lstsq(alone, y, rcond=1e-9)[0]
+    free = max(len(use) / together, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
+    share = 1.0 - float(left @ left) / free[1] / max(float(before @ before) / free[0], 1e-300)
+    partial = (y - rest @ fit[: rest.shape[1]]) / root
+    weight = root**2
+    total = np.bincount(bins, weight, count)
+    at = np.bincount(bins, weight * values[use], count) / total
+    mean = np.bincount(bins, weight * partial, count) / total
+    error = np.sqrt(together / total)
+    return Curve(at, mean, error, np.array([values[use], partial]), float(np.clip(share, 0.0, 1.0)))
+
+
+def _together(d) -> float:
+    """Return over how many samples a force is much the same: they count as one."""
+    spread, total = float(d @ d), 1.0
+    for lag in range(1, len(d) // 4 if spread > 0 else 1):
+        correlation = float(d[:-lag] @ d[lag:]) / spread
+        if correlation < 0.1:
+            break
+        total += 2.0 * correlation
+    return total

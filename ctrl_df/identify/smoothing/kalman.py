@@ -1,0 +1,169 @@
+# pyright: reportCallIssue=false
+"""Kalman filter and Rauch-Tung-Striebel smoother over affine steps, with the likelihood of what was measured.
+
+s_(k+1) = A_k s_k + b_k + w_k, w_k of covariance Q_k; of each s_k the measurements say, up to a constant,
+log p(y_k | s_k) = h_k s_k - s_k J_k s_k / 2. Source: Sarkka & Svensson, Bayesian Filtering and Smoothing, 2nd
+ed. (2023), ch. 6 and 12.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...simulate.compiler.compiled import njit, part
+from ...simulate.compiler.views import lean
+
+
+@part
+def _solve(a, b):
+    """Replace b (n, k) by the solution of a x = b; returns log |det a|. `a` is used up."""
+    n, logdet = a.shape[0], 0.0
+    for i in range(n):
+        best = i
+        for j in range(i + 1, n):
+            if abs(a[j, i]) > abs(a[best, i]):
+                best = j
+        if best != i:
+            for j in range(n):
+                a[i, j], a[best, j] = a[best, j], a[i, j]
+            for j in range(b.shape[1]):
+                b[i, j], b[best, j] = b[best, j], b[i, j]
+        if a[i, i] == 0.0:
+            return -math.inf
+        logdet += math.log(abs(a[i, i]))
+        for j in range(i + 1, n):
+            factor = a[j, i] / a[i, i]
+            if factor != 0.0:
+                for m in range(i, n):
+                    a[j, m] -= factor * a[i, m]
+                for m in range(b.shape[1]):
+                    b[j, m] -= factor * b[i, m]
+    for i in range(n - 1, -1, -1):
+        for m in range(b.shape[1]):
+            value = b[i, m]
+            for j in range(i + 1, n):
+                value -= a[i, j] * b[j, m]
+            b[i, m] = value / a[i, i]
+    return logdet
+
+
+@njit(error_model="numpy")
+def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch):
+    """Write means (N + 1, n) and covariances (N + 1, n, n) given all measurements; return their evidence.
+
+    a (N, n, n), b (N, n), q (N, n, n): the steps; info (N + 1, n, n), told (N + 1, n): J and h; mean0, cov0:
+    before anything is measured. scratch (N + 5, n, n). The evidence lacks what depends on the measurements
+    and their noise alone.
+    """
+    a, b, q, info, told, mean0 = lean(a), lean(b), lean(q), lean(info), lean(told), lean(mean0)
+    cov0, mean, cov, scratch = lean(cov0), lean(mean), lean(cov), lean(scratch)
+    n, steps = mean0.shape[0], a.shape[0]
+    m, p, left, right = scratch[steps], scratch[steps + 1], scratch[steps + 2], scratch[steps + 3]
+    before = scratch[steps + 4]
+    for i in range(n):
+        m[0, i] = mean0[i]
+        for j in range(n):
+            p[i, j] = cov0[i, j]
+    evidence = 0.0
+    for k in range(steps + 1):
+        # --- measurements: P <- (I + P J)^-1 P
+        for i in range(n):
+            for j in range(n):
+                value = 1.0 if i == j else 0.0
+                for c in range(n):
+                    value += p[i, c] * info[k, c, j]
+                left[i, j] = value
+                right[i, j] = p[i, j]
+        evidence -= 0.5 * _solve(left, right)
+        for i in range(n):
+            value, square = told[k, i], 0.0
+            for j in range(n):
+                value -= info[k, i, j] * m[0, j]
+                square += info[k, i, j] * m[0, j]
+            m[1, i] = value
+            evidence += m[0, i] * (told[k, i] - 0.5 * square)
+        for i in range(n):
+            value = m[0, i]
+            for j in range(n):
+                value += 0.5 * (right[i, j] + right[j, i]) * m[1, j]
+                evidence += 0.5 * m[1, i] * right[i, j] * m[1, j]
+            mean[k, i] = value
+        for i in range(n):
+            for j in range(n):
+                cov[k, i, j] = 0.5 * (right[i, j] + right[j, i])
+        if k == steps:
+            break
+        # --- a step
+        for i in range(n):
+            value = b[k, i]
+            for j in range(n):
+                value += a[k, i, j] * mean[k, j]
+            m[0, i] = value
+            for j in range(n):
+                total = 0.0
+                for c in range(n):
+                    total += cov[k, i, c] * a[k, j, c]
+                left[i, j] = total  # P A^T
+        for i in range(n):
+            for j in range(n):
+                total = q[k, i, j]
+                for c in range(n):
+                    total += a[k, i, c] * left[c, j]
+                p[i, j] = total
+        # --- gain of the way back: G = P A^T (P^-)^-1, from P^- G^T = A P
+        for i in range(n):
+            for j in range(n):
+                before[i, j] = p[i, j]
+                right[i, j] = left[j, i]
+        _solve(before, right)
+        for i in range(n):
+            for j in range(n):
+                scratch[k, i, j] = right[j, i]
+    # --- back
+    for k in range(steps - 1, -1, -1):
+        gain = scratch[k]
+        for i in range(n):
+            value = b[k, i]
+            for j in range(n):
+                value += a[k, i, j] * mean[k, j]
+            m[0, i] = mean[k + 1, i] - value
+            for j in range(n):
+                total = 0.0
+                for c in range(n):
+                    total += cov[k, i, c] * a[k, j, c]
+                left[i, j] = total
+        for i in range(n):
+            for j in range(n):
+                total = q[k, i, j]
+                for c in range(n):
+                    total += a[k, i, c] * left[c, j]
+                p[i, j] = cov[k + 1, i, j] - total
+        for i in range(n):
+            value = mean[k, i]
+            for j in range(n):
+                value += gain[i, j] * m[0, j]
+                total = 0.0
+                for c in range(n):
+                    total += gain[i, c] * p[c, j]
+                left[i, j] = total
+            mean[k, i] = value
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for c in range(n):
+                    total += left[i, c] * gain[j, c]
+                right[i, j] = total
+        for i in range(n):
+            for j in range(n):
+                cov[k, i, j] += 0.5 * (right[i, j] + right[j, i])
+    return evidence
+
+
+def smoothed(a, b, q, info, told, mean0, cov0):
+    """Return (means, covariances, evidence); see `smooth`."""
+    steps, n = b.shape
+    mean, cov = np.zeros((steps + 1, n)), np.zeros((steps + 1, n, n))
+    evidence = smooth(a, b, q, info, told, mean0, cov0, mean, cov, np.zeros((steps + 5, max(n, 2), n)))
+    return mean, cov, evidence

@@ -1,0 +1,174 @@
+"""The force that is missing, as a signal, and the quantity that it is a curve over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...blocks.mechanism import Mechanism
+from ...checks import choice
+from ...drawing import draw
+from ..data.measurement import Measurement
+from ..residuals.motion_phases import reversals
+from .curves import Curve, curve_over
+from .smoother import smooth_record
+
+AGAINST = ("time", "position", "velocity", "load", "reversal")
+KNOWN = 0.8  # of the size of the process: a standard deviation beyond tells of no more than what was assumed
+REFERENCE = ("reference", "r")
+
+
+@dataclass(frozen=True, eq=False)
+class MissingForce:
+    """The force that would have to be added to a model, at every instant, for it to follow a record.
+
+    Attributes
+    ----------
+    time : (n,) array
+        [s].
+    force, std : (n,) array
+        The force (a torque, of machines that turn) and its standard deviation [`unit`]. Where the machine
+        sticks nothing is known of it, and the standard deviation says so.
+    quantities : mapping
+        position, velocity, load (the force recorded) and reversal (distance moved since the last reversal),
+        (n,) each.
+    units : mapping
+        Of the quantities and of the time.
+    unit : str
+        N or N m.
+    own : (n, p) array
+        Force that a small change of each of the model's own parameters makes, over that change.
+    noise : float
+        Standard deviation of the sensor's noise, estimated with the force [unit of the output].
+    size : float
+        Standard deviation of the force where nothing is measured, estimated too [`unit`].
+    name : str
+        Of the record.
+    """
+
+    time: np.ndarray
+    force: np.ndarray
+    std: np.ndarray
+    quantities: Mapping[str, np.ndarray]
+    units: Mapping[str, str]
+    unit: str
+    own: np.ndarray
+    noise: float
+    size: float
+    name: str
+
+    @property
+    def known(self) -> np.ndarray:
+        """Where the record tells of the force, (n,) bool."""
+        return self.std < KNOWN * self.size
+
+    @cached_property
+    def shares(self) -> dict[str, float]:
+        """Share of the force's variance that is a curve over each quantity alone, 0 to 1, the largest first.
+
+        What the model's own parameters could do is left aside. A force that is a curve over velocity is a law
+        of friction, one over position a spring or a ripple, one over the distance since the last reversal
+        presliding or a gap.
+        """
+        found = {name: self._over(name).share for name in self.quantities}
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    def curve(self, against: str) -> Curve:
+        """Return the force as a curve over a quantity, what the model's own parameters could do left aside.
+
+        Parameters
+        ----------
+        against : {'position', 'velocity', 'load', 'reversal'}
+            Over the distance since the last reversal, the force is that along the motion.
+        """
+        choice("the curve of a missing force", "against", against, AGAINST[1:])
+        return self._over(against)
+
+    def _over(self, against) -> Curve:
+        signs = np.sign(self.quantities["velocity"]) if against == "reversal" else np.ones(len(self.time))
+        return curve_over(
+            self.quantities[against], self.force * signs, self.std, self.own * signs[:, None], self.known
+        )
+
+    def plot(self, against: str = "time", **keywords):
+        """Draw it over time, or as points and a curve over another quantity; returns a ``ct.ControlPlot``.
+
+        Parameters
+        ----------
+        against : {'time', 'position', 'velocity', 'load', 'reversal'}
+        """
+        choice("the picture of a missing force", "against", against, AGAINST)
+        return draw("missing force", self, against=against, **keywords)
+
+    def summary(self) -> str:
+        """Return one or two sentences: how large it is, and what it is a curve over."""
+        rms = float(np.sqrt(np.mean(self.force**2)))
+        first = (
+            f"Missing beside {self.name!r}: {rms:.3g} {self.unit} rms, known to "
+            f"{float(np.median(self.std)):.2g} {self.unit} (median)."
+        )
+        if not np.any(self.known):
+            return first + " Nowhere is it larger than what the record leaves open."
+        best, share = next(iter(self.shares.items()))
+        words = {"reversal": "the distance since the last reversal", "load": "the force recorded"}
+        return first + f" {100 * share:.0f} % of it is a curve over {words.get(best, best)}."
+
+    def __repr__(self) -> str:
+        return f"<MissingForce: {self.summary()}>"
+
+
+def missing_force(model, record: Measurement) -> MissingForce:
+    """Return the force that a model lacks beside a record, with its uncertainty.
+
+    Parameters
+    ----------
+    model : block of masses or inertias and effects, or loop of `ctrl_df.closed_loop` round one
+        Of a loop the block is taken, driven by the force that was recorded.
+    record : Measurement
+        Its output is the position.
+
+    Raises
+    ------
+    TypeError
+        A model that is no mechanism: nobody knows where a force acts in it.
+    ValueError
+        A loop, and a record whose input is the reference: no force was recorded.
+    """
+    parts = getattr(model, "parts", None)
+    block = model if parts is None else parts.block
+    if not isinstance(block, Mechanism):
+        raise TypeError(
+            f"a missing force needs a block of masses and effects; got {type(block).__name__}. Build it from "
+            "ctrl_df.Mass, TwoMass, Inertia or TwoInertias and effects."
+        )
+    if parts is not None and not any(name in (record.channels or {}) for name in REFERENCE):
+        raise ValueError(
+            "a missing force of a loop needs the force that was recorded; this record's input is the "
+            "reference. Record the controller's output as the input u, and the reference as a channel "
+            "'reference'."
+        )
+    found = smooth_record(block, record)
+    coordinates, core = block.coordinates, block.core
+    at = 2 if core.bodies == 2 and core.measured == 1 else 0
+    position, velocity = found.states[:, at], found.states[:, at + 1]
+    load = np.interp(found.time, record.t, record.u)
+    slow = 0.05 * float(np.sqrt(np.mean(velocity**2)))
+    travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(position)))))
+    marks = np.maximum.accumulate(np.where(_turned(velocity, slow), travelled, 0.0))
+    unit, force = coordinates.unit, coordinates.force_unit
+    return MissingForce(
+        found.time, found.force, found.std,
+        {"position": position, "velocity": velocity, "load": load, "reversal": travelled - marks},
+        {"time": "s", "position": unit, "velocity": f"{unit}/s", "load": force, "reversal": unit},
+        force, found.own, found.noise, found.size, record.name,
+    )  # fmt: skip
+
+
+def _turned(velocity, slow) -> np.ndarray:
+    """Return the samples at which the motion turns, (n,) bool."""
+    turned = np.zeros(len(velocity), bool)
+    turned[reversals(velocity, slow)] = True
+    return turned

@@ -1,0 +1,164 @@
+"""The force that would have to be added at every instant, by iterated smoothing over the model's own runs.
+
+The disturbance d is a Gaussian process with exp(-|lag| / time) as its correlation; together with the states
+of the block it is smoothed over the whole record. Size and time of the disturbance and the noise of the
+sensor maximize the likelihood of the record. Steps are linearized where, and as widely as, the smoother
+before says the states are (iterated posterior linearization), so that friction that sticks within a step is
+met from both sides. Sources: Garcia-Fernandez, Svensson & Sarkka, IEEE Trans. Automat. Contr. 62 (2017) 2056;
+Marino & Cicirello on switching latent force models of dry friction (2023).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from ...blocks.mechanism import Mechanism
+from ..data.measurement import Measurement
+from ..estimation.segments import facts
+from .kalman import smoothed
+from .steps import Linearized, Steps
+
+MOST = 2500  # steps of a record
+ROUNDS = 12  # linearizations
+STILL = 0.05  # change of the force between rounds, in its standard deviations, at which they end
+TUNED = 6  # rounds in which size, time and noise are estimated anew
+LEAK = 0.1  # of the sensor's noise: what continuity of position may give way over a record
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """What a smoother makes of a record.
+
+    Attributes
+    ----------
+    time : (N + 1,) array
+        [s].
+    states, force, std : (N + 1, n), (N + 1,), (N + 1,) arrays
+        States of the block, the force missing and its standard deviation [N].
+    own : (N + 1, p) array
+        Force that a small change of each of the block's parameters makes, over that change.
+    size, memory, noise : float
+        Standard deviation [N] and correlation time [s] of the process, and of the sensor's noise.
+    evidence : float
+        Log likelihood of the record, and of the record where nothing is missing.
+    """
+
+    time: np.ndarray
+    states: np.ndarray
+    force: np.ndarray
+    std: np.ndarray
+    own: np.ndarray
+    size: float
+    memory: float
+    noise: float
+    evidence: float
+
+
+def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
+    """Smooth the force that is missing of a block beside one record."""
+    known = facts(record)
+    steps = Steps(block, record, math.ceil(len(record) / MOST))
+    mean, std = steps.guess()
+    scale = np.median(std, axis=0)
+    scale[-1] = known.force
+    mean, cov = mean / scale, np.array([np.diag((row / scale) ** 2) for row in std])
+    leak = _leak(steps, known, scale)
+    first = cov[0]
+    sizes = np.log([0.3, 0.1 * known.swing, known.noise])
+    evidence = -math.inf
+    for turn in range(ROUNDS):
+        lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
+        told = _Told(lin, steps, leak, mean[0], first, known)
+        if turn < TUNED:
+            sizes = told.likeliest(sizes, 0.7 if turn < 2 else 0.2)
+        new, cov, evidence = told.smoothed(sizes)
+        moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
+        mean = new
+        if turn > 1 and moved < STILL:
+            break
+    return Smoothed(
+        steps.times, mean[:, :-1] * scale[:-1], mean[:, -1] * scale[-1],
+        np.sqrt(cov[:, -1, -1]) * scale[-1], steps.own(mean * scale), math.exp(sizes[0]) * scale[-1],
+        math.exp(sizes[1]), math.exp(sizes[2]), evidence,
+    )  # fmt: skip
+
+
+def _leak(steps: Steps, known, scale) -> np.ndarray:
+    """Return variances that keep the covariances of the states regular, and change nothing else."""
+    n = len(steps.free)
+    q = (1e-4 * scale[:-1]) ** 2
+    for body in range(steps.core.bodies):
+        dt = float(np.median(np.diff(steps.times)))
+        q[2 * body] = (LEAK * known.noise) ** 2 / len(steps)
+        q[2 * body + 1] = (1e-3 * known.force * dt / sum(steps.core.masses)) ** 2
+    return q[:n] / scale[:-1] ** 2
+
+
+def _scaled(lin: Linearized, scale) -> Linearized:
+    inner = scale[:-1]
+    return Linearized(
+        lin.a * scale / inner[:, None],
+        lin.b / inner,
+        lin.q / np.outer(inner, inner),
+        lin.c * scale,
+        lin.e,
+        lin.r,
+    )
+
+
+class _Told:
+    """What a linearized record says of the process and of the noise."""
+
+    def __init__(self, lin: Linearized, steps: Steps, leak, mean0, cov0, known):
+        self.lin, self.known = lin, known
+        self.mean0, self.cov0 = mean0, cov0
+        self.dt = np.diff(steps.times)
+        count, n = lin.b.shape[0], lin.a.shape[2]
+        self.a = np.zeros((count, n, n))
+        self.a[:, :-1] = lin.a
+        self.b = np.hstack([lin.b, np.zeros((count, 1))])
+        self.q = np.zeros((count, n, n))
+        self.q[:, :-1, :-1] = lin.q
+        inner = np.arange(n - 1)
+        self.q[:, inner, inner] += leak
+        most = lin.e.shape[1]
+        at = steps.edges[:-1, None] + np.arange(most)
+        self.has = at < steps.edges[1:, None]
+        y = steps.y[np.minimum(at, len(steps.y) - 1)]
+        self.off = np.where(self.has, y - lin.e, 0.0)
+        self.c = np.where(self.has[:, :, None], lin.c, 0.0)
+        self.r = np.where(self.has, lin.r, 0.0)
+
+    def smoothed(self, sizes):
+        """Return means, covariances and evidence with log size [force], log time [s], log noise."""
+        size, memory, noise = np.exp(np.clip(sizes, -40, 40))
+        weight = np.where(self.has, 1.0 / (noise**2 + self.r), 0.0)
+        n = self.b.shape[1]
+        info, told = np.zeros((len(self.b) + 1, n, n)), np.zeros((len(self.b) + 1, n))
+        weighted = self.c * weight[:, :, None]
+        info[:-1] = weighted.swapaxes(1, 2) @ self.c
+        told[:-1] = np.einsum("kmi,km->ki", weighted, self.off)
+        keep = np.exp(-self.dt / memory)
+        a, q = self.a.copy(), self.q.copy()
+        a[:, -1, -1], q[:, -1, -1] = keep, size**2 * -np.expm1(-2 * self.dt / memory)
+        cov0, mean0 = self.cov0.copy(), self.mean0.copy()
+        cov0[-1], cov0[:, -1], cov0[-1, -1], mean0[-1] = 0.0, 0.0, size**2, 0.0
+        mean, cov, evidence = smoothed(a, self.b, q, info, told, mean0, cov0)
+        evidence += 0.5 * float(np.sum(np.log(weight[self.has])) - np.sum(weight * self.off**2))
+        return mean, cov, evidence
+
+    def likeliest(self, sizes, width):
+        """Return the sizes of most evidence, sought about those given."""
+        corners = np.vstack([sizes, sizes + width * np.eye(len(sizes))])
+        how = {"initial_simplex": corners, "maxfev": 60, "xatol": 0.02, "fatol": 0.05}
+        return minimize(lambda p: -self.evidence(p), sizes, method="Nelder-Mead", options=how).x
+
+    def evidence(self, sizes) -> float:
+        """Return log p(record | sizes) + log p(sizes): wide priors about the scales of the record."""
+        usual = np.log([0.1, 0.1 * self.known.swing, self.known.noise])
+        value = self.smoothed(sizes)[2] - 0.5 * float(np.sum(((sizes - usual) / [4.0, 1.5, 1.0]) ** 2))
+        return value if math.isfinite(value) else -1e300

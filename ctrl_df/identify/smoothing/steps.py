@@ -1,0 +1,258 @@
+"""Short runs of a block from many states at once, and the affine map with noise that is closest to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ...blocks.core import IMPACT
+from ...blocks.effect import Effect
+from ...blocks.parameter import parameter
+from ...blocks.primitives import Ramp
+from ...simulate.groups import groups_of
+from ...simulate.runs import run_many, sampled_drives
+from ..data.measurement import Measurement
+from ..estimation import initial_states
+from ..estimation.segments import facts
+from ..estimation.simulator import Simulator
+
+RTOL = 1e-6  # of the runs: the noise of a record is larger
+NUDGE = 1e-3  # of parameters and forces, relative to their size
+
+
+@dataclass(frozen=True)
+class Disturbance(Effect):
+    """A force that no law knows of, constant over a short run, on the body that the input drives."""
+
+    force: float = parameter("N", lower=-math.inf, meaning="force along +x")
+
+    id: ClassVar[str] = "disturbance"
+    role: ClassVar[str] = "force"
+    place_free: ClassVar[bool] = True
+    affine: ClassVar[bool] = True
+    shows: ClassVar[str] = ""
+    source: ClassVar[str] = ""
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        """Return the force [N]."""
+        return p[0]
+
+
+@dataclass(frozen=True)
+class Linearized:
+    """Steps s_(k+1) = a s_k + b + w and samples y = c s_k + e + noise within them.
+
+    Attributes
+    ----------
+    a, b, q : (N, n, n), (N, n), (N, n, n) arrays
+        The step of the states, and the covariance of what is not affine about it.
+    c, e, r : (N, m, n), (N, m), (N, m) arrays
+        The samples, and the variance of what is not affine about them; NaN where a step has fewer.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    q: np.ndarray
+    c: np.ndarray
+    e: np.ndarray
+    r: np.ndarray
+
+
+class Steps:
+    """A record cut into short steps, each begun from any state.
+
+    The vector s holds the states of the block that are not known from the input alone (those of lags are),
+    then the disturbance [N].
+
+    Parameters
+    ----------
+    block : Mechanism
+    record : Measurement
+    every : int
+        Samples a step.
+    """
+
+    def __init__(self, block, record: Measurement, every: int):
+        model = block.with_effects([*block.effects, Disturbance(0.0)])
+        self.simulator = Simulator(model, record, rtol=RTOL)
+        self.part = self.simulator._prepare(None)
+        self.record = record
+        self.edges = np.append(np.arange(0, len(record) - 1, every), len(record) - 1)
+        self.y = self._sensed(record.y)
+        states = self.part.engine.nstates
+        known = [state for state, _ in self.part.lags]
+        self.free = np.array([i for i in range(states) if i not in known])
+        core = self.part.core
+        self._place = next(i for i, e in enumerate(model.effects) if isinstance(e, Disturbance))
+        self._name = f"{list(model.named_effects)[self._place]}.force"
+        self.core = core
+
+    def __len__(self) -> int:
+        return len(self.edges) - 1
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times at which steps begin and the last ends [s], (N + 1,)."""
+        return self.record.t[self.edges]
+
+    def _sensed(self, y):
+        """Return the output without what a drifting sensor adds to it."""
+        y = np.array(y, float)
+        for primitive, later in self.part.output:
+            if isinstance(primitive, Ramp):
+                y -= primitive.offset + primitive.rate * (self.record.t - later)
+        return y
+
+    def guess(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return states and their standard deviations as the record alone has them, (N + 1, n) each."""
+        known = facts(self.record)
+        x, v, a = self._motion(known)
+        states = np.zeros((len(self.edges), self.part.engine.nstates))
+        initial_states.fill(states, self.core, {}, (x, v, a), known.speed)
+        spread = np.zeros_like(states)
+        at = 2 if self.core.bodies == 2 and self.core.measured == 1 else 0
+        slow = known.noise / math.sqrt(2 * known.half + 1)
+        wide = {
+            "x": 3 * slow + 1e-3 * known.spread, "v": 3 * slow / (known.half * known.dt) + 0.05 * known.speed,
+        }  # fmt: skip
+        for body in range(self.core.bodies):
+            spread[:, 2 * body], spread[:, 2 * body + 1] = wide["x"], wide["v"]
+        if self.core.bodies == 2:
+            other = 0 if at else 2
+            if self.core.joint == IMPACT:
+                spread[:, other], spread[:, other + 1] = 0.5 * self.core.gap, 0.7 * known.speed
+            elif self.core.stiffness > 0:
+                bend = known.force / self.core.stiffness
+                spread[:, other] += 0.6 * bend
+                spread[:, other + 1] += 0.3 * known.speed
+        if self.core.bristle is not None:
+            full = (
+                np.max(np.abs(states[:, self.core.bristle_state]))
+                or known.force / self.core.bristle.stiffness
+            )
+            spread[:, self.core.bristle_state] = 0.5 * full
+        spread[:, np.max(spread, axis=0) == 0] = known.force
+        d = np.zeros((len(self.edges), 1))
+        return (
+            np.hstack([states[:, self.free], d]),
+            np.hstack([spread[:, self.free], d + known.force]),
+        )
+
+    def _motion(self, known):
+        from ..data.derivatives import automatic_cutoff, derivative
+
+        t = self.record.t
+        cutoff = automatic_cutoff(self.y - np.mean(self.y), known.dt)
+        v = derivative(t, self.y, 1, cutoff) if self.record.velocity is None else self.record.velocity
+        a = derivative(t, self.y, 2, cutoff)
+        usual = known.force / sum(self.core.masses)
+        a = usual * np.tanh(a / usual)
+        return self.y[self.edges], v[self.edges], a[self.edges]
+
+    def own(self, mean: np.ndarray) -> np.ndarray:
+        """Return what each of the block's parameters would do as a force, per change of it, (N + 1, p).
+
+        Each is changed a little, and the force taken that would change the speed of the body driven as much.
+        """
+        every, columns = np.arange(len(self)), []
+        speed = int(np.flatnonzero(self.free == 2 * self.core.driven + 1)[0])
+        parameters = self.simulator.block.parameters
+        mine = [k for k, p in parameters.items() if p.free and k != self._name]
+        pushed = NUDGE * facts(self.record).force
+        base = self.run(mean[:-1], every)[0][:, speed]
+        up = mean[:-1].copy()
+        up[:, -1] += pushed
+        gain = (self.run(up, every)[0][:, speed] - base) / pushed
+        gain = np.where(gain > 0.1 * np.max(gain), gain, np.inf)  # what sticks is moved by no force
+        for name in mine:
+            value = parameters[name].value
+            nudge = NUDGE * (abs(value) or pushed)
+            try:
+                moved = self.run(mean[:-1], every, {name: value + nudge})[0][:, speed] - base
+            except (ValueError, KeyError):  # taken out of the engine, or bound by another
+                continue
+            columns.append(moved / gain / nudge)
+        table = np.array(columns).reshape(len(columns), -1).T
+        return np.vstack([table, table[-1:]])
+
+    def run(self, s: np.ndarray, step: np.ndarray, values=None) -> tuple[np.ndarray, np.ndarray]:
+        """Run from states s (m, n) over the steps of these numbers (m,), with `values` of parameters.
+
+        Returns
+        -------
+        (m, n - 1), (m, most) arrays
+            States at the end, and outputs at the samples of the steps, NaN where one has fewer.
+        """
+        part, record = self.part, self.record
+        runs = len(step)
+        x0 = np.zeros((runs, part.engine.nstates))
+        x0[:, self.free] = s[:, :-1]
+        self._admit(x0)
+        begin, end = self.edges[step], self.edges[step + 1]
+        for state, samples in part.lags:
+            x0[:, state] = samples[begin]
+        count = end - begin + 1
+        first = np.concatenate(([0], np.cumsum(count)[:-1]))
+        inside = np.arange(int(count.sum())) - np.repeat(first, count) + np.repeat(begin, count)
+        every = record.t[inside] - part.delay
+        values = {self._name: s[:, -1].copy()} | {k: np.array([v]) for k, v in (values or {}).items()}
+        groups = groups_of("a smoother", part.engine.system, values, runs)
+        result = run_many(
+            groups, x0, every[first], every[first + count - 1], every,
+            sampled_drives(part.drive_time, part.drive_value[None, None], part.hold or record.input_hold),
+            first=first, count=count, order=5, rtol=RTOL, max_steps=60 * count + 20_000,
+        )  # fmt: skip
+        for error in result.errors.values():
+            raise error
+        most = int(count.max()) - 1
+        outputs = np.full((runs, most), np.nan)
+        for i in range(most):
+            has = count - 1 > i
+            outputs[has, i] = result.outputs[first[has] + i, 0]
+        return result.x[:, self.free], outputs
+
+    def _admit(self, x):
+        """Move states outside a gap or a stop to their border."""
+        core = self.core
+        if core.joint == IMPACT:
+            stretch = np.clip(x[:, 2] - x[:, 0], 0.0, core.gap)
+            if core.measured == 1:
+                x[:, 0] = x[:, 2] - stretch
+            else:
+                x[:, 2] = x[:, 0] + stretch
+        if core.stop is not None:
+            low, high = core.stop.span
+            for body in range(core.bodies):
+                x[:, 2 * body] = np.clip(x[:, 2 * body], low, high)
+
+    def linearized(self, mean: np.ndarray, cov: np.ndarray) -> Linearized:
+        """Return the affine steps that are closest to the runs about Gaussian states (N + 1, n).
+
+        By statistical linear regression over the 2 n points of the cubature of degree 3. Source:
+        Garcia-Fernandez, Svensson, Morelande & Sarkka, IEEE Trans. Signal Process. 63 (2015) 5561.
+        """
+        steps, n = len(self), mean.shape[1]
+        root = np.linalg.cholesky(cov[:-1]) * math.sqrt(n)
+        offsets = np.concatenate([root, -root], axis=2).swapaxes(1, 2)  # (N, 2 n, n)
+        points = mean[:-1, None, :] + offsets
+        end, outputs = self.run(points.reshape(-1, n), np.repeat(np.arange(steps), 2 * n))
+        end = end.reshape(steps, 2 * n, n - 1)
+        outputs = outputs.reshape(steps, 2 * n, -1)
+        inverse = np.linalg.inv(cov[:-1])
+        a, b, q = _regressed(end, offsets, inverse, cov[:-1], mean[:-1])
+        c, e, left = _regressed(outputs, offsets, inverse, cov[:-1], mean[:-1])
+        return Linearized(a, b, q, c, e, np.maximum(np.diagonal(left, axis1=1, axis2=2), 0.0))
+
+
+def _regressed(values, offsets, inverse, cov, mean):
+    """Return slope, value at zero and covariance of what is left of values (N, 2 n, m) over points."""
+    middle = values.mean(axis=1)
+    beside = values - middle[:, None]
+    cross = np.einsum("kpi,kpj->kij", beside, offsets) / values.shape[1]
+    slope = cross @ inverse
+    left = np.einsum("kpi,kpj->kij", beside, beside) / values.shape[1] - slope @ cov @ slope.swapaxes(1, 2)
+    return slope, middle - np.einsum("kij,kj->ki", slope, mean), 0.5 * (left + left.swapaxes(1, 2))
