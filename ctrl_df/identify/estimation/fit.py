@@ -252,7 +252,7 @@ def fit_segments(
 
     Returns
     -------
-    Candidate
+    FitResult
     """
     problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
     problem.stage(list(segments), thin, starts)
