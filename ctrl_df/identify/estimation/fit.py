@@ -56,7 +56,7 @@ class FitResult:
         Natural scale of each parameter.
     starts : list of (nw, ns) array
         Initial states, as corrections (see `Simulator.run`).
-    segments : list of Windows
+    segments : list of Segments
         Where the model was started anew.
     linear : callable or None
         Works out `sensitivity`, once it is asked for.
