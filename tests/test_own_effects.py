@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import rigs
-from copies import copied
+from user_copies import copied
 
 import ctrl_df as cdf
 from ctrl_df.blocks.effect import ROLES, effect_class
