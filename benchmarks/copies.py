@@ -23,7 +23,7 @@ if "--jobs" in sys.argv:
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import rigs
-from copies import copied
+from user_copies import copied
 
 import ctrl_df as cdf
 

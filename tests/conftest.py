@@ -22,11 +22,12 @@ def pytest_sessionstart(session):
 
 
 def pytest_collection_modifyitems(items):
-    """Mark the tests of the list; a name without brackets stands for all its cases."""
+    """Mark the tests of the list, those aside that are to be quick; a bare name stands for all its cases."""
     slow = set(SLOW.read_text().split("\n")) if SLOW.exists() else set()
     for item in items:
         name = item.nodeid.rpartition("tests/")[2]
-        if name in slow or name.partition("[")[0] in slow:
+        listed = name in slow or name.partition("[")[0] in slow
+        if listed and not item.get_closest_marker("quick"):
             item.add_marker(pytest.mark.slow)
 
 

@@ -15,7 +15,7 @@ CLOSE, ALIKE = 1e-6, 3e-3
 SCALES = [(1.0, 2.0**20), (2.0**-20, 2.0**10), (2.0**20, 2.0**-20)]
 """Factors of forces and of lengths: powers of two, so that hardly anything rounds otherwise."""
 
-FAST = ("linear_spring", "input_delay")
+FAST = ("linear_spring",)
 OTHERS = ("quadratic_drag", "asymmetric_coulomb")
 SEEDS = {"position_ripple": 6001}  # of seed 21 it is none that fits can follow
 
@@ -42,7 +42,8 @@ CASES = [(e, s) for e in LINEAR for s in SCALES if e not in OTHERS]
 
 
 @pytest.mark.parametrize(
-    ("hidden", "scale"), [pytest.param(e, s, marks=() if e in FAST else pytest.mark.slow) for e, s in CASES]
+    ("hidden", "scale"),
+    [pytest.param(e, s, marks=pytest.mark.quick if e in FAST else pytest.mark.slow) for e, s in CASES],
 )
 def test_other_units_alter_nothing(hidden, scale):
     before, after = diagnosed(hidden), diagnosed(hidden, *scale)

@@ -3,6 +3,7 @@
 CTRL_DF_TIMES=times.txt pytest; python tests/tiers.py times.txt
 """
 
+import math
 import sys
 from pathlib import Path
 
@@ -16,7 +17,7 @@ def main(path) -> None:
     times = {}
     for line in Path(path).read_text().splitlines():
         seconds, _, name = line.partition(" ")
-        times[name] = max(times.get(name, 0.0), float(seconds))
+        times[name] = min(times.get(name, math.inf), float(seconds))  # the first one may compile
     listed = set(SLOW.read_text().split("\n")) - {""} if SLOW.exists() else set()
     slow = {name for name in listed if name not in times} | {n for n, s in times.items() if s > LONG}
     SLOW.write_text("\n".join(sorted(slow)) + "\n")

@@ -156,6 +156,9 @@ BRIEF = 4 * SHORTEST
 FILTERED = 40
 """Values of the force that the shortest segments show where disturbance forces outweigh the noise."""
 
+MANY_SEGMENTS = 50
+"""Segments of a record from which on they tell how their errors go on from one to the next."""
+
 HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
 
@@ -186,8 +189,9 @@ POINTS, POINTS_COSTLY = 20, 10
 RIVALS = 2
 """Candidates of a step of a ladder that are tried again when a later step is taken."""
 
-BEGUN, KEPT, JOINTS = 2, 2, 3
-"""Steps of every fit before the first look, fits of an effect that go on after it, joints that begin."""
+BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
+"""Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load
+that begin, and from how many these are chosen."""
 
 ANGLES = 6
 """Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""

@@ -6,12 +6,10 @@ import math
 
 import numpy as np
 
+from ..thresholds import MANY_SEGMENTS
 from .multiple_shooting import Problem
 from .noise_model import noise_model
 from .sensitivity import OutputSensitivity
-
-MANY = 50
-"""Windows of a record from which on they tell how their errors go on from one to the next."""
 
 
 def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
@@ -48,7 +46,7 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     middle = np.zeros_like(h)
     for k, e in enumerate(residual):
         e, columns = problem.weighed(k, e), sensitivity.parameters[k]
-        if problem.error_filter is None and len(problem.segments[k]) >= MANY:
+        if problem.error_filter is None and len(problem.segments[k]) >= MANY_SEGMENTS:
             scores = np.array([columns[w].T @ e[w] for w in problem.segments[k].slices])
             middle += _long_run(scores)
             continue

@@ -56,7 +56,7 @@ class FitResult:
         Natural scale of each parameter.
     starts : list of (nw, ns) array
         Initial states, as corrections (see `Simulator.run`).
-    segments : list of Windows
+    segments : list of Segments
         Where the model was started anew.
     linear : callable or None
         Works out `sensitivity`, once it is asked for.
@@ -252,7 +252,7 @@ def fit_segments(
 
     Returns
     -------
-    Candidate
+    FitResult
     """
     problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
     problem.stage(list(segments), thin, starts)

@@ -1,6 +1,6 @@
 """Where segments begin: tries of initial states that a descent from the estimate does not reach.
 
-`problem` is a `shooting.Problem`; what is found goes into its `nuisance`.
+`problem` is a `multiple_shooting.Problem`; what is found goes into its `nuisance`.
 """
 
 from __future__ import annotations

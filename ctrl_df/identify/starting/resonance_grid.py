@@ -8,12 +8,9 @@ about.
 from __future__ import annotations
 
 from ..estimation.fit import FitResult
-from ..thresholds import JOINT_DAMPING, RESONANCES
+from ..thresholds import JOINT_DAMPING, JOINTS_TRIED, RESONANCES
 from .extend import extended
 from .screen import Screen
-
-# Iterations of all, more of the best of them, and how many these are.
-_LINEAR, _FITTED, _BEST = 1, 2, 4
 
 
 def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]:
@@ -28,7 +25,7 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
         stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
         block = extended(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
         if block is not None:
-            found.append(screen.data.fit(block, (), iterations=_LINEAR, tolerance=3e-2))
-    near = sorted(found, key=lambda f: f.rmse)[:_BEST]
-    again = [screen.data.fit(f.model, (), starts=f.starts, iterations=_FITTED, tolerance=3e-2) for f in near]
+            found.append(screen.data.fit(block, (), iterations=1, tolerance=3e-2))
+    near = sorted(found, key=lambda f: f.rmse)[:JOINTS_TRIED]
+    again = [screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=3e-2) for f in near]
     return sorted(again, key=lambda f: f.rmse)[:count]
