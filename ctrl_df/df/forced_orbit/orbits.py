@@ -116,11 +116,12 @@ def _steady(means, sizes) -> bool:
     """
     at = np.arange(len(means)) - 0.5 * (len(means) - 1)
     size = np.max(np.abs(means))
-    for values, scale in ((means.real, size), (means.imag, size), (sizes, np.max(sizes))):
+    for found, scale in ((means.real, size), (means.imag, size), (sizes, np.max(sizes))):
+        values = found / scale if scale > 0 else found  # squares of a motion that runs away are no numbers
         slope = at @ values / (at @ at)
         rest = values - values.mean() - slope * at
         error = np.sqrt(rest @ rest / (len(at) - 2) / (at @ at))
-        if abs(slope) > 4 * error and abs(slope) * len(at) > 1e-6 * scale:
+        if abs(slope) > 4 * error and abs(slope) * len(at) > 1e-6:
             return False
     return True
 

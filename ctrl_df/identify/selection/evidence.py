@@ -67,7 +67,9 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
         if fit is None:
             gains.append(0.0)
             continue
-        plain = -0.5 * power[1] * math.log(2 * math.pi * math.e * power[0] / power[1])
+        # for as many samples as the rounding is judged by: a density has a unit, a ratio of two has none
+        samples = sum(len(r) for r in fit.residual)
+        plain = -0.5 * samples * math.log(2 * math.pi * math.e * power[0] / power[1])
         measured = [a + b for a, b in zip(fit.simulated, fit.residual, strict=True)]
         gains.append(rounding_evidence(measured, fit.simulated, step) - plain)
     return sum(gains), gains[1]
