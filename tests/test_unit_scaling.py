@@ -38,7 +38,10 @@ def diagnosed(hidden, force=1.0, length=1.0):
 
 # the sine of an angle knows no other unit of it
 LINEAR = [e for e in rigs.ORDER if not cdf.effect_library()[e].turns]
-CASES = [(e, s) for e in LINEAR for s in SCALES if e not in OTHERS]
+KINDS = [e for e in LINEAR if e not in OTHERS]
+# all scales of the fast ones; the others take turns
+CASES = [(e, s) for e in FAST for s in SCALES]
+CASES += [(e, SCALES[i % len(SCALES)]) for i, e in enumerate(KINDS) if e not in FAST]
 
 
 @pytest.mark.parametrize(

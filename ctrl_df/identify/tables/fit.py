@@ -276,8 +276,9 @@ def fit_table(
     """
     table = block.parameters
     job = _Job(
-        block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit)) for k in names], work
-    )
+        block, points,
+        [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit), _side(block, k)) for k in names], work,
+    )  # fmt: skip
     z = np.array([v.q(table[v.name].value) for v in job.variables])
     e = job.errors(z)
     jacobian = np.zeros((len(e), len(z)))
@@ -309,6 +310,18 @@ def fit_table(
     model = job.model(z)
     error = relative_error(simulate_table(model, points, work), points)
     return FittedTable(model, tuple(names), error, e, jacobian, tuple(job.variables), z, job.count, converged)
+
+
+def _side(block, name) -> tuple[float, float]:
+    """Return the range of a parameter within one fit: a force keeps the direction it begins with.
+
+    Beyond zero a spring pushes away: the model runs off where the machine moved steadily, and nothing leads
+    back. Effects that may act either way are begun on both sides.
+    """
+    value, effect = block.parameters[name].value, block.named_effects.get(name.partition(".")[0])
+    if effect is None or not effect.proportional or value == 0.0:
+        return -math.inf, math.inf
+    return (0.0, math.inf) if value > 0.0 else (-math.inf, 0.0)
 
 
 def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.ndarray:

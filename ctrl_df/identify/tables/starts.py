@@ -141,15 +141,17 @@ def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=WORK_MED
     size = left(before)
     # a single point of another motion must not hide a good start
     common = 0.1 * float(np.mean(size)) + 1e-12
-    scored = []
+    scored, silent = [], int(np.isnan(before).sum())
     for grown in proposals(cls, block, points):
         try:
             table = simulate_table(grown, points, work)
         except (ValueError, ArithmeticError):
             continue
         if not np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
-            scored.append((float(np.sum(np.log(left(table) + common))), len(scored), grown))
-    scored.sort(key=lambda s: s[:2])
+            # a model that runs away where the machine moved steadily comes after all that do not
+            lost = int(np.isnan(table).sum()) > silent
+            scored.append((lost, float(np.sum(np.log(left(table) + common))), len(scored), grown))
+    scored.sort(key=lambda s: s[:3])
     bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(HOPELESS_START)
-    hopeful = [g for size, _, g in scored[:keep] if size < bound]
-    return hopeful or [g for _, _, g in scored[:1]], bool(hopeful)
+    hopeful = [g for _, size, _, g in scored[:keep] if size < bound]
+    return hopeful or [g for *_, g in scored[:1]], bool(hopeful)
