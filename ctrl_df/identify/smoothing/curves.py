@@ -55,9 +55,8 @@ def curve_over(values, force, std, own, known) -> Curve:
     rest = own[use][:, scale > 0] / scale[scale > 0] * root[:, None]
     y, count, together = force[use] * root, CURVE_BINS, 1.0
     bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
-    for _ in range(
-        2
-    ):  # what neither explains tells how many instants know the same; so many bins can be told
+    # what neither explains tells how many instants know the same, and so how many bins can be told apart
+    for _ in range(2):
         bins = np.empty(len(use), int)
         bins[order] = np.arange(len(use)) * count // len(use)
         both = np.column_stack([rest, (bins[:, None] == np.arange(count)) * root[:, None]])

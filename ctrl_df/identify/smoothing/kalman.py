@@ -50,12 +50,12 @@ def _solve(a, b):
 
 
 @njit(error_model="numpy")
-def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch):
+def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch, back):
     """Write means (N + 1, n) and covariances (N + 1, n, n) given all measurements; return their evidence.
 
     a (N, n, n), b (N, n), q (N, n, n): the steps; info (N + 1, n, n), told (N + 1, n): J and h; mean0, cov0:
     before anything is measured. scratch (N + 5, n, n). The evidence lacks what depends on the measurements
-    and their noise alone.
+    and their noise alone. Without `back` only it is computed: what is written is that of the filter.
     """
     a, b, q, info, told, mean0 = lean(a), lean(b), lean(q), lean(info), lean(told), lean(mean0)
     cov0, mean, cov, scratch = lean(cov0), lean(mean), lean(cov), lean(scratch)
@@ -122,7 +122,7 @@ def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch):
             for j in range(n):
                 scratch[k, i, j] = right[j, i]
     # --- back
-    for k in range(steps - 1, -1, -1):
+    for k in range(steps - 1 if back else -1, -1, -1):
         gain = scratch[k]
         for i in range(n):
             value = b[k, i]
@@ -161,9 +161,10 @@ def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch):
     return evidence
 
 
-def smoothed(a, b, q, info, told, mean0, cov0):
+def smoothed(a, b, q, info, told, mean0, cov0, back=True):
     """Return (means, covariances, evidence); see `smooth`."""
     steps, n = b.shape
     mean, cov = np.zeros((steps + 1, n)), np.zeros((steps + 1, n, n))
-    evidence = smooth(a, b, q, info, told, mean0, cov0, mean, cov, np.zeros((steps + 5, max(n, 2), n)))
+    scratch = np.zeros((steps + 5, max(n, 2), n))
+    evidence = smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch, back)
     return mean, cov, evidence

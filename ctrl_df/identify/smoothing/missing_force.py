@@ -12,13 +12,13 @@ from ...blocks.mechanism import Mechanism
 from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
+from ..estimation.prepared import REFERENCE
 from ..residuals.motion_phases import reversals
 from ..thresholds import FORCE_KNOWN
 from .curves import Curve, curve_over
 from .smoother import smooth_record
 
 AGAINST = ("time", "position", "velocity", "load", "reversal")
-REFERENCE = ("reference", "r")
 
 
 @dataclass(frozen=True, eq=False)

@@ -134,7 +134,7 @@ class _Told:
         self.c = np.where(self.has[:, :, None], lin.c, 0.0)
         self.r = np.where(self.has, lin.r, 0.0)
 
-    def smoothed(self, sizes):
+    def smoothed(self, sizes, back=True):
         """Return means, covariances and evidence with log size [force], log time [s], log noise."""
         size, memory, noise = np.exp(np.clip(sizes, -40, 40))
         weight = np.where(self.has, 1.0 / (noise**2 + self.r), 0.0)
@@ -148,7 +148,7 @@ class _Told:
         a[:, -1, -1], q[:, -1, -1] = keep, size**2 * -np.expm1(-2 * self.dt / memory)
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
         cov0[-1], cov0[:, -1], cov0[-1, -1], mean0[-1] = 0.0, 0.0, size**2, 0.0
-        mean, cov, evidence = smoothed(a, self.b, q, info, told, mean0, cov0)
+        mean, cov, evidence = smoothed(a, self.b, q, info, told, mean0, cov0, back)
         evidence += 0.5 * float(np.sum(np.log(weight[self.has])) - np.sum(weight * self.off**2))
         return mean, cov, evidence
 
@@ -161,5 +161,7 @@ class _Told:
     def evidence(self, sizes) -> float:
         """Return log p(record | sizes) + log p(sizes): wide priors about the scales of the record."""
         usual = np.log([0.1, 0.1 * self.known.swing, self.known.noise])
-        value = self.smoothed(sizes)[2] - 0.5 * float(np.sum(((sizes - usual) / [4.0, 1.5, 1.0]) ** 2))
+        value = self.smoothed(sizes, back=False)[2] - 0.5 * float(
+            np.sum(((sizes - usual) / [4.0, 1.5, 1.0]) ** 2)
+        )
         return value if math.isfinite(value) else -1e300

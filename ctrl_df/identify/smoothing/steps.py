@@ -9,8 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...blocks.core import IMPACT
-from ...blocks.effect import Effect
-from ...blocks.parameter import parameter
+from ...blocks.effects import ConstantForce
 from ...blocks.primitives import Ramp
 from ...simulate.groups import groups_of
 from ...simulate.runs import run_many, sampled_drives
@@ -24,22 +23,13 @@ NUDGE = 1e-3  # of parameters and forces, relative to their size
 
 
 @dataclass(frozen=True)
-class Disturbance(Effect):
-    """A force that no law knows of, constant over a short run, on the body that the input drives."""
+class Disturbance(ConstantForce):
+    """A force that no law knows of, constant over a short run, on the body that the input drives.
 
-    force: float = parameter("N", lower=-math.inf, meaning="force along +x")
+    Apart from a constant force that the block may have.
+    """
 
     id: ClassVar[str] = "disturbance"
-    role: ClassVar[str] = "force"
-    place_free: ClassVar[bool] = True
-    affine: ClassVar[bool] = True
-    shows: ClassVar[str] = ""
-    source: ClassVar[str] = ""
-
-    @staticmethod
-    def law(t, x, v, z, p, dz):
-        """Return the force [N]."""
-        return p[0]
 
 
 @dataclass(frozen=True)
