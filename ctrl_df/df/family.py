@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from ..checks import number, path_of
 from ..drawing import draw
 from .family_file import FORMAT, read_arrays, write_arrays
 from .journal import is_journal, lines_done, read_header
+from .points import AtPairs
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,8 +39,9 @@ class Family:
         The block in words.
     output : str
         Name of the output described.
-    at : callable or None
-        Computes N(amplitude, omega), shape (nw,), as the family was computed; None after loading.
+    at : AtPairs or None
+        Computes N and regime at further pairs (amplitude, omega) as the family was computed; None after
+        loading.
 
     Examples
     --------
@@ -60,7 +61,7 @@ class Family:
     block: Any = None
     description: str = ""
     output: str = "y"
-    at: Callable[[float], np.ndarray] | None = field(default=None, repr=False)
+    at: AtPairs | None = field(default=None, repr=False)
 
     @property
     def N(self) -> np.ndarray:
@@ -110,7 +111,7 @@ class Family:
         if row.size:
             response = self.N[row[0]]
         elif self.at is not None:
-            response = self.at(amplitude)
+            response = self.at(amplitude, self.omega)[0]
         else:
             order = np.argsort(self.amplitudes)
             grid, table = np.log(self.amplitudes[order]), self.N[order]

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .methods import Method, Quadrature
 from .threads import go_on
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
+
+
+@dataclass(frozen=True, eq=False)
+class AtPairs:
+    """N of one method at pairs of amplitude and frequency: what a finished family is asked off its grid."""
+
+    method: Method
+
+    @property
+    def light(self) -> bool:
+        """Whether points cost so little that pictures may ask for hundreds."""
+        return self.method.quick or self.method.between
+
+    def __call__(self, A, omega) -> tuple[np.ndarray, np.ndarray]:
+        """Return N and regime at pairs of `A` and `omega`, which broadcast."""
+        A, omega = np.broadcast_arrays(np.asarray(A, dtype=float), np.asarray(omega, dtype=float))
+        N, regime, _ = points(self.method, A, omega if self.method.needs_omega else None)
+        return N, regime
 
 
 def points(method: Method, A, omega, zero_check=False):

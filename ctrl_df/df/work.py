@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from .family_file import FORMAT, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
 from .methods import Guarded, Method
-from .points import compute_part, points
+from .points import AtPairs, compute_part
 from .threads import Threads
 
 LARGEST = 2 << 30  # [bytes] of a family in memory
@@ -234,13 +233,8 @@ class Work:
             block=self.F,
             description=describe(self.F),
             output=self.method.output,
-            at=partial(_row, self.method, self._omega),
+            at=AtPairs(self.method),
         )
-
-
-def _row(method: Method, omega, amplitude: float):
-    """Return N at one amplitude."""
-    return points(method, np.full(omega.shape, amplitude), omega)[0]
 
 
 def require_room(na: int, nw: int, orders: int) -> None:
