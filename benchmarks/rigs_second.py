@@ -1,7 +1,7 @@
 """A second generator of virtual rigs, for judging only: nothing is tuned on it.
 
-It shares no physics with the library: machines run in `second_physics`, without unit, and are scaled to masses
-from a gram to a tonne, strokes from micrometres to metres, times from milliseconds to ten seconds.
+It shares no physics with the library: machines run in `second_physics`, without unit, and are scaled to
+masses from a gram to a tonne, strokes from micrometres to metres, times from milliseconds to ten seconds.
 ``rig(kind, number)`` is the same rig for ever; kinds are ``single``, ``nothing``, ``outside``, ``double``,
 ``triple``.
 
@@ -42,8 +42,8 @@ class Unsuited(Exception):
 class Rig:
     """A machine with something hidden.
 
-    `accepted` has for each hidden effect the ids that say the same of any record; `truth` is the true structure
-    as a block of the library (None outside it), `free` what its user does not know exactly.
+    `accepted` has for each hidden effect the ids that say the same of any record; `truth` is the true
+    structure as a block of the library (None outside it), `free` what its user does not know exactly.
     """
 
     kind: str
@@ -76,7 +76,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect to hide: `draw(rng, scene)` gives values over a size from 0 to 1, `make` that of the library."""
+    """An effect to hide: `draw(rng, scene)` gives its values over a size from 0 to 1."""
 
     draw: Callable
     make: Callable
