@@ -9,11 +9,8 @@ from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
 from .arguments import check_quantities, effect_classes, free_parameters, mechanism_of
 from .datasets.choice import dataset_of
-from .results.diagnosis import NONE
 from .results.ladder import Step, Study, last_diagnosis, outcome
-from .selection.revision import Revision, revised
-from .selection.verdict import verdict_of, worth
-from .thresholds import RIVALS
+from .selection.ladder import Climb
 
 __all__ = ["Step", "Study", "improve"]
 
@@ -60,23 +57,14 @@ def improve(
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
     kept = frozenset(start.parameters) - set(free_parameters(start, free))
-    rivals: dict[str, list] = {}
-    steps: list[Step] = []
-    added, revision = None, Revision(start)
-    while True:
-        asked, block = time.perf_counter(), revision.block
-        search = dataset.search(block, [k for k in free_parameters(block) if k not in kept])
-        found = verdict_of(
-            search, search.candidates(classes, executor) if len(steps) < max_effects else [], asked
-        )
-        steps.append(_step(found, added, revision))
-        best = found.ranking[0] if found.ranking else None
-        if best is None or found.verdict == NONE or not worth(best, search):
-            break
-        confirmed = [c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > search.significant]
-        rivals[best.model.newest] = confirmed[:RIVALS]
-        added, revision = best, revised(best.model, start, search, kept, rivals)
-    again = search.final([s.model for s in steps], kept)
+
+    def free_of(block) -> list[str]:
+        return [k for k in free_parameters(block) if k not in kept]
+
+    climb = Climb(dataset, start, classes, free_of, max_effects, executor)
+    end, around = climb.run()
+    steps = list(end.steps)
+    again = end.search.final([s.model for s in steps], kept)
     if again is not None:
         steps = [
             replace(
@@ -84,20 +72,8 @@ def improve(
             )
             for s, (m, e, h) in zip(steps, again, strict=True)
         ]
-    noise = search.relative(last_diagnosis(steps).noise)
+    noise = end.search.relative(last_diagnosis(steps).noise)
     return Study(
         tuple(steps), steps[-1].model, outcome(steps), noise, start, dataset.records, dataset.validation,
-        time.perf_counter() - began,
+        time.perf_counter() - began, around,
     )  # fmt: skip
-
-
-def _step(found, added, revision: Revision) -> Step:
-    effect, evidence, same = ("", 0.0, ()) if added is None else (added.id, added.evidence, added.equivalents)
-    return Step(
-        effect, revision.dropped, found.model, found.nrmse, found.nrmse_holdout, evidence,
-        _values(found.model), same, found, revision.instead,
-    )  # fmt: skip
-
-
-def _values(model) -> dict[str, float]:
-    return {k: p.value for k, p in model.parameters.items()}

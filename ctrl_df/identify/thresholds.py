@@ -187,7 +187,11 @@ POINTS, POINTS_COSTLY = 20, 10
 """Points of a table for the first look, and for effects whose orbits take many times as long."""
 
 RIVALS = 2
-"""Candidates of a step of a ladder that are tried again when a later step is taken."""
+"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
+
+BRANCHES = 2
+"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
+hidden, one that stood in for both ranks first, and they follow (rigs)."""
 
 BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
 """Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load

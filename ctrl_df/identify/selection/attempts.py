@@ -81,7 +81,7 @@ class Attempt:
 
 
 def tried(
-    classes, screen: Screen, shortest: SegmentedData, free, nominal, executor=None
+    classes, screen: Screen, shortest: SegmentedData, free, nominal, executor=None, reached: float = np.inf
 ) -> list[CandidateFit]:
     """Return every effect that can be added, fitted over the segments of the screen.
 
@@ -97,32 +97,36 @@ def tried(
         Their values as the user has them.
     executor : concurrent.futures.Executor or None
         Runs the fits side by side; None: threads do.
+    reached : float
+        Error of a model that is known: all begin at the nominal values, too, what cannot come near it is left
+        where that shows, and joints are not sought over the plane.
     """
+    near, known = HOPELESS * reached, np.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
 
     def run(function: Callable, jobs: list) -> list:
         return side_by_side(function, jobs) if executor is None else list(executor.map(function, jobs))
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1]
-    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in LOAD_SHARES]
-    jobs += [(c, None, screen, shortest, free, nominal) for c in kinds]
+    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
+    jobs = [(c, s, screen, shortest, free, nominal, known) for c in joints for s in LOAD_SHARES]
+    jobs += [(c, None, screen, shortest, free, nominal, known) for c in kinds]
     begun = run(_begin, jobs)
     attempts = _best([a for found in begun for a in found if a.fit is not None], JOINTS)
     attempts += [a for found in begun for a in found if a.fit is None]
     # those of few steps first: what they come to tells of the others which need no long look
     short = [a for a in attempts if not a.multimodal]
-    begun = run(_first, [(a, np.inf) for a in short])
+    begun = run(_first, [(a, near) for a in short])
     least = min((a.error for a in begun), default=np.inf)
-    least = min(least, screen.base.rmse)
+    least = min(least, screen.base.rmse, reached)
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
-    kept = _best(begun, KEPT)
+    kept = _best(begun, 1 if known else KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another minimum
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
     ahead = _best(begun, 1)[:2]
-    found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
+    found = run(_finish, [(a, screen.data, near) for a in ahead])
     least = min([least, *(t.train.rmse for t in found)])
     rest = [a for a in begun if not any(a is o for o in ahead)]
     found += run(_finish, [(a, screen.data, HOPELESS * least) for a in rest])
@@ -154,7 +158,7 @@ def _best(attempts, count) -> list[Attempt]:
 
 def _begin(job) -> list[Attempt]:
     """Return where fits of one effect class begin; with a `share` of load given, those of joints."""
-    cls, share, screen, shortest, free, nominal = job
+    cls, share, screen, shortest, free, nominal, known = job
     if share is not None:
         found = []
         for near in resonating(cls, screen, share, JOINTS):
@@ -166,6 +170,11 @@ def _begin(job) -> list[Attempt]:
             )
         return found
     found, starts = [], starts_for(cls, screen)
+    if known:
+        # with the other parameters as the model has them, or as they are without the effect
+        best = starts[: 1 + cls.multimodal]
+        own = [replace(s, values=tuple(nominal.items())) for s in best[:1]]
+        return [a for s in (*own, *best) if (a := _from(s, screen, shortest, free)) is not None]
     for i, start in enumerate(starts):
         if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
             break

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from ..results.diagnosis import Diagnosis
@@ -103,6 +103,23 @@ class Search(ABC):
     @abstractmethod
     def candidates(self, classes, executor=None) -> list[Any]:
         """Return every effect that can be added, fitted, that of most evidence first."""
+
+    def rivals(self, model, names, classes, executor=None) -> list[Any]:
+        """Return effects that may do what a model of one effect more does, with evidence over it, best first.
+
+        Its values are where they begin; what comes nowhere near it need not be brought to its end.
+
+        Parameters
+        ----------
+        model : Mechanism
+        names : sequence of str
+            Its parameters that are fitted.
+        classes : sequence of effect classes
+        executor : concurrent.futures.Executor or None
+        """
+        known, more = self.fitted(model, names, 2), len(names) - len(self.free)
+        found = self.candidates(classes, executor)
+        return self.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
     def confirm(self, found) -> list[Any]:

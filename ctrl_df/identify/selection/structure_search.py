@@ -136,11 +136,23 @@ class StructureSearch(Search):
 
     def _look(self, classes, executor, data: SegmentedData):
         """Fit every effect over one set of segments; return baseline and effects there, best first."""
+        base, found = self._tried(classes, executor, data)
+        return base, ranked(CandidateFit("", base), found)[0]
+
+    def _tried(self, classes, executor, data: SegmentedData, reached: float = math.inf):
         base = data.moved(self.base.train, 3)
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        found = tried(classes, screen, self.segmentations[0].sampled, self.free, nominal, executor)
-        return base, ranked(CandidateFit("", base), found)[0]
+        short = self.segmentations[0].sampled
+        return base, tried(classes, screen, short, self.free, nominal, executor, reached)
+
+    def rivals(self, model, names, classes, executor=None):
+        """Return effects that may do what the model of one effect more does, with evidence over it."""
+        data = self.data.sampled
+        known = data.fit(model, names, iterations=4)
+        _, found = self._tried(classes, executor, data, known.rmse)
+        more = len(names) - len(self.free)
+        return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
