@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
-import time
+import math
 from dataclasses import replace
 
 from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
 from .arguments import check_quantities, effect_classes, free_parameters, mechanism_of
+from .course import COMPLETE, UNDER_WAY, Course
 from .datasets.choice import dataset_of
 from .results.diagnosis import NONE
 from .results.ladder import Step, Study, last_diagnosis, outcome
 from .selection.revision import Revision, revised
-from .selection.verdict import verdict_of, worth
+from .selection.verdict import diagnosed, worth
 from .thresholds import RIVALS
 
 __all__ = ["Step", "Study", "improve"]
 
 
 def improve(
-    model, train, holdout=None, max_effects=5, *, candidates=None, free=None, executor=None, **keywords
+    model,
+    train,
+    holdout=None,
+    max_effects=5,
+    *,
+    candidates=None,
+    free=None,
+    executor=None,
+    progress=None,
+    callback=None,
+    budget=None,
+    **keywords,
 ) -> Study:
     """Add the effects a model misses, one at a time, as long as held-out error falls beyond noise.
 
@@ -33,12 +45,23 @@ def improve(
         Records to confirm on; None: every third part of the training records, or point of the tables.
     max_effects : int
         Longest ladder, >= 0.
-    candidates, free, executor
+    candidates, free, executor, progress
         As for `diagnose`.
+    callback : callable or None
+        Takes the `Study` as it stands, first within seconds. What it raises ends the ladder.
+    budget : float or None
+        Seconds after which the ladder returns what is known, its `status` ``"budget spent"``; the first
+        screened ranking is waited for in any case. None: as many as it takes.
 
     Returns
     -------
     Study
+        Ctrl-C returns what is known, its `status` ``"interrupted"``.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C before anything is known.
 
     Examples
     --------
@@ -55,46 +78,85 @@ def improve(
     unknown_keywords(keywords)
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
-    began = time.perf_counter()
+    course = Course("improve", progress, callback, budget)
     dataset = dataset_of(train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
     kept = frozenset(start.parameters) - set(free_parameters(start, free))
-    rivals: dict[str, list] = {}
-    steps: list[Step] = []
-    added, revision = None, Revision(start)
-    while True:
-        asked, block = time.perf_counter(), revision.block
-        search = dataset.search(block, [k for k in free_parameters(block) if k not in kept])
-        found = verdict_of(
-            search, search.candidates(classes, executor) if len(steps) < max_effects else [], asked
-        )
-        steps.append(_step(found, added, revision))
-        best = found.ranking[0] if found.ranking else None
-        if best is None or found.verdict == NONE or not worth(best, search):
-            break
-        confirmed = [c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > search.significant]
-        rivals[best.model.newest] = confirmed[:RIVALS]
-        added, revision = best, revised(best.model, start, search, kept, rivals)
-    again = search.final([s.model for s in steps], kept)
-    if again is not None:
-        steps = [
-            replace(
-                s, model=m, nrmse=e, nrmse_holdout=h, parameters={k: p.value for k, p in m.parameters.items()}
-            )
-            for s, (m, e, h) in zip(steps, again, strict=True)
-        ]
-    noise = search.relative(last_diagnosis(steps).noise)
-    return Study(
-        tuple(steps), steps[-1].model, outcome(steps), noise, start, dataset.records, dataset.validation,
-        time.perf_counter() - began,
+    climb = _Climb(start, classes, kept, dataset, executor, course)
+    return course.run(lambda: climb.to(max_effects))
+
+
+class _Climb:
+    """One ladder, on its way."""
+
+    def __init__(self, start, classes, kept, dataset, executor, course: Course):
+        self.start, self.classes, self.kept, self.dataset = start, classes, kept, dataset
+        self.executor, self.course = executor, course
+
+    def to(self, most: int) -> Study:
+        """Climb `most` steps at the most."""
+        rivals: dict[str, list] = {}
+        steps: list[Step] = []
+        added, revision = None, Revision(self.start)
+        while True:
+            search, found = self._asked(revision, added, steps, most)
+            steps.append(_step(found, added, revision))
+            best = found.ranking[0] if found.ranking else None
+            if best is None or found.verdict == NONE or not worth(best, search):
+                break
+            self.course.known(self._study([*steps, _next(best, found)], search, UNDER_WAY))
+            self.course.stage("earlier effects looked at again")
+            confirmed = [
+                c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > search.significant
+            ]
+            rivals[best.model.newest] = confirmed[:RIVALS]
+            added, revision = best, revised(best.model, self.start, search, self.kept, rivals)
+        self.course.known(self._study(steps, search, UNDER_WAY))
+        self.course.stage("all models over the same data")
+        again = search.final([s.model for s in steps], self.kept)
+        if again is not None:
+            steps = [
+                replace(s, model=m, nrmse=e, nrmse_holdout=h, parameters=_values(m))
+                for s, (m, e, h) in zip(steps, again, strict=True)
+            ]
+        return self._study(steps, search, COMPLETE)
+
+    def _asked(self, revision: Revision, added, steps, most):
+        """Ask what the model of a step misses."""
+        block = revision.block
+        self.course.stage(f"step {len(steps)}: the model refitted")
+        search = self.dataset.search(block, [k for k in free_parameters(block) if k not in self.kept])
+
+        def so_far(found):
+            return self._study([*steps, _step(found, added, revision)], search, UNDER_WAY)
+
+        classes = self.classes if len(steps) < most else []
+        return search, diagnosed(search, classes, self.executor, self.course.within(so_far))
+
+    def _study(self, steps, search, status) -> Study:
+        noise = search.relative(last_diagnosis(steps).noise)
+        return Study(
+            tuple(steps), steps[-1].model, outcome(steps), noise, self.start, self.dataset.records,
+            self.dataset.validation, self.course.seconds, status,
+        )  # fmt: skip
+
+
+def _next(best, found) -> Step:
+    """Return the step that a diagnosis leads to, before earlier effects are looked at again."""
+    return Step(
+        best.id, (), best.model, best.nrmse, best.nrmse_holdout, best.evidence, _values(best.model),
+        best.equivalents, found,
     )  # fmt: skip
 
 
 def _step(found, added, revision: Revision) -> Step:
     effect, evidence, same = ("", 0.0, ()) if added is None else (added.id, added.evidence, added.equivalents)
+    errors = found.nrmse, found.nrmse_holdout
+    if added is not None and not math.isfinite(errors[1]):  # not tried on what is held out yet
+        errors = added.nrmse, added.nrmse_holdout
     return Step(
-        effect, revision.dropped, found.model, found.nrmse, found.nrmse_holdout, evidence,
+        effect, revision.dropped, found.model, *errors, evidence,
         _values(found.model), same, found, revision.instead,
     )  # fmt: skip
 

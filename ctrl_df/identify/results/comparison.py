@@ -14,6 +14,7 @@ from ..data.derivatives import automatic_cutoff, derivative
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
 from ..residuals.comparison_base import ComparisonBase
+from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..residuals.regions import Regions, error_regions
 from ..residuals.residual_tests import (
     InputTest,
@@ -188,6 +189,14 @@ class Comparison(ComparisonBase):
     def missing_force(self) -> MissingForce:
         """The force that would have to be added for the model to follow the worst record."""
         return self.worst.missing_force
+
+    @cached_property
+    def error_by_horizon(self) -> ErrorByHorizon:
+        """Error of free prediction against its length, up to the whole record; seconds.
+
+        `ErrorByHorizon.plot` draws it, several models in one picture.
+        """
+        return error_by_horizon(self.model, [r.record for r in self.records])
 
     @property
     def windows(self) -> int:

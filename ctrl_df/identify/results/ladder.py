@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...drawing import draw, go_on
-from .diagnosis import NONE, UNKNOWN, Diagnosis
+from ..course import COMPLETE
+from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,8 @@ class Study:
         Nothing was missing; what was missing is found; something remains that the library does not explain.
     noise : float
         Noise over the rms of the centred output: the floor no model gets below.
+    status : {'complete', 'under way', 'budget spent', 'interrupted'}
+        How far the ladder came. Before it is complete the last step holds what is known so far.
 
     Examples
     --------
@@ -94,6 +98,7 @@ class Study:
     train: tuple
     holdout: tuple
     seconds: float = 0.0
+    status: str = COMPLETE
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -127,15 +132,19 @@ class Study:
             )
         else:
             added = ", ".join(e.replace("_", " ") for e in self.effects) or "nothing"
+            held = ""
+            if math.isfinite(first.nrmse_holdout + last.nrmse_holdout):
+                held = f", on held-out data from {first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%}"
             head = (
-                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}, on held-out "
-                "data from "
-                f"{first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%} (noise {self.noise:.2%})."
+                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}{held} "
+                f"(noise {self.noise:.2%})."
             )
         if self.verdict == UNKNOWN and last.diagnosis is not None:
             d = last.diagnosis
             left = f"Something outside the library is missing. {d.remains}" if d.remains else d.explanation
             head += " " + left
+        if self.status != COMPLETE:
+            head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
         lines = [head, "", self.table(), ""]
         for name, p in self.model.parameters.items():
             lines.append(f"  {name:<30} {p.value:>12.6g} {p.unit}")
@@ -161,7 +170,8 @@ def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:
 
 
 def outcome(steps: Sequence[Step]) -> str:
-    """Return the verdict of a ladder."""
-    if last_diagnosis(steps).verdict == UNKNOWN:
+    """Return the verdict of a ladder; where it ended early, something that is not in it yet is unknown."""
+    verdict = last_diagnosis(steps).verdict
+    if verdict == UNKNOWN or (len(steps) == 1 and verdict != NONE):
         return UNKNOWN
-    return NONE if len(steps) == 1 else "effect"
+    return NONE if len(steps) == 1 else EFFECT

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from ..course import Course
 from ..results.diagnosis import Diagnosis
 
 
@@ -84,6 +85,8 @@ class Search(ABC):
     words : Words
     kind : type
         Class of the answer.
+    course : Course
+        Hears of the candidates as they stand, best first.
     """
 
     block: Any
@@ -94,6 +97,7 @@ class Search(ABC):
     measure: str
     words: Words
     kind: type[Diagnosis] = Diagnosis
+    course: Course = Course()
 
     @property
     @abstractmethod
@@ -115,6 +119,19 @@ class Search(ABC):
     @abstractmethod
     def standard_errors(self, judged) -> dict[str, float]:
         """Return the standard errors of the parameters fitted, as far as they are known."""
+
+    def determined(self, judged) -> bool:
+        """Whether the data determine the parameters of the newest effect of a confirmed candidate."""
+        return False
+
+    def predicted(self, judged) -> tuple[Any, tuple] | None:
+        """Return a model and the records that it is to predict; None where there is nothing to predict."""
+        return None
+
+    @property
+    def at_first(self) -> Remainder:
+        """What the refitted model leaves, as far as is known before anything is confirmed."""
+        return Remainder(0.0, 0.0, False)
 
     @abstractmethod
     def alike(self, a, b) -> bool:
