@@ -16,9 +16,10 @@ from ..estimation.fit import FitResult
 from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
+from ..estimation.segments import facts
 from ..estimation.simulator import feasible
 from ..estimation.variables import default_free
-from ..starting.regression import force_regression, motion_of
+from ..starting.regression import force_regression, heavy, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (
     CONFIRMED,
@@ -70,10 +71,14 @@ class StructureSearch(Search):
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
         # a disturbance force drowns all else over longer segments
         near = self.segmentations[0].moved(self.base.train)
-        if near.rmse > PROCESS_NOISE * data.noise and not data.noise_free:
+        if self.disturbs(near.rmse, data):
             self._look_at(self.segmentations[0].with_process_noise, 0)
             self.base = CandidateFit("", self.data.fit(near.model, self.free))
         self.noise = ranked(self.base, ())[1]  # of the best model's residual
+
+    def disturbs(self, error: float, data: SegmentedData) -> bool:
+        """Whether an error over the shortest segments is one that disturbance forces make."""
+        return error > PROCESS_NOISE * data.noise and not data.noise_free
 
     def _look_at(self, data: SegmentedData, which: int):
         self.segmentations = data.segmentations
@@ -84,7 +89,7 @@ class StructureSearch(Search):
         shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, heavy=heavy(block))
         guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
@@ -206,7 +211,7 @@ class StructureSearch(Search):
         ended = side_by_side(lambda t: self._ended(t, t in near and len(near) > 1, floor, least), close)
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
-        span = max(float(np.ptp(r.y)) for r in self.data.train.records)
+        span = max(float(np.ptp(facts(r).place)) for r in self.data.train.records)
         chosen, self.noise = ranked(self.base, [t for t in chosen if itself(t, span)])
         return chosen
 
