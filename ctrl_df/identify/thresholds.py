@@ -159,6 +159,13 @@ FILTERED = 40
 MANY_SEGMENTS = 50
 """Segments of a record from which on they tell how their errors go on from one to the next."""
 
+HORIZONS = 8
+"""Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
+shortest."""
+
+SHORTEST_HORIZON = 0.25
+"""The shortest, in to-and-fro motions: over less the fitted position and speed follow nearly anything."""
+
 HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
 

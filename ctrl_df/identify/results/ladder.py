@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...drawing import draw, go_on
-from .diagnosis import NONE, UNKNOWN, Diagnosis
+from ..course import COMPLETE
+from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
 from .neighbours import Neighbours
 
 
@@ -97,6 +98,8 @@ class Study:
         Nothing was missing; what was missing is found; something remains that the library does not explain.
     noise : float
         Noise over the rms of the centred output: the floor no model gets below.
+    status : {'complete', 'under way', 'budget spent', 'interrupted'}
+        How far the ladder came. Before it is complete the last step holds what is known so far.
     neighbours : Neighbours
         The model against all that are one exchange away.
 
@@ -121,12 +124,19 @@ class Study:
     train: tuple
     holdout: tuple
     seconds: float = 0.0
+    status: str = COMPLETE
     neighbours: Neighbours = Neighbours()
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Ids of the effects that were added and kept."""
         return tuple(e.id for e in self.model.effects[len(self.start.effects) :])
+
+    @property
+    def story(self) -> list[str]:
+        """What became of effects on the way, and what the neighbours come to, in sentences."""
+        told = [s.sentence for s in self.steps if s.sentence]
+        return [*told, self.neighbours.sentence] if self.neighbours else told
 
     @property
     def measure(self) -> str:
@@ -154,18 +164,20 @@ class Study:
             )
         else:
             added = ", ".join(_words(e) for e in self.effects) or "nothing"
+            held = ""
+            if math.isfinite(first.nrmse_holdout + last.nrmse_holdout):
+                held = f", on held-out data from {first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%}"
             head = (
-                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}, on held-out "
-                "data from "
-                f"{first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%} (noise {self.noise:.2%})."
+                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}{held} "
+                f"(noise {self.noise:.2%})."
             )
         if self.verdict == UNKNOWN and last.diagnosis is not None:
             d = last.diagnosis
             left = f"Something outside the library is missing. {d.remains}" if d.remains else d.explanation
             head += " " + left
-        told = [s.sentence for s in self.steps if s.sentence]
-        told += [self.neighbours.sentence] if self.neighbours else []
-        lines = [" ".join([head, *told]), "", self.table(), ""]
+        if self.status != COMPLETE:
+            head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
+        lines = [" ".join([head, *self.story]), "", self.table(), ""]
         if self.neighbours:
             lines += [str(self.neighbours.table()), ""]
         for name, p in self.model.parameters.items():
@@ -192,10 +204,11 @@ def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:
 
 
 def outcome(steps: Sequence[Step]) -> str:
-    """Return the verdict of a ladder."""
-    if last_diagnosis(steps).verdict == UNKNOWN:
+    """Return the verdict of a ladder; where it ended early, something that is not in it yet is unknown."""
+    verdict = last_diagnosis(steps).verdict
+    if verdict == UNKNOWN or (len(steps) == 1 and verdict != NONE):
         return UNKNOWN
-    return NONE if len(steps) == 1 else "effect"
+    return NONE if len(steps) == 1 else EFFECT
 
 
 def _words(name: str) -> str:

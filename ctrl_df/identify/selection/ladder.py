@@ -11,21 +11,21 @@ ladder then begins again from what came next at its own step, and the better end
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
+from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
-from ..results.ladder import Step
+from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import Neighbour, Neighbours
-from ..thresholds import BRANCHES, CONFIRMED
+from ..thresholds import BRANCHES
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .search import Search
 from .structure import Structure, plainness
-from .verdict import verdict_of, worth
+from .verdict import diagnosed, worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,6 @@ class Rung:
     structure : Structure
         Refitted.
     search : Search
-    trials : list
-        Every effect besides, roughly fitted.
     found : Diagnosis
     steps : tuple of Step
         How it was come to; the last one is its own.
@@ -46,27 +44,23 @@ class Rung:
 
     structure: Structure
     search: Search
-    trials: list
     found: Diagnosis
     steps: tuple[Step, ...]
 
     @property
     def next(self) -> CandidateEffect | None:
         """The effect to be added; None where there is none."""
-        if (
-            not self.found.ranking
-            or self.found.verdict == NONE
-            or not worth(self.found.ranking[0], self.search)
-        ):
+        ranking = self.found.ranking
+        if not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
             return None
-        return plainest(self.found.ranking)
+        return plainest(ranking)
 
 
 def plainest(ranking) -> CandidateEffect:
     """Return the plainest of the candidates that the data hardly tell from the first."""
-    first = ranking[0]
-    same = [c for c in rivals(ranking) if c.id in first.equivalents]
-    fewer = [c for c in rivals(ranking) if plainness(c.effect)[0] < plainness(first.effect)[0]]
+    first, near = ranking[0], rivals(ranking)
+    same = [c for c in near if c.id in first.equivalents]
+    fewer = [c for c in near if plainness(c.effect)[0] < plainness(first.effect)[0]]
     return min([first, *same, *fewer], key=lambda c: plainness(c.effect))
 
 
@@ -84,29 +78,38 @@ class Climb:
     max_effects : int
         Most effects added.
     executor : concurrent.futures.Executor or None
-    known : callable
-        Takes the steps and the neighbours as far as they are known.
+    course : Course
+        Hears of the `Study` as it stands.
     """
 
-    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor=None, known=None):
-        self.dataset, self.free, self.executor = dataset, free, executor
+    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor, course: Course):
+        self.dataset, self.free, self.executor, self.course = dataset, free, executor, course
         self.classes = sorted(dict.fromkeys(classes), key=lambda c: c.id)
         self.max_effects = max_effects
-        self.known = known or (lambda steps, neighbours: None)
         self.start = Structure(start, len(start.effects))
         self.rungs: dict[tuple[str, ...], Rung] = {}
-        self.looks: dict[tuple[str, ...], Look] = {}
+        self.best: Study | None = None  # what is known, while something else is tried
 
-    def run(self) -> tuple[Rung, Neighbours]:
+    def to_the_end(self) -> Study:
         """Return the end of the ladder and its neighbours."""
         end, around = self._settled(self._up(self.start, ()))
         for rung, effect in islice(self._rivals(end), BRANCHES):
             if end.found.verdict != UNKNOWN:
                 break
+            self.best = self._study(end.steps, end.search, UNDER_WAY, around)
             other = self._again(end, rung, effect)
+            self.best = None
             if other is not None:
                 end, around = self._settled(other)
-        return end, around
+        self.course.stage("all models over the same data")
+        steps = list(end.steps)
+        again = end.search.final([s.model for s in steps], self.free)
+        if again is not None:
+            steps = [
+                replace(s, model=m, nrmse=e, nrmse_holdout=h, parameters=_values(m))
+                for s, (m, e, h) in zip(steps, again, strict=True)
+            ]
+        return self._study(steps, end.search, COMPLETE, around)
 
     # --- up -------------------------------------------------------------------------------------------
 
@@ -115,107 +118,157 @@ class Climb:
         return self._on(self._rung(structure, steps, how or {}), rungs)
 
     def _on(self, rung: Rung, rungs: float = math.inf) -> Rung:
-        while rung.next is not None and rungs > 0:
-            revision = self._added(rung, rung.next)
+        while (best := rung.next) is not None and rungs > 0:
+            step = _step(rung.found, best.model, (best.nrmse, best.nrmse_holdout), _added(best))
+            self._known((*rung.steps, step), rung.search)
+            self.course.stage("earlier effects looked at again")
+            revision = self._beside(rung, best)
             if revision.structure.key in self.rungs:
                 break
-            rung, rungs = self._rung(revision.structure, rung.steps, _told(rung.next, revision)), rungs - 1
+            how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
+            rung, rungs = self._rung(revision.structure, rung.steps, how), rungs - 1
         return rung
 
     def _rung(self, structure: Structure, steps, how: dict) -> Rung:
         """Ask of a structure what it misses."""
-        asked, room = time.perf_counter(), len(structure.added) < self.max_effects
+        self.course.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
-        trials = search.candidates(self.classes, self.executor) if room else []
-        found = verdict_of(search, trials, asked)
-        values = {k: p.value for k, p in found.model.parameters.items()}
-        step = Step(
-            model=found.model, nrmse=found.nrmse, nrmse_holdout=found.nrmse_holdout, parameters=values,
-            diagnosis=found, **how,
-        )  # fmt: skip
-        rung = Rung(structure.at(found.model), search, trials, found, (*steps, step))
+        last = steps[-1] if steps else None
+
+        def told(found: Diagnosis) -> Step:
+            errors = found.nrmse, found.nrmse_holdout
+            if last is not None and not math.isfinite(errors[1]):  # not tried on what is held out yet
+                errors = last.nrmse, last.nrmse_holdout
+            return _step(found, found.model, errors, how)
+
+        def so_far(found: Diagnosis) -> Study:
+            return self.best or self._study((*steps, told(found)), search, UNDER_WAY)
+
+        room = len(structure.added) < self.max_effects
+        found = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
+        rung = Rung(structure.at(found.model), search, found, (*steps, told(found)))
         self.rungs[structure.key] = rung
-        self.known(rung.steps, None)
         return rung
 
-    def _added(self, rung: Rung, effect: CandidateEffect) -> Revision:
+    def _beside(self, rung: Rung, effect: CandidateEffect) -> Revision:
+        """Add an effect, and look again at those before it."""
         others = [c.effect for c in rung.found.ranking if c is not effect and c.confirmed]
-        others = others[:CONFIRMED]
         return revised(rung.structure.plus(effect.model, others), rung.search, self.free)
 
     # --- about ----------------------------------------------------------------------------------------
 
     def _settled(self, end: Rung) -> tuple[Rung, Neighbours]:
         """Go on to better neighbours until there are none."""
-        moves = 0
-        while True:
-            around = Around(end.structure, end.search, self.free)
-            around.drop_each()
-            for place in reversed(range(len(end.structure.added))):
-                around.exchange(place, self._look(end, place))
-            around.merge()
-            around.add(end.found.ranking)
-            table = Neighbours(around.rows(), *end.search.errors(around.own))
-            self.known(end.steps, table)
+        for _ in range(self.max_effects):
+            around, table = self._around(end)
             better = around.better(self.rungs)
-            if better is None or moves == self.max_effects:
+            if better is None:
                 return end, table
-            structure, neighbour = better
-            end = self._up(structure, end.steps, _exchanged(neighbour))
-            moves += 1
+            structure, how = better
+            end = self._up(structure, end.steps, _exchanged(how))
+        return end, self._around(end)[1]
+
+    def _around(self, end: Rung) -> tuple[Around, Neighbours]:
+        """Look at every neighbour of a model in which nothing more was found."""
+        self._known(end.steps, end.search)
+        self.course.stage("every effect left out in turn")
+        around = Around(end.structure, end.search, self.free)
+        around.add(end.found.ranking)
+        around.drop_each()
+        errors = end.search.errors(around.own)
+        for place in reversed(range(len(end.structure.added))):
+            self._known(end.steps, end.search, Neighbours(around.rows(), *errors, complete=False))
+            self.course.stage(f"others in place of {end.structure.added[place].id.replace('_', ' ')}")
+            around.exchange(place, self._look(end, place))
+        around.merge()
+        table = Neighbours(around.rows(), *errors)
+        self._known(end.steps, end.search, table)
+        return around, table
 
     def _look(self, end: Rung, place: int) -> Look:
         """Return what was tried in the place of an effect: when it was added, or now."""
         less, old = end.structure.without(place), end.structure.added[place]
         rung = self.rungs.get(less.key)
-        if rung is not None:
+        if rung is not None and rung.found.ranking:
             return _looked(rung, old)
         search = self.dataset.search(less.block, self.free(less.block))
-        trials = search.rivals(
-            end.structure.block, self.free(end.structure.block), self.classes, self.executor
-        )
-        return Look(less, trials, search.errors)
+        model = end.structure.block
+        return Look(less, search.rivals(model, self.free(model), self.classes, self.executor), search.errors)
 
     # --- again from below -----------------------------------------------------------------------------
 
+    def _rivals(self, end: Rung) -> Iterator[tuple[Rung, CandidateEffect]]:
+        """Yield rivals of steps of the way to an end that were not followed, the nearest first."""
+        found = []
+        for rung in [r for r in self.rungs.values() if any(r.steps[-1] is s for s in end.steps)]:
+            for c in rung.found.ranking[1:]:
+                if c.confirmed and worth(c, rung.search):
+                    key = rung.structure.plus(c.model).key
+                    found.append((c.evidence / rung.found.ranking[0].evidence, key, rung, c))
+        for _, key, rung, c in sorted(found, key=lambda f: (-f[0], f[1])):
+            if key not in self.rungs:
+                yield rung, c
+
     def _again(self, end: Rung, rung: Rung, effect: CandidateEffect) -> Rung | None:
         """Climb from a rival of an earlier step; return where that ends if it is better."""
-        structure = self._added(rung, effect).structure
+        structure = self._beside(rung, effect).structure
         if structure.key in self.rungs:
             return None
         gone, new = [e.id for e in end.structure.added], [e.id for e in structure.added]
         how = {
-            "effect": "", "dropped": tuple(e for e in gone if e not in new),
+            "dropped": tuple(e for e in gone if e not in new),
             "instead": tuple(e for e in new if e not in gone),
             "evidence": effect.evidence - rung.found.ranking[0].evidence,
-        }  # fmt: skip
+        }
         # one effect more has to show that it leads anywhere
         other = self._up(structure, end.steps, how, 1)
         return self._on(other) if self._beats(other, end) else None
 
-    def _rivals(self, end: Rung) -> Iterator[tuple[Rung, CandidateEffect]]:
-        """Yield rivals of steps of the way to the end that were not followed, the nearest first."""
-        found = []
-        for rung in self.rungs.values():
-            if not any(rung.steps[-1] is s for s in end.steps):
-                continue
-            for c in rung.found.ranking[1:]:
-                if c.confirmed and worth(c, rung.search):
-                    found.append((c.evidence / rung.found.ranking[0].evidence, rung, c))
-        for _, rung, c in sorted(found, key=lambda f: -f[0]):
-            yield rung, c
-
     def _beats(self, other: Rung, end: Rung) -> bool:
         """Whether another end does better, on the data that judged it."""
         fits = [other.search.fitted(r.structure.block, self.free(r.structure.block), 6) for r in (end, other)]
-        fits = [replace(t, extra=t.extra - fits[0].extra) for t in fits]
-        judged = other.search.ranked(fits[0], [fits[1]])[0]
+        judged = other.search.ranked(fits[0], [replace(fits[1], extra=fits[1].extra - fits[0].extra)])[0]
         return judged.evidence > other.search.significant
+
+    # --- what is known --------------------------------------------------------------------------------
+
+    def _known(self, steps, search: Search, neighbours: Neighbours | None = None) -> None:
+        self.course.known(self.best or self._study(steps, search, UNDER_WAY, neighbours))
+
+    def _study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
+        return Study(
+            tuple(steps), steps[-1].model, outcome(steps), search.relative(last_diagnosis(steps).noise),
+            self.start.block, self.dataset.records, self.dataset.validation, self.course.seconds, status,
+            neighbours or Neighbours(complete=False),
+        )  # fmt: skip
+
+
+def _step(found: Diagnosis, model, errors, how: dict) -> Step:
+    return Step(
+        model=model,
+        nrmse=errors[0],
+        nrmse_holdout=errors[1],
+        parameters=_values(model),
+        diagnosis=found,
+        **how,
+    )
+
+
+def _values(model) -> dict[str, float]:
+    return {k: p.value for k, p in model.parameters.items()}
+
+
+def _added(effect: CandidateEffect) -> dict:
+    return {"effect": effect.id, "evidence": effect.evidence, "equivalents": effect.equivalents}
+
+
+def _exchanged(n: Neighbour) -> dict:
+    return {"dropped": n.dropped, "instead": (n.added,) if n.added else (), "evidence": n.evidence}
 
 
 def _looked(rung: Rung, old) -> Look:
     """Return what was asked of a structure as a look at what may stand for an effect that was then added."""
-    first = {t.key: t.evidence for t in rung.trials}
+    first = {t.key: t.evidence for t in rung.search.first_look}
     own = next((c for c in rung.found.ranking if c.confirmed and c.id == old.id), rung.found.ranking[0])
     entries = []
     for c in rung.found.ranking:
@@ -232,16 +285,3 @@ class _Entry:
     evidence: float
     errors: tuple[float, float]
     confirmed: bool
-
-
-def _told(effect: CandidateEffect, revision: Revision) -> dict:
-    return {
-        "effect": effect.id, "dropped": revision.dropped, "instead": revision.instead,
-        "evidence": effect.evidence, "equivalents": effect.equivalents,
-    }  # fmt: skip
-
-
-def _exchanged(n: Neighbour) -> dict:
-    return {
-        "effect": "", "dropped": n.dropped, "instead": (n.added,) if n.added else (), "evidence": n.evidence,
-    }  # fmt: skip
