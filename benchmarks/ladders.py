@@ -22,6 +22,7 @@ import rigs
 import ctrl_df as cdf
 
 PID, GAP, NOISY = dict(closed_loop=True), dict(gap=True), dict(snr_db=40.0, noise="coloured")
+SLOW = dict(n=5_000, dt=2e-3)
 
 RIGS = {
     "two, stribeck, spring": (("stribeck", "linear_spring"), 7101, dict()),
@@ -32,14 +33,14 @@ RIGS = {
     "two, joint, ripple": (("compliance", "position_ripple"), 7106, dict()),
     "two, spring, saturation, PID": (("linear_spring", "input_saturation"), 7107, PID),
     "two, drag, offset, gap": (("quadratic_drag", "constant_force"), 7108, GAP),
-    "three, coulomb, offset, ripple": (("coulomb", "constant_force", "position_ripple"), 7201, dict()),
-    "three, stribeck, spring, delay": (("stribeck", "linear_spring", "input_delay"), 7202, dict()),
+    "three, coulomb, offset, ripple": (("coulomb", "constant_force", "position_ripple"), 7201, SLOW),
+    "three, stribeck, spring, delay": (("stribeck", "linear_spring", "input_delay"), 7202, SLOW),
     "three, asymmetric, cubic, offset, PID": (
-        ("asymmetric_viscous", "cubic_spring", "constant_force"), 7203, PID,
+        ("asymmetric_viscous", "cubic_spring", "constant_force"), 7203, SLOW | PID,
     ),
-    "three, drag, spring, ripple": (("quadratic_drag", "linear_spring", "position_ripple"), 7204, dict()),
+    "three, drag, spring, ripple": (("quadratic_drag", "linear_spring", "position_ripple"), 7204, SLOW),
     "three, stribeck, drag, offset": (
-        ("stribeck", "quadratic_drag", "constant_force"), 7205, dict(excitation="chirp"),
+        ("stribeck", "quadratic_drag", "constant_force"), 7205, SLOW | dict(excitation="chirp"),
     ),
 }  # fmt: skip
 """Effects hidden, seed, circumstances by name."""
