@@ -196,9 +196,9 @@ POINTS, POINTS_COSTLY = 20, 10
 RIVALS = 2
 """Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
 
-BRANCHES = 2
+BRANCHES = 3
 """Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
-hidden, one that stood in for both ranks first, and they follow (rigs)."""
+hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
 
 BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
 """Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load

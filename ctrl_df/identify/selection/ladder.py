@@ -20,7 +20,7 @@ from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import Neighbour, Neighbours
-from ..thresholds import BRANCHES
+from ..thresholds import BRANCHES, SHOWS_HARDLY
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .search import Search
@@ -100,7 +100,7 @@ class Climb:
             other = self._again(end, rung, effect)
             self.best = None
             if other is not None:
-                end, around = self._settled(other)
+                end, around = self._settled(self._on(other))
         self.course.stage("all models over the same data")
         steps = list(end.steps)
         again = end.search.final([s.model for s in steps], self.free)
@@ -113,12 +113,12 @@ class Climb:
 
     # --- up -------------------------------------------------------------------------------------------
 
-    def _up(self, structure: Structure, steps, how: dict | None = None, rungs: float = math.inf) -> Rung:
-        """Climb from a structure until nothing more is found, or so many rungs."""
-        return self._on(self._rung(structure, steps, how or {}), rungs)
+    def _up(self, structure: Structure, steps, how: dict | None = None) -> Rung:
+        """Climb from a structure until nothing more is found."""
+        return self._on(self._rung(structure, steps, how or {}))
 
-    def _on(self, rung: Rung, rungs: float = math.inf) -> Rung:
-        while (best := rung.next) is not None and rungs > 0:
+    def _on(self, rung: Rung) -> Rung:
+        while (best := rung.next) is not None:
             step = _step(rung.found, best.model, (best.nrmse, best.nrmse_holdout), _added(best))
             self._known((*rung.steps, step), rung.search)
             self.course.stage("earlier effects looked at again")
@@ -126,7 +126,7 @@ class Climb:
             if revision.structure.key in self.rungs:
                 break
             how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
-            rung, rungs = self._rung(revision.structure, rung.steps, how), rungs - 1
+            rung = self._rung(revision.structure, rung.steps, how)
         return rung
 
     def _rung(self, structure: Structure, steps, how: dict) -> Rung:
@@ -198,19 +198,29 @@ class Climb:
     # --- again from below -----------------------------------------------------------------------------
 
     def _rivals(self, end: Rung) -> Iterator[tuple[Rung, CandidateEffect]]:
-        """Yield rivals of steps of the way to an end that were not followed, the nearest first."""
+        """Yield what was not followed on the way to an end, the first of every step before the second of any.
+
+        Within a step by the error left: of several effects that are missing none need show by itself.
+        """
         found = []
         for rung in [r for r in self.rungs.values() if any(r.steps[-1] is s for s in end.steps)]:
-            for c in rung.found.ranking[1:]:
-                if c.confirmed and worth(c, rung.search):
-                    key = rung.structure.plus(c.model).key
-                    found.append((c.evidence / rung.found.ranking[0].evidence, key, rung, c))
-        for _, key, rung, c in sorted(found, key=lambda f: (-f[0], f[1])):
+            followed = rung.next
+            named = {followed.id, *followed.equivalents} if followed is not None else set()
+            ranking = sorted((c for c in rung.found.ranking if c.confirmed), key=lambda c: c.nrmse)
+            rank = 0
+            for c in ranking:
+                if c.id in named or not c.nrmse < SHOWS_HARDLY * rung.found.nrmse:
+                    continue
+                named |= {c.id, *c.equivalents}
+                key = rung.structure.plus(c.model).key
+                found.append(((rank, c.nrmse / rung.found.nrmse, key), rung, c))
+                rank += 1
+        for (_, _, key), rung, c in sorted(found, key=lambda f: f[0]):
             if key not in self.rungs:
                 yield rung, c
 
     def _again(self, end: Rung, rung: Rung, effect: CandidateEffect) -> Rung | None:
-        """Climb from a rival of an earlier step; return where that ends if it is better."""
+        """Ask of the model with a rival of an earlier step; return it if it, or what follows, is better."""
         structure = self._beside(rung, effect).structure
         if structure.key in self.rungs:
             return None
@@ -218,17 +228,18 @@ class Climb:
         how = {
             "dropped": tuple(e for e in gone if e not in new),
             "instead": tuple(e for e in new if e not in gone),
-            "evidence": effect.evidence - rung.found.ranking[0].evidence,
+            "evidence": effect.evidence - max(rung.found.ranking[0].evidence, 0.0),
         }
-        # one effect more has to show that it leads anywhere
-        other = self._up(structure, end.steps, how, 1)
-        return self._on(other) if self._beats(other, end) else None
+        other = self._rung(structure, end.steps, how)
+        following = other.next
+        ahead = other.structure.block if following is None else following.model
+        return other if self._beats(ahead, end.structure.block, other.search) else None
 
-    def _beats(self, other: Rung, end: Rung) -> bool:
-        """Whether another end does better, on the data that judged it."""
-        fits = [other.search.fitted(r.structure.block, self.free(r.structure.block), 6) for r in (end, other)]
-        judged = other.search.ranked(fits[0], [replace(fits[1], extra=fits[1].extra - fits[0].extra)])[0]
-        return judged.evidence > other.search.significant
+    def _beats(self, block, end, search: Search) -> bool:
+        """Whether a model does better than the end of the ladder, on the data of a search."""
+        fits = [search.fitted(b, self.free(b), 6) for b in (end, block)]
+        judged = search.ranked(fits[0], [replace(fits[1], extra=fits[1].extra - fits[0].extra)])[0]
+        return judged.evidence > search.significant
 
     # --- what is known --------------------------------------------------------------------------------
 
