@@ -159,6 +159,13 @@ FILTERED = 40
 MANY_SEGMENTS = 50
 """Segments of a record from which on they tell how their errors go on from one to the next."""
 
+HORIZONS = 8
+"""Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
+shortest."""
+
+SHORTEST_HORIZON = 0.25
+"""The shortest, in to-and-fro motions: over less the fitted position and speed follow nearly anything."""
+
 HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
 
@@ -187,7 +194,11 @@ POINTS, POINTS_COSTLY = 20, 10
 """Points of a table for the first look, and for effects whose orbits take many times as long."""
 
 RIVALS = 2
-"""Candidates of a step of a ladder that are tried again when a later step is taken."""
+"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
+
+BRANCHES = 3
+"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
+hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
 
 BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
 """Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load

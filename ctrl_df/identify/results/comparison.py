@@ -15,6 +15,7 @@ from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
 from ..residuals.comparison_base import ComparisonBase
+from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..residuals.regions import Regions, error_regions
 from ..residuals.residual_tests import (
     InputTest,
@@ -193,6 +194,14 @@ class Comparison(ComparisonBase):
     def missing_force(self) -> MissingForce:
         """The force that would have to be added for the model to follow the worst record."""
         return self.worst.missing_force
+
+    @cached_property
+    def error_by_horizon(self) -> ErrorByHorizon:
+        """Error of free prediction against its length, up to the whole record; seconds.
+
+        `ErrorByHorizon.plot` draws it, several models in one picture.
+        """
+        return error_by_horizon(self.model, [r.record for r in self.records])
 
     @property
     def windows(self) -> int:

@@ -141,11 +141,18 @@ class TableSearch(Search):
                 some = fewer if c.costly else few
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
-        found = [self._trial(*r, work=WORK_MEDIUM) for r in run(try_effect, jobs) if r is not None]
+        found = []
+        self.course.stage(f"{len(jobs)} effects tried on some points")
+        for r in run(try_effect, jobs):
+            self.course.done()
+            if r is not None:
+                found.append(self._trial(*r, work=WORK_MEDIUM))
+                self.course.known(self.ranked(self.base, found))
         return self.ranked(self.base, found)
 
     def confirm(self, found):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
+        self.course.stage("the best fitted to all points")
         best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
@@ -213,6 +220,16 @@ class TableSearch(Search):
     def standard_errors(self, judged):
         """Return the standard errors of a candidate fitted to all points."""
         return uncertainty(judged.fitted)[1] if judged.confirmed else {}
+
+    def determined(self, judged):
+        """Whether every parameter of the newest effect is known to better than its size, and in its range."""
+        if not judged.confirmed:
+            return False
+        own, fitted = judged.block.newest + ".", judged.fitted
+        table = fitted.block.parameters
+        named = [v for v in fitted.variables if v.name.startswith(own)]
+        doubtful = uncertainty(fitted)[2]
+        return not any(v.name in doubtful or table[v.name].value in (v.lower, v.upper) for v in named)
 
     # --- what it comes to -----------------------------------------------------------------------------
 
