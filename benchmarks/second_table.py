@@ -40,10 +40,9 @@ def table(rows):
     line(
         "the same: among the first three, or in the ambiguous class", "99 %", large, lambda r: r.get("three")
     )
-    line("the same in open loop: first", "", [r for r in large if "facts" in r and not r["facts"]["closed"]],
-         lambda r: r.get("first"))  # fmt: skip
-    line("the same under a PID: first", "", [r for r in large if "facts" in r and r["facts"]["closed"]],
-         lambda r: r.get("first"))  # fmt: skip
+    for closed, where in ((False, "in open loop"), (True, "under a PID")):
+        part = [r for r in large if r.get("facts", {}).get("closed") is closed]
+        line(f"the same {where}: first", "", part, lambda r: r.get("first"))
     line("1.5 to 5 times the noise: right, or honestly ambiguous or none", "95 %", small, honest)
     line("the same: wrong with p > 0.9", "≤ 1 %", small,
          lambda r: r.get("verdict") == "effect" and not r["first"] and r["said"] > 0.9)  # fmt: skip
