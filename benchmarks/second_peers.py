@@ -1,4 +1,4 @@
-"""Peers on the rigs of the second generator: sparse regression, and a grey box over structures picked by hand.
+"""Peers on the rigs of the second generator: sparse regression, a grey box over structures picked by hand.
 
 The regressions see the smoothed motion and the terms of `diagnosis_peers`. The grey box is what one does with
 MATLAB's idnlgrey: for each structure on a list a simulation of the whole record is fitted by least squares
@@ -36,8 +36,8 @@ def lasso(rig):
     penalties = top * np.geomspace(1, 1e-3, 30)
     folds = np.arange(len(target)) * 5 // len(target)
     errors = np.array([
-        [np.mean((target[folds == f] - more[folds == f] @ w) ** 2) for w in _paths(more[folds != f], target[folds != f], penalties)]
-        for f in range(5)
+        [np.mean((target[mine] - more[mine] @ w) ** 2) for w in _paths(more[~mine], target[~mine], penalties)]
+        for mine in (folds == f for f in range(5))
     ])  # fmt: skip
     mean, spread = errors.mean(0), errors.std(0) / math.sqrt(5)
     least = int(np.argmin(mean))
@@ -96,7 +96,8 @@ STRUCTURES = {
     "linear_spring": (("spring", 0.2, True),), "cubic_spring": (("cubic", 0.1, True),),
     "asymmetric_viscous": (("uneven_viscous", 0.05, True),), "input_delay": (("late_in", 0.01, False),),
     "input_lag": (("lag", 0.01, False),), "input_saturation": (("limit", 1.2, False),),
-    "input_dead_zone": (("dead", 0.05, False),), "stribeck": (("more", 0.05, False), ("stribeck_speed", 0.1, False)),
+    "input_dead_zone": (("dead", 0.05, False),),
+    "stribeck": (("more", 0.05, False), ("stribeck_speed", 0.1, False)),
 }  # fmt: skip
 NAMED = {
     "mass": "motor", "inertia": "motor", "coulomb.level": "coulomb", "viscous.coefficient": "viscous",
