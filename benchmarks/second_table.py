@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import binomtest
 
+EDGE = 5.5  # times the noise: what is hidden shows little below, clearly above
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0)
 
 
@@ -21,6 +22,11 @@ def answered(row):
     return "verdict" in row
 
 
+def shown(row):
+    """Return how much of what is hidden shows, in times the noise; nan where nothing is known of the rig."""
+    return row.get("facts", {}).get("shows", [float("nan")])[0]
+
+
 def table(rows):
     """Return the results as markdown."""
     of = {
@@ -33,8 +39,8 @@ def table(rows):
             lines.append(f"| {name} | {demanded} | {share(sum(map(bool, map(key, part))), len(part))} |")
 
     singles = of["single"]
-    small = [r for r in singles if r.get("facts", {}).get("small")]
-    large = [r for r in singles if not r.get("facts", {}).get("small")]
+    small = [r for r in singles if 0 < shown(r) < EDGE]
+    large = [r for r in singles if shown(r) >= EDGE or not answered(r)]
     line("one hidden, all: first", "95 %", singles, lambda r: r.get("first"))
     line("one hidden, over 5 times the noise: first", "95 %", large, lambda r: r.get("first"))
     line(
