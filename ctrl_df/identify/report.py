@@ -69,7 +69,7 @@ $sections
 _ERRORS = {
     "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
-    "model has, such as friction that wanders, are larger here than the noise of the sensor",
+    "model has, such as friction that varies, are larger here than the noise of the sensor",
     "N": "of |N|",
 }
 
