@@ -180,8 +180,9 @@ def _neighbours(neighbours) -> str:
     head = ["Neighbour", "Evidence", "Error", "Held out", "Verdict"]
     near, far = rows[:10], rows[10:]
     told = (
-        "Evidence is over the final model: negative where the data speak against the neighbour. Those without "
-        "a held-out error came nowhere near at a first look over short segments; their evidence is of that."
+        "Evidence is over the final model: negative where the data speak against the neighbour. Those "
+        "without a held-out error came nowhere near at a first look over short segments, of which their "
+        "evidence is."
     )
     parts = [
         "<h2>One exchange away</h2>",
