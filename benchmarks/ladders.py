@@ -2,7 +2,8 @@
 
     python benchmarks/ladders.py [--only PART] [--candidates IDS] [--save FILE]
 
-The whole library unless told otherwise; one line a rig. The rigs are drawn with seeds that no other benchmark or test has.
+The whole library unless told otherwise; one line a rig. The rigs are drawn with seeds that no other benchmark
+or test has.
 """
 
 from __future__ import annotations
