@@ -243,8 +243,15 @@ FINER = 3
 REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 """Travel after a reversal [typical positions] over which a force may build up."""
 
+HIDDEN_RTOL = 1e-6
+"""Tolerance of hidden states under an imposed motion: far below a load cell's noise, and three times as
+fast as seven digits."""
+
 TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 """Sizes of an effect of which nothing is known, over those of the table."""
+
+BALANCED_STARTS = 2
+"""Starts of an effect on a table from which its forces are balanced: sizes apart may balance alike."""
 
 WORK_LOW = {"max_steps": 4_000, "averages": 8}
 WORK_MEDIUM = {"max_steps": 25_000, "averages": 8}
