@@ -1,8 +1,9 @@
 """Ladders to two and three hidden effects, and how often all of them are in the final model.
 
-    python benchmarks/ladders.py [--only PART] [--save FILE]
+    python benchmarks/ladders.py [--only PART] [--candidates IDS] [--save FILE]
 
-The whole library; one line a rig. The rigs are drawn with seeds that no other benchmark or test has.
+The whole library unless told otherwise; one line a rig. The rigs are drawn with seeds that no other benchmark
+or test has.
 """
 
 from __future__ import annotations
@@ -56,14 +57,14 @@ def several(hidden, seed, *, gap=False, **options):
     return rig, rig.baseline.with_effect(cdf.Backlash(**of | {"gap": 1.1 * of["gap"]}))
 
 
-def row(name) -> dict:
+def row(name, candidates=None) -> dict:
     """Return what the ladder comes to on one rig."""
     hidden, seed, options = RIGS[name]
     rig, model = several(hidden, seed, **options)
     free = [k for k, p in model.parameters.items() if p.free and k not in rig.known]
     train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
     wall, processor = time.perf_counter(), time.process_time()
-    study = cdf.improve(model, train, held, free=free)
+    study = cdf.improve(model, train, held, free=free, candidates=candidates)
     seconds = time.perf_counter() - wall, time.process_time() - processor
     ids = [e.id for e in study.model.effects[len(model.effects) :]]
     found = [h for h in hidden if {h, *rig.equivalents.get(h, ())} & set(ids)]
@@ -79,12 +80,13 @@ def main() -> None:
     """Print a line a rig, and how many were right."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--only", default="")
+    parser.add_argument("--candidates", default="", help="ids, by commas")
     parser.add_argument("--save", default="")
     args = parser.parse_args()
     rows = []
     for name in (n for n in RIGS if args.only in n):
         try:
-            rows.append(row(name))
+            rows.append(row(name, args.candidates.split(",") if args.candidates else None))
         except Exception as reason:
             rows.append(dict(name=name, right=False, found=[repr(reason)], wall=0.0, processor=0.0))
         r = rows[-1]

@@ -55,10 +55,15 @@ class Step:
         return [*(("-", d) for d in self.dropped), *(("+", d) for d in self.instead)]
 
     @property
-    def name(self) -> str:
-        """What the step did, in signs."""
+    def signs(self) -> tuple[str, ...]:
+        """What the step did: every id with its sign; none for the refitted start."""
         added = [f"+ {self.effect}"] if self.effect else []
-        return " ".join([*added, *(f"{sign} {key}" for sign, key in self.changes)]) or "refitted"
+        return (*added, *(f"{sign} {key}" for sign, key in self.changes))
+
+    @property
+    def name(self) -> str:
+        """The same in one line."""
+        return " ".join(self.signs) or "refitted"
 
     @property
     def sentence(self) -> str:

@@ -127,15 +127,13 @@ class Neighbours(Sequence):
             )
         return " ".join(found)
 
-    def table(self, rows: int = 8) -> Table:
-        """Return the nearest ones as a table."""
+    def table(self, rows: int = 5) -> Table:
+        """Return the final model and the nearest ones as a table."""
         lines = [("final model", "", _percent(self.nrmse), _percent(self.nrmse_holdout), "")]
         for n in self.rows[:rows]:
             errors = _percent(n.nrmse), _percent(n.nrmse_holdout)
             lines.append((_told(n), f"{n.evidence:.0f}", *errors, n.verdict))
-        return Table(
-            ("neighbour", "evidence", "error", "held out", "verdict"), tuple(lines), (60, 12, 12, 12, 12)
-        )
+        return Table(("neighbour", "evidence", "error", "held out", "verdict"), tuple(lines), 60)
 
     def to_pandas(self):
         """Return one row a neighbour as a pandas DataFrame."""
