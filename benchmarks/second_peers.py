@@ -4,16 +4,24 @@ The regressions see the smoothed motion and the terms of `diagnosis_peers`. The 
 MATLAB's idnlgrey: for each structure on a list a simulation of the whole record is fitted by least squares
 (initial place and speed too), and the least criterion of Schwarz wins. Its simulator is that of the generator
 itself, events and all, which is more than MATLAB has. Each returns the ids it would name.
+
+    python benchmarks/second_peers.py [--single 0:58] [--nothing 0:14]
+
+runs them alone.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
+import warnings
 
 import numpy as np
+import rigs_second as rigs
 import second_physics as physics
 from diagnosis_peers import BASE, terms
 from scipy.optimize import least_squares
+from second_table import share
 
 
 def _columns(record):
@@ -157,3 +165,36 @@ def grey_box(rig):
 
 
 PEERS = {"LASSO": lasso, "sparse regression (SINDy)": sindy, "grey box": grey_box}
+
+
+def told(peer, rig):
+    """Return whether a peer names what is hidden, or nothing where nothing is."""
+    try:
+        named = set(peer(rig))
+    except (ValueError, ArithmeticError, IndexError):
+        named = {"failed"}
+    return bool(named & rig.accepted[rig.hidden[0]]) if rig.hidden else not named
+
+
+def main(arguments=None):
+    """Run the peers on rigs and print how often they are right."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    for kind in ("single", "nothing"):
+        parser.add_argument(f"--{kind}", default="0:0")
+    args = parser.parse_args(arguments)
+    for kind in ("single", "nothing"):
+        low, high = map(int, getattr(args, kind).split(":"))
+        right: dict[str, list[bool]] = {name: [] for name in PEERS}
+        for number in range(low, high):
+            rig = rigs.rig(kind, number)
+            for name, peer in PEERS.items():
+                right[name].append(told(peer, rig))
+            print(kind, number, rig.hidden, {k: v[-1] for k, v in right.items()}, flush=True)
+        for name, those in right.items():
+            if those:
+                print(f"| {name} | {kind} | {share(sum(those), len(those))} |")
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    main()
