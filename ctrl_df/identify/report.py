@@ -130,7 +130,8 @@ def _pictures(study):
         if parts and len(study.steps) == 1:
             break
         comparison = compare(model, record)
-        caption = f"{name}, on {record.name}. {comparison.where.sentences[0]}"
+        error = f"Over {comparison.over} it errs by {_percent(comparison.nrmse)}"
+        caption = f"{name}, on {record.name}. {error}. {comparison.where.sentences[0]}"
         parts.append(_picture(lambda c=comparison, n=name, **size: c.plot(title=n, **size), caption))
     return parts
 
