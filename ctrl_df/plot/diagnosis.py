@@ -6,6 +6,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..identify.results.diagnosis import rivals
 from .labels import settle
 from .page import MODEL, OTHER, QUIET, page
 
@@ -33,8 +34,14 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> 
 
 
 def verdict_title(diagnosis, title) -> str:
-    """Return the title given, or the verdict."""
-    return f"Verdict: {diagnosis.verdict}" if title is None else title
+    """Return the title given, or the verdict in words."""
+    if title is not None:
+        return title
+    if diagnosis.verdict not in ("effect", "ambiguous") or not diagnosis.ranking:
+        return {"none": "Nothing missing"}.get(diagnosis.verdict, "Missing: something outside the library")
+    open_ones = rivals(diagnosis.ranking) if diagnosis.verdict == "ambiguous" else []
+    names = [c.id.replace("_", " ") for c in (diagnosis.ranking[0], *open_ones)]
+    return f"Missing: {' or '.join(dict.fromkeys(names))}"
 
 
 def draw_ranking(ax, diagnosis, rows):
