@@ -99,7 +99,7 @@ def render(study) -> str:
     """Return the report as HTML text."""
     names = ", ".join(_record(r) for r in study.train)
     held = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
-    fit = _known(study)
+    fit, drawn = _known(study), _drawn(study)
     return _PAGE.substitute(
         title=html.escape(f"What the model of {study.train[0].name} was missing"),
         records=html.escape(f"Fitted to {names}. Held out: {held}."),
@@ -108,11 +108,12 @@ def render(study) -> str:
         how=html.escape(
             "Each step adds the effect that explains most of what is left, and refits everything. It stays "
             "only if the error on data it was not fitted to falls too. Errors are rms "
-            f"{_ERRORS[study.measure]}."
+            f"{_ERRORS[study.measure]}; those as drawn are nrmse {_how(drawn[0])}, of "
+            f"{_shown(study).name} alone."
         ),
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
-        steps=_steps(study),
-        pictures=_pictures(study),
+        steps=_steps(study, drawn),
+        pictures=_pictures(study, drawn),
         model=html.escape(
             "A standard error is how far the value may be off by chance alone; two of them hold 95 % of the "
             "time if the structure is right."
@@ -146,34 +147,54 @@ def _known(study):
         return None
 
 
-def _steps(study):
-    rows = []
-    for s in study.steps:
+def _shown(study):
+    """Return the record of the pictures: one held out, or fitted."""
+    return (study.holdout or study.train)[0]
+
+
+def _drawn(study) -> list:
+    """Return the first and the last model beside the record of the pictures."""
+    from .compare import compare
+
+    models = [study.steps[0].model, study.model][: len(study.steps)]
+    return [compare(model, _shown(study)) for model in models]
+
+
+def _how(comparison) -> str:
+    """Return what a comparison runs freely over."""
+    mode = getattr(comparison, "mode", "")
+    whole = "over a free run of the whole record"
+    return {"free": whole, "windows": f"over {getattr(comparison, 'windows', 0)} windows"}.get(mode, "of |N|")
+
+
+def _steps(study, drawn):
+    """Return the table of the steps; `drawn`: the comparisons of the pictures, whose numbers it repeats."""
+    rows, last = [], len(study.steps) - 1
+    for i, s in enumerate(study.steps):
         name = "+ " + s.effect.replace("_", " ") if s.effect else "start, refitted"
         name += "".join(f"; without {d.replace('_', ' ')}" for d in s.dropped)
         name += "".join(f", {d.replace('_', ' ')} in its place" for d in s.instead)
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
         evidence = f"{s.evidence:,.0f}" if s.effect else "–"
-        rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), evidence, same])
-    rows.append(["noise floor", _percent(study.noise), "", "", ""])
-    return _table(["Step", "Error", "Held out", "Evidence", "Same on these data"], rows, numeric=(1, 2, 3))
+        seen = _percent(drawn[0 if i == 0 else -1].nrmse) if i in (0, last) else "–"
+        rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), seen, evidence, same])
+    rows.append(["noise floor", _percent(study.noise), "", "", "", ""])
+    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Same on these data"]
+    return _table(head, rows, numeric=(1, 2, 3, 4))
 
 
 def _percent(value) -> str:
     return f"{100 * value:.3g} %" if math.isfinite(value) else "–"
 
 
-def _pictures(study):
-    """Compare the first and the last model with the record held out, or the training record."""
-    from .compare import compare
-
-    record = (study.holdout or study.train)[0]
+def _pictures(study, drawn):
+    """Draw the first and the last model beside the record held out, or the training record."""
     parts = []
-    for model, name in ((study.steps[0].model, "The start, refitted"), (study.model, "The improved model")):
-        if parts and len(study.steps) == 1:
-            break
-        comparison = compare(model, record)
-        caption = f"{name}, on {record.name}. {comparison.where.sentences[0]}"
+    for comparison, name in zip(drawn, ("The start, refitted", "The improved model"), strict=False):
+        caption = (
+            f"{name}, on {_shown(study).name}: it errs by {_percent(comparison.nrmse)} {_how(comparison)}. "
+            f"{comparison.places[0]}"
+        )
         parts.append(_picture(lambda c=comparison, n=name: c.plot(title=n), caption, caption=True))
     return "\n".join(parts)
 

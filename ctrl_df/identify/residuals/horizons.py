@@ -108,7 +108,7 @@ def _fitted(model, records, parts, thin, begins, shorter) -> FitResult:
     """Fit where stretches begin: roughly from those of shorter ones, then once at the full rate."""
     segments = [cut(r, parts) for r in records]
     near: Any = same_begins(shorter[-1], segments) if shorter else None
-    for rate, iterations in ((4 * thin, 3 if shorter else 8), (thin, 1)):
+    for rate, iterations in ((4 * thin, 3 if shorter else 8), (thin, 2)):
         found = fit_segments(
             model, records, segments, (), thin=rate, starts=near, iterations=iterations, tolerance=1e-2,
             begins=begins,

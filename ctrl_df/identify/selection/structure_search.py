@@ -329,13 +329,16 @@ class StructureSearch(Search):
         fit = judged.train
         if not judged.confirmed or not len(fit.covariance):
             return ()
+        # a bound that the records prove, where a body has been, is what they tell of the parameter
+        proved = {f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.data.filtered)}
         at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
-        doubtful = at_bound | blurred(fit)
-        own = own_names(judged.block)
-        if own and fit.standard_errors.get(own[0], 0.0) > SIZE_KNOWN * abs(
-            fit.parameters.get(own[0], math.inf)
-        ):
-            doubtful.add(own[0])  # the size of an effect is measured by itself
+        doubtful = (at_bound - proved) | blurred(fit)
+        # a static level is found by trying, as single samples pass it: slopes know nothing of it
+        table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
+        own = [k for k in own_names(judged.block) if not table[k].threshold]
+        # the size of an effect, its first parameter, is measured by itself
+        size = set(own_names(judged.block)[:1]).intersection(own)
+        doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
     def predicted(self, judged):
