@@ -48,16 +48,17 @@ def render(study) -> str:
     page = Environment(loader=folder, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     names = ", ".join(_record(r) for r in study.train)
     held = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
-    fit = _known(study)
+    fit, drawn = _known(study), _drawn(study)
     return page.get_template("report.html").render(
         title=f"What the model of {study.train[0].name} was missing",
         records=f"Fitted to {names}. Held out: {held}.",
         verdict=_VERDICTS[study.verdict],
         lead=study.summary().split("\n")[0],
         errors=_ERRORS[study.measure],
+        as_drawn=f"over {drawn[0].over}, of {_shown(study).name} alone",
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
-        steps=_steps(study),
-        pictures=_pictures(study),
+        steps=_steps(study, drawn),
+        pictures=_pictures(study, drawn),
         parameters=_parameters(study, fit),
         doubts=fit.unidentifiable if fit else (),
         neighbours=_neighbours(study.neighbours),
@@ -84,15 +85,30 @@ def _known(study):
         return None
 
 
-def _steps(study):
-    rows = []
-    for s in study.steps:
-        name = _did(s)
+def _shown(study):
+    """Return the record of the pictures: one held out, or fitted."""
+    return (study.holdout or study.train)[0]
+
+
+def _drawn(study) -> list:
+    """Return the first and the last model beside the record of the pictures."""
+    from .compare import compare
+
+    models = [study.steps[0].model, study.model][: len(study.steps)]
+    return [compare(model, _shown(study)) for model in models]
+
+
+def _steps(study, drawn):
+    """Return the table of the steps; `drawn`: the comparisons of the pictures, whose numbers it repeats."""
+    rows, last = [], len(study.steps) - 1
+    for i, s in enumerate(study.steps):
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
         evidence = f"{s.evidence:,.0f}" if s.effect or s.changes else "–"
-        rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), evidence, same])
-    rows.append(["noise floor", _percent(study.noise), "", "", ""])
-    return _table(["Step", "Error", "Held out", "Evidence", "Same on these data"], rows, numeric=(1, 2, 3))
+        seen = _percent(drawn[0 if i == 0 else -1].nrmse) if i in (0, last) else "–"
+        rows.append([_did(s), _percent(s.nrmse), _percent(s.nrmse_holdout), seen, evidence, same])
+    rows.append(["noise floor", _percent(study.noise), "", "", "", ""])
+    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Same on these data"]
+    return _table(head, rows, numeric=(1, 2, 3, 4))
 
 
 def _did(step) -> str:
@@ -120,18 +136,14 @@ def _percent(value) -> str:
     return f"{100 * value:.3g} %" if math.isfinite(value) else "–"
 
 
-def _pictures(study):
-    """Compare the first and the last model with the record held out, or the training record."""
-    from .compare import compare
-
-    record = (study.holdout or study.train)[0]
+def _pictures(study, drawn):
+    """Draw the first and the last model beside the record held out, or the training record."""
     parts = []
-    for model, name in ((study.steps[0].model, "The start, refitted"), (study.model, "The improved model")):
-        if parts and len(study.steps) == 1:
-            break
-        comparison = compare(model, record)
-        error = f"Over {comparison.over} it errs by {_percent(comparison.nrmse)}"
-        caption = f"{name}, on {record.name}. {error}. {comparison.where.sentences[0]}"
+    for comparison, name in zip(drawn, ("The start, refitted", "The improved model"), strict=False):
+        caption = (
+            f"{name}, on {_shown(study).name}: it errs by {_percent(comparison.nrmse)} over {comparison.over}. "
+            f"{comparison.places[0]}"
+        )
         parts.append(_picture(lambda c=comparison, n=name, **size: c.plot(title=n, **size), caption))
     return parts
 

@@ -239,7 +239,7 @@ class Comparison(ComparisonBase):
                 )
             )
         if self.where:
-            lines += ["", *self.where.sentences[:6], "", self.where.table(8)]
+            lines += ["", *self.places[:6], "", self.where.table(8)]
         return "\n".join(lines)
 
     def __str__(self) -> str:

@@ -100,7 +100,7 @@ class FrequencyComparison(ComparisonBase):
         lines = [str(self)]
         if len(self.records) > 1:
             lines += [f"  {r.record.name:<24} nrmse {r.nrmse:.4g}" for r in self.records]
-        return "\n".join([*lines, "", *self.where.sentences[:6], "", self.where.table(8)])
+        return "\n".join([*lines, "", *self.places[:6], "", self.where.table(8)])
 
     def __str__(self) -> str:
         """Return it as text."""
