@@ -9,7 +9,7 @@ from typing import Any
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..thresholds import RIVALS, RULED_OUT
 from .search import Search
-from .structure import Structure, parameters_of, plainness
+from .structure import Structure, exchanged, parameters_of, plainness
 from .verdict import worth
 
 
@@ -125,6 +125,13 @@ class Around:
             errors = c.nrmse, c.nrmse_holdout
             self.far.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
 
+    def add_again(self, effects) -> None:
+        """Begin effects besides with values that they had at earlier steps."""
+        for effect in effects:
+            block = exchanged(self.structure.block, effect)
+            if block is not None:
+                self.fit(Trial(ADD, (), effect.id, self.structure.plus(block)))
+
     # --- what they come to ----------------------------------------------------------------------------
 
     def _judged(self) -> list[tuple[Trial, Any]]:
@@ -147,7 +154,9 @@ class Around:
     def _verdict(self, trial: Trial, t) -> str:
         """Return how a neighbour does: what has an effect more needs the evidence of any effect."""
         fewer = len(trial.dropped) > bool(trial.added)
-        if t.evidence > self.search.significant:
+        more = len(trial.dropped) < bool(trial.added)
+        alone = t.evidence_validation > self.search.significant_validation
+        if t.evidence > self.search.significant and (alone or not more):
             return BETTER
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
 
