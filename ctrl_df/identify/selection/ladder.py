@@ -160,12 +160,15 @@ class Climb:
 
     def _settled(self, end: Rung) -> tuple[Rung, Neighbours]:
         """Go on to better neighbours until there are none."""
+        refound: set[tuple[str, ...]] = set()
         for _ in range(self.max_effects):
             around, table = self._around(end)
-            better = around.better(self.rungs)
+            better = around.better(self.rungs, end.structure.key not in refound)
             if better is None:
                 return end, table
             structure, how = better
+            if structure.key == end.structure.key:
+                refound.add(structure.key)
             end = self._up(structure, end.steps, _exchanged(how))
         return end, self._around(end)[1]
 
@@ -288,6 +291,8 @@ def _added(effect: CandidateEffect) -> dict:
 
 
 def _exchanged(n: Neighbour) -> dict:
+    if n.dropped == (n.added,):  # the same in a better minimum
+        return {"evidence": n.evidence}
     if n.change == ADD:
         return {"effect": n.added, "evidence": n.evidence}
     return {"dropped": n.dropped, "instead": (n.added,) if n.added else (), "evidence": n.evidence}

@@ -58,7 +58,7 @@ class Around:
 
     def __init__(self, structure: Structure, search: Search, free: Callable):
         self.structure, self.search, self.free = structure, search, free
-        self.own = self._fitted(structure.block, 4)
+        self.own = self._fitted(structure.block, 8)
         self.near: list[tuple[Trial, Any]] = []
         self.far: list[Neighbour] = []
 
@@ -141,7 +141,8 @@ class Around:
 
     def rows(self) -> tuple[Neighbour, ...]:
         """Return all of them, those that were fitted first, by evidence."""
-        near = [self._told(trial, t) for trial, t in self._judged()]
+        others = [(trial, t) for trial, t in self._judged() if trial.structure.key != self.structure.key]
+        near = [self._told(trial, t) for trial, t in others]
         return tuple(sorted([*near, *self.far], key=lambda n: (not n.refitted, -n.evidence)))
 
     def _told(self, trial: Trial, t) -> Neighbour:
@@ -160,16 +161,17 @@ class Around:
             return BETTER
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
 
-    def better(self, known) -> tuple[Structure, Neighbour] | None:
+    def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:
         """Return the neighbour to go to: the best of those that do better, else the plainest of the equals.
 
-        `known`: keys of structures that the ladder has been at.
+        `known`: keys of structures that the ladder has been at; `again`: whether the model itself with other
+        values, in a better minimum, may be one.
         """
         found = []
         for trial, t in self._judged():
             verdict = self._verdict(trial, t)
-            again = trial.dropped == (trial.added,)
-            if trial.given or verdict == WORSE or (trial.structure.key in known and not again):
+            same = trial.structure.key == self.structure.key
+            if trial.given or verdict == WORSE or not (again if same else trial.structure.key not in known):
                 continue
             structure = trial.structure.at(t.block)
             if verdict == EQUAL and _plain(structure) >= _plain(self.structure):
