@@ -4,30 +4,39 @@ The regressions see the smoothed motion and the terms of `diagnosis_peers`. The 
 MATLAB's idnlgrey: for each structure on a list a simulation of the whole record is fitted by least squares
 (initial place and speed too), and the least criterion of Schwarz wins. Its simulator is that of the generator
 itself, events and all, which is more than MATLAB has. Each returns the ids it would name.
+
+    python benchmarks/second_peers.py [--single 0:58] [--nothing 0:14]
+
+runs them alone.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
+import warnings
 
 import numpy as np
+import rigs_second as rigs
 import second_physics as physics
-from diagnosis_peers import BASE, terms
+from diagnosis_peers import terms
 from scipy.optimize import least_squares
+from second_table import share
 
 
-def _columns(record):
+def _columns(rig):
     """Return the target, the columns the model has, and those it might lack, where the mass moves."""
-    force, columns, good = terms(record)
-    base = np.column_stack([columns[k][good] for k in BASE])
-    extra = [k for k in columns if k not in BASE]
+    force, columns, good = terms(rig.train)
+    known = {"mass", *(e.id for e in rig.baseline.effects)} & set(columns)
+    base = np.column_stack([columns[k][good] for k in columns if k in known])
+    extra = [k for k in columns if k not in known]
     more = np.column_stack([columns[k][good] for k in extra])
     return force[good], base, extra, more
 
 
 def lasso(rig):
     """LASSO on what the base terms leave of the force; its penalty by five folds, one standard error up."""
-    force, base, extra, more = _columns(rig.train)
+    force, base, extra, more = _columns(rig)
     q, _ = np.linalg.qr(base / np.linalg.norm(base, axis=0))
     target, more = force - q @ (q.T @ force), more - q @ (q.T @ more)
     more /= np.std(more, axis=0) + 1e-300
@@ -66,7 +75,7 @@ def _paths(matrix, target, penalties):
 
 def sindy(rig):
     """Sparse regression of the force, sequentially thresholded; the threshold by a third held out."""
-    force, base, extra, more = _columns(rig.train)
+    force, base, extra, more = _columns(rig)
     matrix = np.column_stack([base, more])
     size = np.linalg.norm(matrix, axis=0) + 1e-300
     matrix, target = matrix / size, force / np.linalg.norm(force)
@@ -78,13 +87,13 @@ def sindy(rig):
             w = np.zeros(matrix.shape[1])
             w[kept] = np.linalg.lstsq(matrix[~held][:, kept], target[~held], rcond=1e-10)[0]
             now = kept & (np.abs(w) > threshold)
-            now[: len(BASE)] = True
+            now[: base.shape[1]] = True
             if np.array_equal(now, kept):
                 break
             kept = now
         error = np.mean((target[held] - matrix[held] @ w) ** 2) * (1 + 0.01 * kept.sum())
         if error < best:
-            weights = np.abs(w[len(BASE) :])
+            weights = np.abs(w[base.shape[1] :])
             best, told = error, ((extra[int(np.argmax(weights))],) if np.any(weights > 0) else ())
     return told
 
@@ -130,7 +139,7 @@ def grey_box(rig):
             full["static"] = full.get("coulomb", 0.0) + full.pop("more")
         for name, value in full.items():
             p[physics.AT[name]] = value
-        h = max(physics.longest_step(p, tick, 10.0, 30.0, 3.0), tick / 20)
+        h = max(physics.longest_step(p, tick, 10.0, 30.0, 3.0), tick / 4)
         y0 = np.zeros(8)
         y0[:2] = values[:2]
         x = physics.run(
@@ -149,7 +158,7 @@ def grey_box(rig):
         scale = np.maximum(np.abs(values), [1.0, 1.0, *np.full(len(values) - 2, 1e-3)])
         fit = least_squares(
             simulated, np.maximum(values, low + 1e-9), "2-point", (low, np.inf), x_scale=scale,
-            diff_step=1e-5, max_nfev=20, args=(more,),
+            diff_step=1e-5, max_nfev=12, args=(more,),
         )  # fmt: skip
         scores[name] = len(y) * math.log(2 * fit.cost / len(y)) + len(values) * math.log(len(y))
     best = min(scores, key=lambda k: scores[k])
@@ -157,3 +166,36 @@ def grey_box(rig):
 
 
 PEERS = {"LASSO": lasso, "sparse regression (SINDy)": sindy, "grey box": grey_box}
+
+
+def told(peer, rig):
+    """Return whether a peer names what is hidden, or nothing where nothing is."""
+    try:
+        named = set(peer(rig))
+    except (ValueError, ArithmeticError, IndexError):
+        named = {"failed"}
+    return bool(named & rig.accepted[rig.hidden[0]]) if rig.hidden else not named
+
+
+def main(arguments=None):
+    """Run the peers on rigs and print how often they are right."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    for kind in ("single", "nothing"):
+        parser.add_argument(f"--{kind}", default="0:0")
+    args = parser.parse_args(arguments)
+    for kind in ("single", "nothing"):
+        low, high = map(int, getattr(args, kind).split(":"))
+        right: dict[str, list[bool]] = {name: [] for name in PEERS}
+        for number in range(low, high):
+            rig = rigs.rig(kind, number)
+            for name, peer in PEERS.items():
+                right[name].append(told(peer, rig))
+            print(kind, number, rig.hidden, {k: v[-1] for k, v in right.items()}, flush=True)
+        for name, those in right.items():
+            if those:
+                print(f"| {name} | {kind} | {share(sum(those), len(those))} |")
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    main()
