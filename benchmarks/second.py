@@ -5,9 +5,9 @@
 
 Each rig is one line of FILE; a second run goes on from there, ``--table`` only prints. One process works; a
 rig that takes more processor time than the limit [s] is stopped and counts as a miss. A miss is told with its
-cause: ``not screened`` (the right effect is not among the candidates confirmed), ``bad optimum`` (its fit errs
-more than the true structure fitted from the truth does), ``lost on evidence``, ``refused`` (it comes first, the
-verdict denies it), ``stopped``.
+cause: ``not screened`` (the right effect is not among the candidates confirmed), ``bad optimum`` (its fit
+errs more than the true structure fitted from the truth does), ``lost on evidence``, ``refused`` (it comes
+first, the verdict denies it), ``stopped``.
 """
 
 from __future__ import annotations
