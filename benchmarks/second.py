@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import multiprocessing
 import os
 import sys
@@ -86,6 +87,11 @@ def _one(rig):
     return row, found.model if best is None else best.model
 
 
+def _apart(a, b, turns):
+    """Return how far two values lie apart; angles of a wave by the shorter way round."""
+    return abs(math.remainder(a - b, 2 * math.pi)) if turns else abs(a - b)
+
+
 def _held_values(rig, found):
     """Return for each parameter of the effect found how many standard errors it is off."""
     truth = rig.truth.named_effects[rig.truth.newest]
@@ -93,7 +99,8 @@ def _held_values(rig, found):
     for name, error in found.errors.items():
         value = getattr(truth, name, None)
         if value is not None and np.isfinite(error) and error > 0:
-            off.append(abs(found.parameters[name] - value) / error)
+            turns = truth.parameters[name].unit == "rad" or name == "angle0"
+            off.append(_apart(found.parameters[name], value, turns) / error)
     return off
 
 
@@ -118,7 +125,7 @@ def _beside_truth(rig, model, right):
     true_values = {k: p.value for k, p in rig.truth.parameters.items()}
     row: dict = dict(
         off=[
-            abs(p.value - true_values[k]) / p.standard_error
+            _apart(p.value, true_values[k], k.endswith((".phase", ".angle0"))) / p.standard_error
             for k, p in truth.parameters.items()
             if p.identifiable and not p.at_bound and np.isfinite(p.standard_error) and p.standard_error > 0
         ]
