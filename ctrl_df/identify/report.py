@@ -16,8 +16,6 @@ _ERRORS = {
     "N": "of |N|",
 }
 
-_WIDTH = 8.0  # of pictures [in]
-
 _VERDICTS = {"none": "nothing missing", "effect": "found", "unknown": "something remains"}
 
 
@@ -141,8 +139,8 @@ def _pictures(study, drawn):
     parts = []
     for comparison, name in zip(drawn, ("The start, refitted", "The improved model"), strict=False):
         caption = (
-            f"{name}, on {_shown(study).name}: it errs by {_percent(comparison.nrmse)} over {comparison.over}. "
-            f"{comparison.places[0]}"
+            f"{name}, on {_shown(study).name}: it errs by {_percent(comparison.nrmse)} over "
+            f"{comparison.over}. {comparison.places[0]}"
         )
         parts.append(_picture(lambda c=comparison, n=name, **size: c.plot(title=n, **size), caption))
     return parts
@@ -193,7 +191,7 @@ def _picture(draw, text) -> dict:
     open_before = plt.get_fignums()
     buffer = io.BytesIO()
     try:
-        draw(width=_WIDTH).figure.savefig(buffer, format="png", dpi=130)
+        draw(width=8.0).figure.savefig(buffer, format="png", dpi=130)
     finally:
         for number in set(plt.get_fignums()) - set(open_before):
             plt.close(number)
