@@ -202,15 +202,18 @@ class Climb:
         return Look(less, search.rivals(model, self.free(model), self.classes, self.executor), search.errors)
 
     def _seen(self, end: Rung) -> list[Effect]:
-        """Return effects that left less error at an earlier step, with the values they had there."""
-        found: dict[str, CandidateEffect] = {}
-        for rung in self.rungs.values():
-            for c in rung.found.ranking if rung is not end else ():
-                if c.confirmed and c.nrmse < min(
-                    rung.found.nrmse, found[c.id].nrmse if c.id in found else math.inf
-                ):
-                    found[c.id] = c
-        return [c.effect for c in sorted(found.values(), key=lambda c: c.nrmse)[:CONFIRMED]]
+        """Return effects that left less error at an earlier step, with the values of the last such one."""
+        found: dict[str, Effect] = {}
+        for rung in reversed([r for r in self._way(end) if r is not end]):
+            ranking = sorted(rung.found.ranking, key=lambda c: c.nrmse)
+            for c in ranking:
+                if c.confirmed and c.nrmse < rung.found.nrmse:
+                    found.setdefault(c.id, c.effect)
+        return list(found.values())[:CONFIRMED]
+
+    def _way(self, end: Rung) -> list[Rung]:
+        """Return the rungs that led to an end, it included."""
+        return [r for r in self.rungs.values() if any(r.steps[-1] is s for s in end.steps)]
 
     # --- again from below -----------------------------------------------------------------------------
 
@@ -220,7 +223,7 @@ class Climb:
         Within a step by the error left: of several effects that are missing none need show by itself.
         """
         found = []
-        for rung in [r for r in self.rungs.values() if any(r.steps[-1] is s for s in end.steps)]:
+        for rung in self._way(end):
             followed = rung.next
             named = {followed.id, *followed.equivalents} if followed is not None else set()
             ranking = sorted((c for c in rung.found.ranking if c.confirmed), key=lambda c: c.nrmse)

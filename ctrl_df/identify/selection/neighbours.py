@@ -189,15 +189,8 @@ def _plain(structure: Structure) -> tuple:
 
 def _row(change, dropped, added, evidence, errors, verdict, refitted, block, given=False) -> Neighbour:
     values = {k: p.value for k, p in block.parameters.items()}
+    nrmse, held = errors
     return Neighbour(
-        change,
-        tuple(dropped),
-        added,
-        float(evidence),
-        *map(float, errors),
-        verdict,
-        refitted,
-        given,
-        values,
-        block,
-    )
+        change, tuple(dropped), added, float(evidence), float(nrmse), float(held), verdict, refitted, given,
+        values, block,
+    )  # fmt: skip
