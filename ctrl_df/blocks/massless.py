@@ -14,7 +14,7 @@ IMPOSED_ROLES = ("force", "friction", "presliding", "contact")
 
 
 def without_answer(effects) -> str | None:
-    """Return why an effect says nothing of the force under an imposed motion; None: all of them do."""
+    """Return why one of these effects, or classes, gives no force under an imposed motion; None: all do."""
     for effect in effects:
         if effect.role not in IMPOSED_ROLES or effect.side == "load":
             return f"{effect.id} acts between a driving force and a free mass"

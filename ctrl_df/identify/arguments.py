@@ -178,8 +178,8 @@ def _check_imposed(block, records, closed) -> None:
                 raise ValueError(
                     f"under an imposed motion this model takes {_article(moves.position)} [{moves.unit}] and "
                     f"gives {_article(moves.force)} [{moves.force_unit}]; the {what} of {record.name!r} is "
-                    f"in {there or 'no unit'}. State {what}_unit= as it was recorded; for a record of force in, "
-                    "motion out give the block a mass."
+                    f"in {there or 'no unit'}. State {what}_unit= as it was recorded; for a record of force "
+                    "in, motion out give the block a mass."
                 )
 
 

@@ -53,15 +53,13 @@ def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
             if np.isfinite(b):  # a ladder that ended early may not have been tried on what is held out
                 ax.text(x + 0.19, b * 1.05, f"{b:.2g}", ha="center", fontsize=small)
         ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
-        names = ["refitted", *("+ " + s.effect.replace("_", " ") for s in steps[1:])]
         room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
-        ax.set_xticks(at, [_in_lines(n, s.changes, room) for n, s in zip(names, steps, strict=True)])
+        ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])
         ax.set_ylabel(OF[study.measure])
         legend_above(ax, "Error of every step" if title is None else title)
         return drawn.finished([*bars, [noise]])
 
 
-def _in_lines(name, changes, room) -> str:
+def _in_lines(parts, room) -> str:
     """Return what a step did, broken into lines of so many letters."""
-    parts = [name, *(f"{sign} {key.replace('_', ' ')}" for sign, key in changes)]
-    return "\n".join("\n".join(textwrap.wrap(part, room)) for part in parts)
+    return "\n".join("\n".join(textwrap.wrap(part.replace("_", " "), room)) for part in parts)

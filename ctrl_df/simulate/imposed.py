@@ -28,10 +28,13 @@ class Path:
         samples and at the reversals between them.
     samples : (m,) int array
         The sample at each node; -1 at reversals.
+    open : (q,) int array
+        Samples at which the direction is not known.
     """
 
     nodes: np.ndarray
     samples: np.ndarray
+    open: np.ndarray
 
     @property
     def count(self) -> int:
@@ -39,13 +42,14 @@ class Path:
         return int(self.samples.max()) + 1
 
 
-def path_of(t, x, v=None, *, still: float = 0.0) -> Path:
+def path_of(t, x, v=None, *, still: float = 0.0, slow: float = 0.0) -> Path:
     """Return the motion through positions x (n,) at times t (n,).
 
     Without speeds it is a cubic spline, whose acceleration is continuous; with them each piece is Hermite's
     cubic through positions and speeds, and the acceleration that of a spline through the speeds. Where it
     stands still the direction is that of the motion before (at the begin: of the motion to come). `still`: a
-    way back no longer than that is noise [m], and changes no direction.
+    way back no longer than that is noise [m], and changes no direction. `slow`: speeds up to that may be
+    noise [m/s]: their direction is not known.
     """
     from scipy.interpolate import CubicSpline
 
@@ -68,7 +72,8 @@ def path_of(t, x, v=None, *, still: float = 0.0) -> Path:
     number = np.concatenate([np.arange(len(t)), np.full(len(at), -1)])
     order = np.argsort(every[:, 0], kind="stable")
     every, number = every[order], number[order]
-    return Path(np.column_stack([every, _directions(every[:, 1], still)]), number)
+    unknown = np.flatnonzero(np.abs(v) <= slow) if slow > 0 else np.zeros(0, int)
+    return Path(np.column_stack([every, _directions(every[:, 1], still)]), number, unknown)
 
 
 def _turns(v0, b, c):
@@ -108,7 +113,7 @@ def _directions(x, still: float) -> np.ndarray:
 
 def imposed_forces(
     cores: Sequence[Core], path: Path, z0: np.ndarray, *, rtol: float = RTOL, states: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the forces of blocks that differ in their values alone, and their hidden states.
 
     Parameters
@@ -126,8 +131,9 @@ def imposed_forces(
 
     Returns
     -------
-    (rows, n), (rows, n, nz) arrays
-        [N], NaN from where a state ran away; states of no rows where they are not asked for.
+    (rows, n), (rows, q), (rows, n, nz) arrays
+        [N], NaN from where a state ran away; the force by the other direction at samples whose direction is
+        not known; states, of no rows where they are not asked for.
     """
     laws = laws_of(cores)
     stop = flag()
@@ -137,12 +143,14 @@ def imposed_forces(
     out = np.empty((rows, n))
     kept = np.empty((rows, n, laws.states) if states else (0, 0, 0))
     stop = np.zeros(1, np.int64) if stop is None else stop
+    open_at, back = np.full(n, -1), np.empty((rows, len(path.open)))
+    open_at[path.open] = np.arange(len(path.open))
     done = answer(
         laws.table, laws.par, laws.mass, laws.span, laws.asked, laws.presliding, path.nodes, path.samples,
         np.ascontiguousarray(z0, dtype=float).reshape(rows, laws.states), rtol, stop,
-        room(laws.states), out, kept,
+        room(laws.states), out, open_at, back, kept,
     )  # fmt: skip
     raise_kept()
     if not done:
         raise Stopped
-    return out, kept
+    return out, back, kept

@@ -75,7 +75,7 @@ def imposed_response(
     hidden = core.nstates - 2
     z0 = np.broadcast_to(np.asarray(initial_state, float), (hidden,))
     path = path_of(t, x, v)
-    force, states = imposed_forces([block.core], path, z0[None], states=True)
+    force, _, states = imposed_forces([block.core], path, z0[None], states=True)
     called = block.coordinates.name
     motion = path.nodes[path.samples >= 0, 1:3].T
     return ct.TimeResponseData(

@@ -16,6 +16,7 @@ from .linear_spring import LinearSpring
 from .load_dependent_friction import LoadDependentFriction
 from .load_friction import LoadFriction
 from .loose_linkage import LooseLinkage
+from .maxwell_slip import MaxwellSlip
 from .position_dependent_friction import PositionDependentFriction
 from .position_ripple import PositionRipple
 from .quadratic_drag import QuadraticDrag
@@ -47,6 +48,7 @@ __all__ = [
     "LoadDependentFriction",
     "LoadFriction",
     "LooseLinkage",
+    "MaxwellSlip",
     "PositionDependentFriction",
     "PositionRipple",
     "QuadraticDrag",

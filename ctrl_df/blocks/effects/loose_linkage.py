@@ -93,6 +93,16 @@ class LooseLinkage(Effect):
             for bend in (0.02, 0.1):
                 yield cls(level / (bend * screen.scales.position), gap * screen.scales.position)
 
+    @classmethod
+    def suggest_on_plane(cls, plane):
+        """Yield gaps of shares of the swings."""
+        for gap in plane.swing.over(4, 0.3, 0.3):
+            yield cls(max(plane.friction, 0.02 * plane.force.high) / gap, gap), 1.0
+
+    def genuine(self, stroke, at_bound):
+        """Return whether it has a gap to speak of; without one it is a bristle."""
+        return "gap" not in at_bound and self.gap > 2e-3 * stroke
+
     def ranges(self, seen):
         """Return what does not settle much faster than a sample, and gaps within the motion."""
         stiffness = 2 * seen.force / (seen.speed * seen.dt)

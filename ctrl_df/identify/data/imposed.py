@@ -13,9 +13,9 @@ from ...units import dimension
 from . import derivatives
 from .measurement import Measurement
 
-STILL = 6.0
-"""Standard deviations of the smoothed position's noise: a way back shorter than that is none (three to
-either side)."""
+STILL, SLOW = 6.0, 3.0
+"""Standard deviations of the smoothed position's noise, three to either side, up to which a way back is none;
+of the speed's, up to which its direction is not known."""
 
 _MOTIONS: WeakKeyDictionary[Measurement, ImposedMotion] = WeakKeyDictionary()
 
@@ -71,8 +71,13 @@ def _motion(record) -> ImposedMotion:
     t = record.t
     x, cutoff = _smoothed(t, record.u)
     v = None if record.velocity is None else _smoothed(t, record.velocity)[0]
-    noise = derivatives.noise_floor(t, record.u) * math.sqrt(2 * cutoff * record.dt)
-    path = path_of(t, x, v, still=STILL * noise)
+    # white noise below the cutoff, and what differentiation makes of it
+    noise, band = derivatives.noise_floor(t, record.u), 2 * cutoff * record.dt
+    place = noise * math.sqrt(band)
+    speed = 2 * math.pi * cutoff * place / math.sqrt(3)
+    if record.velocity is not None:
+        speed = derivatives.noise_floor(t, record.velocity) * math.sqrt(min(band, 1.0))
+    path = path_of(t, x, v, still=STILL * place, slow=SLOW * speed)
     _, x, v, a, _ = path.nodes[path.samples >= 0].T
     return ImposedMotion(x, v, a, cutoff, record.velocity is not None, path)
 

@@ -10,12 +10,10 @@ from ...blocks.core import Core
 from ...simulate.imposed import imposed_forces
 from ...simulate.imposed_response import imposable
 from ..data.imposed import imposed_motion
+from ..thresholds import HIDDEN_RTOL
 from . import initial_states
 from .segments import Segments
 from .simulator import Simulator
-
-RTOL = 1e-6
-"""Of hidden states: far below the noise of any load cell, and three times as fast as seven digits."""
 
 
 class ImposedSimulator(Simulator):
@@ -23,7 +21,8 @@ class ImposedSimulator(Simulator):
 
     The force is a function of the motion and of what effects hide. The latter goes on over the whole record,
     whatever its segments: its only initial states are those at the record's begin, the corrections that the
-    first segment has.
+    first segment has. Where noise hides which way it moves, dry friction takes the value, between its two
+    levels, that comes nearest to the force recorded.
     """
 
     def __init__(self, model, record, **keywords):
@@ -58,7 +57,11 @@ class ImposedSimulator(Simulator):
         self.runs += len(asked)
         cores = [self._core(values) for _, values, _ in asked]
         z0 = np.array([self._begin(c, w, s) for c, (w, _, s) in zip(cores, asked, strict=True)])
-        forces, _ = imposed_forces(cores, self.motion.path, z0, rtol=RTOL)
+        forces, back, _ = imposed_forces(cores, self.motion.path, z0, rtol=HIDDEN_RTOL)
+        at = self.motion.path.open
+        # at rest dry friction may be anything between its two levels: no error within
+        between = np.sort([forces[:, at], back], axis=0)
+        forces[:, at] = np.clip(self.record.y[at], *between)
         if self._extra is not None:
             forces = forces + self._extra
         away = float(np.mean(self.record.y)) + 10 * self.facts.spread

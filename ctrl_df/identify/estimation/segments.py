@@ -66,9 +66,11 @@ def _of_imposed(record: Measurement) -> Facts:
     motion = imposed_motion(record)
     dt, _, values = derivatives.uniform(record.t, motion.x)
     force = max(float(np.std(record.y)), 1e-300)
+    # dry friction makes steps of the force, whose spectrum has no floor
+    noise = min(record.noise_floor(), derivatives.grain(record.y))
     return Facts(
         dt, force, max(float(np.sqrt(np.mean(motion.v**2))), 1e-300), force,
-        max(record.noise_floor(), NOISE_FREE * force),
+        max(noise, NOISE_FREE * force),
         min(2 * record.duration / max(_turns(values), 1), record.duration),
         int(np.clip(0.25 / (motion.cutoff * dt), 4, max(len(record) // 8, 4))), motion.v,
         max(float(np.std(motion.x)), 1e-300), motion.x, record.y, (record.input_unit, record.output_unit),

@@ -213,6 +213,11 @@ class Comparison(ComparisonBase):
         """``free`` or ``windows``."""
         return "windows" if any(r.windows > 1 for r in self.records) else "free"
 
+    @property
+    def over(self) -> str:
+        """What the model was judged over, in words."""
+        return "a free run" if self.mode == "free" else f"{self.windows} windows"
+
     def report(self) -> str:
         """Return the comparison as text: each record, the tests, the regions."""
         lines = [str(self)]

@@ -82,7 +82,14 @@ class Attempt:
 
 
 def tried(
-    classes, screen: Screen, shortest: SegmentedData, free, nominal, executor=None, screened=None
+    classes,
+    screen: Screen,
+    shortest: SegmentedData,
+    free,
+    nominal,
+    executor=None,
+    screened=None,
+    reached: float = math.inf,
 ) -> list[CandidateFit]:
     """Return every effect that can be added, fitted over the segments of the screen.
 
@@ -100,15 +107,19 @@ def tried(
         Runs the fits side by side; None: threads do.
     screened : callable or None
         Takes every effect by what its best start explains, before any fit.
+    reached : float
+        Error of a model that is known: all begin at the nominal values, too, what cannot come near it is left
+        where that shows, and joints are not sought over the plane.
     """
+    near, known = HOPELESS * reached, math.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
 
     def run(function: Callable, jobs: list) -> list:
         return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1]
-    begun = run(_begin, [(c, screen, shortest, free, nominal) for c in kinds])
+    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
+    begun = run(_begin, [(c, screen, shortest, free, nominal, known) for c in kinds])
     if screened is not None:
         screened(_screened(begun, screen))
     resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
@@ -116,17 +127,17 @@ def tried(
     attempts += [a for _, found in begun for a in found]
     # those of few steps first: what they come to tells of the others which need no long look
     short = [a for a in attempts if not a.multimodal]
-    begun = run(_first, [(a, np.inf) for a in short])
+    begun = run(_first, [(a, near) for a in short])
     least = min((a.error for a in begun), default=np.inf)
-    least = min(least, screen.base.rmse)
+    least = min(least, screen.base.rmse, reached)
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
-    kept = _best(begun, KEPT)
+    kept = _best(begun, 1 if known else KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another minimum
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
     ahead = _best(begun, 1)[:2]
-    found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
+    found = run(_finish, [(a, screen.data, near) for a in ahead])
     least = min([least, *(t.train.rmse for t in found)])
     rest = [a for a in begun if not any(a is o for o in ahead)]
     found += run(_finish, [(a, screen.data, HOPELESS * least) for a in rest])
@@ -192,8 +203,14 @@ def _begin_joint(job) -> list[Attempt]:
 
 def _begin(job) -> tuple[list[Start], list[Attempt]]:
     """Return the starts of one effect class, and where fits begin there."""
-    cls, screen, shortest, free, nominal = job
+    cls, screen, shortest, free, nominal, known = job
     found, starts = [], starts_for(cls, screen)
+    if known:
+        # with the other parameters as the model has them, or as they are without the effect
+        best = starts[: 1 + cls.multimodal]
+        own = [replace(s, values=tuple(nominal.items())) for s in best[:1]]
+        begun = [_from(s, screen, shortest, free) for s in (*own, *best)]
+        return starts, [a for a in begun if a is not None]
     for i, start in enumerate(starts):
         if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
             break

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...blocks.massless import IMPOSED_ROLES
+from ...blocks.massless import without_answer
 from .structure_search import StructureSearch
 
 
@@ -19,7 +19,7 @@ class ImposedSearch(StructureSearch):
 
     def candidates(self, classes, executor=None):
         """Return every effect that answers a motion with a force, fitted, that of most evidence first."""
-        return super().candidates([c for c in classes if c.role in IMPOSED_ROLES and not c.divides], executor)
+        return super().candidates([c for c in classes if without_answer([c]) is None], executor)
 
     @property
     def measure(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from ..course import Course
@@ -87,6 +87,8 @@ class Search(ABC):
         Class of the answer.
     course : Course
         Hears of the candidates as they stand, best first.
+    first_look : sequence of Judged
+        The candidates as they were before any was confirmed.
     """
 
     block: Any
@@ -98,6 +100,7 @@ class Search(ABC):
     words: Words
     kind: type[Diagnosis] = Diagnosis
     course: Course = Course()
+    first_look: Sequence[Judged] = ()
 
     @property
     @abstractmethod
@@ -107,6 +110,23 @@ class Search(ABC):
     @abstractmethod
     def candidates(self, classes, executor=None) -> list[Any]:
         """Return every effect that can be added, fitted, that of most evidence first."""
+
+    def rivals(self, model, names, classes, executor=None) -> list[Any]:
+        """Return effects that may do what a model of one effect more does, with evidence over it, best first.
+
+        Its values are where they begin; what comes nowhere near it need not be brought to its end.
+
+        Parameters
+        ----------
+        model : Mechanism
+        names : sequence of str
+            Its parameters that are fitted.
+        classes : sequence of effect classes
+        executor : concurrent.futures.Executor or None
+        """
+        found = self.candidates(classes, executor)  # first: it decides what errors are of
+        known, more = self.fitted(model, names, 2), len(names) - len(self.free)
+        return self.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
     def confirm(self, found) -> list[Any]:
@@ -161,10 +181,10 @@ class Search(ABC):
     def ranked(self, base, judged: Sequence) -> list[Any]:
         """Return models with their evidence over `base`, best first."""
 
-    def final(self, models: Sequence, kept) -> list[tuple[Any, float, float]] | None:
+    def final(self, models: Sequence, free) -> list[tuple[Any, float, float]] | None:
         """Return the models of a ladder with their two errors, all over the same data; None: as they are.
 
-        `kept`: parameters that are not to be refitted.
+        `free`: parameters of a model that may be refitted.
         """
         return None
 

@@ -18,7 +18,6 @@ from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.segments import facts
 from ..estimation.simulator import feasible
-from ..estimation.variables import default_free
 from ..starting.regression import force_regression, heavy, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (
@@ -171,13 +170,25 @@ class StructureSearch(Search):
 
         `screened` takes the effects before they are fitted.
         """
+        base, found = self._tried(classes, executor, data, screened)
+        return base, ranked(CandidateFit("", base), found)[0]
+
+    def _tried(self, classes, executor, data: SegmentedData, screened=None, reached: float = math.inf):
         base = data.moved(self.base.train, 3)
         if not classes:
             return base, []
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        found = tried(classes, screen, self.segmentations[0].sampled, self.free, nominal, executor, screened)
-        return base, ranked(CandidateFit("", base), found)[0]
+        short = self.segmentations[0].sampled
+        return base, tried(classes, screen, short, self.free, nominal, executor, screened, reached)
+
+    def rivals(self, model, names, classes, executor=None):
+        """Return effects that may do what the model of one effect more does, with evidence over it."""
+        data = self.data.sampled
+        known = data.fit(model, names, iterations=4)
+        _, found = self._tried(classes, executor, data, reached=known.rmse)
+        more = len(names) - len(self.free)
+        return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -386,21 +397,21 @@ class StructureSearch(Search):
         """Return models with their evidence over `base`, best first."""
         return ranked(base, judged)[0]
 
-    def final(self, models, kept):
+    def final(self, models, free):
         """Return the models with their errors at the full rate, over the segments that the last one bears.
 
         Where disturbance forces blur parameters they are fitted over shorter segments first.
         """
         common = self.data.fine
         if common.disturbed:
-            models = [self._sharpened(m, common, kept) for m in models]
+            models = [self._sharpened(m, common, free) for m in models]
         return [(m, *common.errors(m)) for m in models]
 
     @staticmethod
-    def _sharpened(model, data: SegmentedData, kept):
+    def _sharpened(model, data: SegmentedData, free):
         if data.carries(model):
             return model
-        return data.short_segments.fit(model, [k for k in default_free(model) if k not in kept]).model
+        return data.short_segments.fit(model, free(model)).model
 
     def relative(self, noise):
         """Return noise over the rms of the centred output, or of the acceleration."""

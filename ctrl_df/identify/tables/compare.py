@@ -115,6 +115,11 @@ class FrequencyComparison(ComparisonBase):
             text += f"; at {lost} of them the model stands still or has no periodic answer (counted as N = 0)"
         return text + "."
 
+    @property
+    def over(self) -> str:
+        """What the model was judged over, in words."""
+        return "the plane"
+
     def plot(self, record=None, **keywords):
         """Draw measured and model's N, and the error on the plane; returns a ``ct.ControlPlot``."""
         return draw("table comparison", self, record=record, **keywords)

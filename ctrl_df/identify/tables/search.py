@@ -42,6 +42,7 @@ from .fit import (
     slopes_of,
     table_scales,
 )
+from .starts import balanced
 from .uncertainty import uncertainty
 
 
@@ -108,7 +109,7 @@ class TableSearch(Search):
         return self._records, self._validation
 
     def _fit_base(self) -> FittedTable:
-        """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
+        """Fit from the model's values, the mass at high frequencies, a balance of forces; keep the best."""
         inside = self.inside
         begins = [self.block]
         heavy = inertia(self.block)
@@ -117,6 +118,7 @@ class TableSearch(Search):
             top = moved.omega >= np.quantile(moved.omega, 0.8)
             mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
             begins.append(self.block.with_parameters({heavy: mass}))
+        begins += balanced([self.block], self.free, inside, self.scales)
         fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 

@@ -220,7 +220,9 @@ def _across(laws, motion, node, z, largest, rtol, pace, work):
 
 
 @njit(error_model="numpy", nogil=True)
-def answer(table, par, mass, span, asked, presliding, motion, samples, z0, rtol, stop, work, out, kept):
+def answer(
+    table, par, mass, span, asked, presliding, motion, samples, z0, rtol, stop, work, out, open_at, back, kept
+):
     """Write the force of every row of parameters at the samples of one motion; whether all came to an end.
 
     Parameters
@@ -250,6 +252,10 @@ def answer(table, par, mass, span, asked, presliding, motion, samples, z0, rtol,
         Of `room`.
     out : (rows, n) array
         [N], NaN from where a row runs away.
+    open_at : (n,) int array
+        Which column of `back` a sample has; -1: none.
+    back : (rows, q) array
+        Force at samples whose direction is not known, by the other one.
     kept : (rows, n, nz) array
         Hidden states at the samples; of no rows where nobody asks for them.
     """
@@ -272,9 +278,13 @@ def answer(table, par, mass, span, asked, presliding, motion, samples, z0, rtol,
             if i < 0:
                 continue
             out[row, i] = np.nan
+            if open_at[i] >= 0:
+                back[row, open_at[i]] = np.nan
             if pace > 0.0:
                 t, x, v = along[node, 0], along[node, 1], along[node, 2]
                 out[row, i] = _answer(laws, t, x, v, along[node, 3], along[node, 4], z, dz)
+                if open_at[i] >= 0:
+                    back[row, open_at[i]] = _answer(laws, t, x, v, along[node, 3], -along[node, 4], z, dz)
             for j in range(kept.shape[2]):
                 kept[row, i, j] = z[j]
     return True
