@@ -124,8 +124,8 @@ class Search(ABC):
         classes : sequence of effect classes
         executor : concurrent.futures.Executor or None
         """
+        found = self.candidates(classes, executor)  # first: it decides what errors are of
         known, more = self.fitted(model, names, 2), len(names) - len(self.free)
-        found = self.candidates(classes, executor)
         return self.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
