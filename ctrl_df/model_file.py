@@ -46,7 +46,8 @@ time = "t"
 input = "F"
 output = "x"
 input_unit = "N"           # optional; also time_unit, velocity, velocity_unit, input_hold, decimal
-output_unit = "mm"
+output_unit = "mm"         # its unit tells the quantity: mm/s is a velocity, V a voltage
+# outputs = { x = "x", v = ["tacho", "mm/s"] }  # in the place of output: several, by quantity
 closed_loop = false        # true: the input column is the reference of the loop with [controller]
 """
 
@@ -58,7 +59,7 @@ _PLANTS: dict[str, type[Mechanism]] = {
     "mass": Mass, "two_mass": TwoMass, "inertia": Inertia, "two_inertias": TwoInertias,
 }  # fmt: skip
 _SECTIONS = ("plant", "effects", "controller", "box", "data")
-_COLUMNS = ("time", "input", "output", "velocity", "channels", "delimiter", "decimal")
+_COLUMNS = ("time", "input", "output", "outputs", "velocity", "channels", "delimiter", "decimal")
 _DATA = (
     *_COLUMNS,
     "name",
@@ -228,6 +229,9 @@ def _data(given):
         elif key == "channels":
             good = isinstance(value, list) and all(isinstance(v, str) or type(v) is int for v in value)
             what = "a list of columns"
+        elif key == "outputs":
+            good = isinstance(value, Mapping) and all(map(_column, value.values()))
+            what = 'a table of columns by quantity, such as { x = "x", v = ["tacho", "mm/s"] }'
         elif key == "closed_loop":
             good, what = isinstance(value, bool), "true or false, without quotes"
         else:
@@ -239,6 +243,13 @@ def _data(given):
         if key == "input_hold":
             choice("data", key, value, ("zoh", "linear"))
     return given
+
+
+def _column(value) -> bool:
+    """Whether a value is a column, or a pair of a column and its unit."""
+    if isinstance(value, list) and len(value) == 2 and isinstance(value[1], str):
+        value = value[0]
+    return isinstance(value, str) or type(value) is int
 
 
 def _number(name, value) -> float:

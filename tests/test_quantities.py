@@ -18,13 +18,13 @@ def record(**units):
 
 
 WRONG = [
-    (LINE, dict(output_unit="m/s"), ["gives a position [m]", "run 7", "m/s", "velocity="]),
+    (LINE, dict(output_unit="m/s"), ["gives a position [m]", "run 7", "m/s", "channels="]),
     (LINE, dict(output_unit="deg"), ["gives a position [m]", "rad"]),
     (LINE, dict(input_unit="V"), ["takes a force [N]", "run 7", "is in V", "input_unit="]),
     (LINE, dict(input_unit="N m"), ["takes a force [N]", "N m"]),
     (AXIS, {}, ["gives an angle [rad]", "is in m", "output_unit="]),
     (AXIS, dict(output_unit="deg"), ["takes a torque [N m]", "is in N"]),
-    (AXIS, dict(output_unit="deg", input_unit="A"), ["takes a torque [N m]", "is in A", "motor's constant"]),
+    (AXIS, dict(output_unit="deg", input_unit="A"), ["takes a torque [N m]", "is in A", "TorqueConstant"]),
 ]
 
 ASKED = {

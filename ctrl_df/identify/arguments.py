@@ -6,10 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..blocks.effect import Effect, effect_class, effect_library
+from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
+from ..simulate.imposed_response import imposable
 from ..units import dimension
+from .data.imposed import imposes_motion
 from .data.measurement import Measurement
+from .data.quantities import quantity_of
+from .estimation.sensed import OUTPUT_COLUMNS
 from .estimation.variables import default_free
 from .thresholds import SEGMENT_SAMPLES
 
@@ -98,7 +103,7 @@ def check_fit(block, start, robust, budget) -> None:
 
 
 def check_quantities(model, records) -> None:
-    """Check that records hold what the model takes and gives: a force and a position, or torque and angle.
+    """Check that records hold what the model takes, and outputs of it; all of them the same outputs.
 
     A loop may be driven by the reference, in the unit of its position.
     """
@@ -106,21 +111,76 @@ def check_quantities(model, records) -> None:
     block = model.parts.block if closed else model
     if not isinstance(block, Mechanism):
         return  # nothing is known of its signals
-    moves = block.coordinates
-    taken = [moves.force_unit, moves.unit] if closed else [moves.force_unit]
+    if isinstance(block, Massless) or any(imposes_motion(r) for r in records):
+        return _check_imposed(block, records, closed)
+    given = block.signals
+    label = block.input_labels[0]
+    taken = [given[label], *([block.coordinates.unit] if closed else [])]
+    said = _words(block)
     for record in records:
-        if dimension(record.output_unit) != dimension(moves.unit):
-            raise ValueError(
-                f"this model gives {_article(moves.position)} [{moves.unit}]; the output of {record.name!r} "
-                f"is in {record.output_unit or 'no unit'}. State output_unit= as it was recorded (such as "
-                f"m{moves.unit}), or give the {moves.position} as y and a measured rate as velocity=."
-            )
+        units = _units(record)
+        for quantity, unit in units.items():
+            known = said.get(quantity)
+            if known is None or dimension(unit) != dimension(known[1]):
+                gives = " and ".join(f"{_article(word)} [{u}]" for word, u in said.values())
+                raise ValueError(
+                    f"this model gives {gives}; the output of {record.name!r} is in {unit or 'no unit'}. "
+                    f"State output_unit= as it was recorded (such as m{block.coordinates.unit}), or keep "
+                    "what a model does not give in channels=."
+                )
         if all(dimension(record.input_unit) != dimension(unit) for unit in taken):
             raise ValueError(
-                f"this model takes {_article(moves.force)} [{moves.force_unit}]; the input of "
+                f"this model takes {_article(_driven_by(block))} [{given[label]}]; the input of "
                 f"{record.name!r} is in {record.input_unit or 'no unit'}. State input_unit= as it was "
-                f"recorded, or convert it to {moves.force_unit} (a current by the motor's constant) first."
+                f"recorded, convert it to {given[label]} first, or give a model driven by voltage or current "
+                "its motor constant (TorqueConstant)."
             )
+        if units.keys() != _units(records[0]).keys():
+            raise ValueError(
+                f"records that are judged together need the same outputs; {records[0].name!r} has "
+                f"{', '.join(_units(records[0]))} and {record.name!r} {', '.join(units)}. Study them apart."
+            )
+
+
+def _units(record) -> Mapping[str, str]:
+    """Return the unit of each output, by quantity; of a table of its one."""
+    return getattr(record, "units", None) or {quantity_of(record.output_unit): record.output_unit}
+
+
+def _words(block: Mechanism) -> dict[str, tuple[str, str]]:
+    """Return what a record may hold of a mechanism: word and unit by quantity."""
+    moves = block.coordinates
+    words = (moves.position, moves.velocity)
+    return {quantity: (words[column], list(block.signals.values())[1:][column])
+            for quantity, column in OUTPUT_COLUMNS.items()}  # fmt: skip
+
+
+def _driven_by(block: Mechanism) -> str:
+    """Return the word for the input of a mechanism."""
+    quantity = quantity_of(block.signals[block.input_labels[0]])
+    return block.coordinates.force if quantity == "force" else quantity
+
+
+def _check_imposed(block, records, closed) -> None:
+    """Check that records hold the motion that is imposed on a block, and the force that it took."""
+    moves = block.coordinates
+    if closed:
+        raise ValueError(
+            "a loop is driven by its reference; got a record of an imposed motion. Give the block alone."
+        )
+    imposable(block)
+    for record in records:
+        for what, unit, there in (
+            ("input", moves.unit, record.input_unit),
+            ("output", moves.force_unit, record.output_unit),
+        ):
+            if dimension(there) != dimension(unit):
+                raise ValueError(
+                    f"under an imposed motion this model takes {_article(moves.position)} [{moves.unit}] and "
+                    f"gives {_article(moves.force)} [{moves.force_unit}]; the {what} of {record.name!r} is "
+                    f"in {there or 'no unit'}. State {what}_unit= as it was recorded; for a record of force "
+                    "in, motion out give the block a mass."
+                )
 
 
 def _article(word: str) -> str:

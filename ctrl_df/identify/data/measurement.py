@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -12,13 +12,14 @@ import numpy as np
 
 from ...checks import choice, count, mapping, number, shown, unknown_keywords
 from ...units import si_unit, to_si
-from . import derivatives, readers
+from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
 
 HOLDS = ("zoh", "linear")
+_CHANNELS = ("channels", "outputs")  # fields that hold arrays by name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,13 +33,17 @@ class Measurement:
     t : array_like, shape (n,)
         Sample times, strictly increasing, n >= 10.
     u : array_like, shape (n,)
-        Applied force (or whatever drives the model), not constant.
+        Applied force, voltage or current, not constant.
     y : array_like, shape (n,)
-        Measured output, usually the position, not constant.
+        Measured output, usually the position, not constant; left out where `outputs` has all that was
+        measured.
     name : str
         Shown in tables and pictures.
-    input_unit, output_unit, time_unit : str
-        Units of the arrays given, such as ``mm``, ``um``, ``deg``, ``kN``, ``ms``; afterwards the SI unit.
+    input_unit, output_unit : str or None
+        Units of the arrays given, such as ``mm``, ``um``, ``deg``, ``kN``; afterwards the SI unit. None: N
+        and m, or the SI unit of the quantity that is named.
+    time_unit : str
+        Of `t`, such as ``ms``.
     input_hold : {'zoh', 'linear'}
         What the input did between samples: held its value, or ran straight to the next.
     velocity : array_like or None, shape (n,)
@@ -47,6 +52,17 @@ class Measurement:
         Its unit; None: output unit per second.
     channels : mapping or None
         Further signals by name, each an array in SI or a pair (array, unit).
+    output, input : str or None
+        What `y` and `u` are of: ``position`` (or ``x``, ``angle``), ``velocity`` (``v``, ``speed``),
+        ``force`` (``F``, ``torque``), ``voltage``, ``current``, ``acceleration``; ``motion`` is a position, a
+        velocity or an acceleration that is imposed. None: the unit decides. Afterwards the first of these
+        words.
+    outputs : mapping or None
+        All that was measured, by quantity, where that is more than one: ``{"x": x, "v": (v, "mm/s")}``, each
+        an array in SI or a pair (array, unit). A model is judged by each over its own noise; `y` is then the
+        position, or the first. A `velocity` judges nothing: drives compute it from the position.
+    units : mapping
+        SI unit of each output, by quantity.
 
     Raises
     ------
@@ -64,15 +80,19 @@ class Measurement:
 
     t: np.ndarray
     u: np.ndarray
-    y: np.ndarray
+    y: Any = None
     name: str = "measurement"
-    input_unit: str = "N"
-    output_unit: str = "m"
+    input_unit: Any = None
+    output_unit: Any = None
     input_hold: str = "zoh"
     velocity: np.ndarray | None = None
     channels: Mapping[str, Any] | None = None
     time_unit: str = "s"
     velocity_unit: str | None = None
+    output: str | None = None
+    input: str | None = None
+    outputs: Mapping[str, Any] | None = None
+    units: Mapping[str, str] = field(init=False)
 
     def __post_init__(self):
         choice("Measurement", "input_hold", self.input_hold, HOLDS)
@@ -83,16 +103,23 @@ class Measurement:
         owner = f"Measurement {self.name!r}"
         t = as_channel(owner, "t", self.t)
         n = len(t)
-        u, y = (as_channel(owner, k, getattr(self, k), n) for k in ("u", "y"))
-        scale_u, input_unit = si_unit(self.input_unit)
-        scale_y, output_unit = si_unit(self.output_unit)
+        u = as_channel(owner, "u", self.u, n)
+        input_quantity, scale_u, input_unit = quantities.stated("input", self.input, self.input_unit, "N")
+        measured = self._measured(owner, n)
         t = to_si(t, self._seconds())[0]
         check_times(owner, t)
         check_input(owner, u)
-        check_output(owner, y)
+        for array, _, _ in measured.values():
+            check_output(owner, array)
+        outputs = {quantity: values * scale for quantity, (values, scale, _) in measured.items()}
+        units = {quantity: unit for quantity, (_, _, unit) in measured.items()}
+        output = quantities.leading(outputs)
+        scale_y, output_unit = measured[output][1:]
         values: dict[str, Any] = dict(
-            t=t, u=u * scale_u, y=y * scale_y, input_unit=input_unit, output_unit=output_unit
-        )
+            t=t, u=u * scale_u, y=outputs[output], input_unit=input_unit, output_unit=output_unit,
+            input=input_quantity, output=output, units=MappingProxyType(units),
+            outputs=MappingProxyType({k: _frozen(v) for k, v in outputs.items()}),
+        )  # fmt: skip
         velocity_unit = f"{output_unit}/s"
         if self.velocity is not None:
             v = as_channel(owner, "velocity", self.velocity, n)
@@ -103,15 +130,36 @@ class Measurement:
         values["velocity_unit"], values["time_unit"] = velocity_unit, "s"
         extra = {}
         for key, given in (self.channels or {}).items():
-            array, unit = (
-                given
-                if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str)
-                else (given, "")
-            )
-            extra[key] = to_si(as_channel(owner, f"channel {key!r}", array, n), unit)[0]
+            array, unit = _with_unit(given)
+            extra[key] = to_si(as_channel(owner, f"channel {key!r}", array, n), unit or "")[0]
         values["channels"] = MappingProxyType({k: _frozen(v) for k, v in extra.items()})
         for key, value in values.items():
             object.__setattr__(self, key, _frozen(value) if isinstance(value, np.ndarray) else value)
+
+    def _measured(self, owner, n) -> dict[str, tuple[np.ndarray, float, str]]:
+        """Return the outputs as given, their factor to SI and their SI unit, by quantity."""
+        if self.outputs is None:
+            y = as_channel(owner, "y", self.y, n)
+            quantity, scale, unit = quantities.stated("output", self.output, self.output_unit, "m")
+            return {quantity: (y, scale, unit)}
+        given = mapping("Measurement", "outputs", self.outputs, "{'x': x, 'v': (v, 'mm/s')}")
+        if not given or self.y is not None or self.output is not None or self.output_unit is not None:
+            raise ValueError(
+                f"{owner} needs either y (with output= and output_unit=) or outputs=, with one channel at "
+                f"least; got {'no output' if not given else 'both'}. Give each unit beside its array: "
+                "outputs={'x': (x, 'mm')}."
+            )
+        found: dict[str, tuple[np.ndarray, float, str]] = {}
+        for word, channel in given.items():
+            array, unit = _with_unit(channel)
+            quantity, scale, unit = quantities.stated("output", word, unit, "")
+            if quantity in found:
+                raise ValueError(
+                    f"{owner} needs each quantity once in outputs; got {', '.join(map(repr, given))}. "
+                    "Keep the better one as output, the other in channels."
+                )
+            found[quantity] = (as_channel(owner, f"output {word!r}", array, n), scale, unit)
+        return found
 
     def _seconds(self):
         if si_unit(self.time_unit)[1] != "s":
@@ -124,8 +172,8 @@ class Measurement:
 
     @classmethod
     def from_csv(
-        cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), delimiter=None,
-        decimal=None, **keywords,
+        cls, path, *, time="t", input="u", output="y", outputs=None, velocity=None, channels=(),
+        delimiter=None, decimal=None, **keywords,
     ):  # fmt: skip
         """Read a text table with a header line.
 
@@ -139,7 +187,11 @@ class Measurement:
             Comma, semicolon, tab or blank separated; lines starting with ``#`` are skipped.
         time, input, output, velocity : str or int
             Column names, or numbers from 0. A unit in the header, as in ``x [mm]``, is used unless one is
-            given, and need not be repeated in the name.
+            given, and need not be repeated in the name. The units tell the quantities (`input` and
+            `output` are columns here).
+        outputs : mapping or None
+            Columns by quantity, in the place of `output`: ``{"x": "pos", "v": ("tacho", "rpm")}``, with a
+            unit where the header has none.
         channels : sequence of str
             Further columns to keep.
         delimiter : str or None
@@ -158,10 +210,14 @@ class Measurement:
         cls._check_keywords(keywords)
         table = readers.read_csv(path, delimiter, decimal)
         keywords.setdefault("name", readers.stem(path))
-        return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
+        return cls(
+            **readers.select(table, time, input, output, outputs, velocity, channels, keywords, str(path))
+        )
 
     @classmethod
-    def from_mat(cls, path, *, time="t", input="u", output="y", velocity=None, channels=(), **keywords):
+    def from_mat(
+        cls, path, *, time="t", input="u", output="y", outputs=None, velocity=None, channels=(), **keywords
+    ):
         """Read variables of a MATLAB file (version 4 to 7.2).
 
         ``data.x`` reaches into a struct, ``data.0`` is the first column of a matrix.
@@ -171,11 +227,13 @@ class Measurement:
         cls._check_keywords(keywords)
         table = readers.read_mat(path)
         keywords.setdefault("name", readers.stem(path))
-        return cls(**readers.select(table, time, input, output, velocity, channels, keywords, str(path)))
+        return cls(
+            **readers.select(table, time, input, output, outputs, velocity, channels, keywords, str(path))
+        )
 
     @classmethod
     def from_dataframe(
-        cls, frame, *, time="t", input="u", output="y", velocity=None, channels=(), **keywords
+        cls, frame, *, time="t", input="u", output="y", outputs=None, velocity=None, channels=(), **keywords
     ):
         """Take columns of a pandas DataFrame; ``time=None`` takes its index.
 
@@ -184,26 +242,28 @@ class Measurement:
         cls._check_keywords(keywords)
         table = readers.read_dataframe(frame, time)
         time = readers.INDEX if time is None else time
-        return cls(
-            **readers.select(table, time, input, output, velocity, channels, keywords, "the DataFrame")
-        )
+        columns = (time, input, output, outputs, velocity, channels)
+        return cls(**readers.select(table, *columns, keywords, "the DataFrame"))
 
     @classmethod
-    def from_response(cls, response, *, input=0, output=0, **keywords):
+    def from_response(cls, response, *, input=0, output=0, outputs=None, **keywords):
         """Take one input and one output of a ``ct.TimeResponseData``, by number or label.
 
+        Several outputs by quantity: ``outputs={"x": 0, "v": 1}``, or ``{"x": "x", "v": ("v", "m/s")}``.
         The input of python-control's simulations runs straight between samples: ``input_hold='linear'``
         unless told otherwise.
         """
         cls._check_keywords(keywords)
+        if outputs is not None:
+            output = mapping("from_response", "outputs", outputs, "{'x': 0, 'v': 1}")
         t, u, y = readers.read_response(response, input, output)
         keywords.setdefault("input_hold", "linear")
         keywords.setdefault("name", getattr(response, "sysname", None) or "response")
-        return cls(t, u, y, **keywords)
+        return cls(t, u, **({"y": y} if outputs is None else {"outputs": y}), **keywords)
 
     @classmethod
     def _check_keywords(cls, keywords):
-        known = [f.name for f in dataclasses.fields(cls) if f.name not in ("t", "u", "y")]
+        known = [f.name for f in dataclasses.fields(cls) if f.init and f.name not in ("t", "u", "y")]
         unknown_keywords([k for k in keywords if k not in known])
 
     # --- what it is -------------------------------------------------------------------------------
@@ -329,40 +389,61 @@ class Measurement:
             )
         if factor == 1:
             return self
-        thin = {
-            k: derivatives.thinned(getattr(self, k), factor)
-            for k in ("y", "velocity")
-            if getattr(self, k) is not None
-        }
+        outputs = {k: derivatives.thinned(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
+        velocity = None if self.velocity is None else derivatives.thinned(self.velocity, factor)
         channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
         held = self.input_hold == "zoh"
         u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
-        return self.replaced(t=self.t[::factor], u=u, channels=MappingProxyType(channels), **thin)
+        return self.replaced(
+            t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels)
+        )
 
     def _part(self, where, name):
         channels = MappingProxyType({k: v[where] for k, v in self.channels.items()})  # type: ignore[union-attr]
         velocity = None if self.velocity is None else self.velocity[where]
+        outputs = {k: v[where] for k, v in self.outputs.items()}  # type: ignore[union-attr]
         return self.replaced(
-            t=self.t[where], u=self.u[where], y=self.y[where], velocity=velocity, channels=channels, name=name
+            t=self.t[where], u=self.u[where], outputs=outputs, velocity=velocity, channels=channels, name=name
         )
 
+    def only(self, quantity: str) -> Measurement:
+        """Return the record with one of its outputs alone, by quantity."""
+        return self.replaced(outputs={quantity: self.outputs[quantity]})  # type: ignore[index]
+
     def replaced(self, **changes):
-        """Copy without checking again: a part of a good record may well have a constant input."""
+        """Copy without checking again: a part of a good record may well have a constant input.
+
+        A `y` alone takes the place of all outputs.
+        """
+        if "y" in changes:
+            changes["outputs"] = {self.output: changes["y"]}
+        if "outputs" in changes:
+            changes |= self._led(changes["outputs"])
         part = object.__new__(type(self))
-        for field in dataclasses.fields(self):
-            value = changes.get(field.name, getattr(self, field.name))
-            object.__setattr__(part, field.name, _frozen(value) if isinstance(value, np.ndarray) else value)
+        for f in dataclasses.fields(self):
+            value = changes.get(f.name, getattr(self, f.name))
+            object.__setattr__(part, f.name, _frozen(value) if isinstance(value, np.ndarray) else value)
         return part
+
+    def _led(self, outputs) -> dict[str, Any]:
+        """Return the fields that go with these outputs."""
+        output = quantities.leading(outputs)
+        return {
+            "outputs": MappingProxyType({k: _frozen(v) for k, v in outputs.items()}),
+            "units": MappingProxyType({k: self.units[k] for k in outputs}),
+            "output": output, "y": outputs[output], "output_unit": self.units[output],
+        }  # fmt: skip
 
     def __getstate__(self):
         """Return the fields for pickling (worker processes); a mapping proxy cannot be."""
         state = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return {**state, "channels": dict(state["channels"])}
+        return {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
 
-    def __setstate__(self, state):
+    def __setstate__(self, given):
         """Take the fields back, read-only again."""
-        state = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in state.items()}
-        state["channels"] = MappingProxyType({k: _frozen(v) for k, v in state["channels"].items()})
+        state: dict[str, Any] = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in given.items()}
+        state |= {k: MappingProxyType({n: _frozen(v) for n, v in state[k].items()}) for k in _CHANNELS}
+        state["units"] = MappingProxyType(state["units"])
         for key, value in state.items():
             object.__setattr__(self, key, value)
 
@@ -372,8 +453,15 @@ class Measurement:
         extra += "".join(f", {k}" for k in self.channels)  # type: ignore[union-attr]
         return (
             f"Measurement({self.name!r}: {len(self)} samples, {self.t[0]:g} to {self.t[-1]:g} s, {rate}, "
-            f"input [{self.input_unit}] {self.input_hold}, output [{self.output_unit}]{extra})"
+            f"input [{self.input_unit}] {self.input_hold}, output [{', '.join(self.units.values())}]{extra})"
         )
+
+
+def _with_unit(channel) -> tuple[Any, str | None]:
+    """Return array and unit of a channel given as an array or as a pair of both."""
+    if isinstance(channel, tuple | list) and len(channel) == 2 and isinstance(channel[1], str):
+        return channel[0], channel[1]
+    return channel, None
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import is_number, names, path_of, shown
+from ...checks import is_number, mapping, names, path_of, shown
 from .text_table import read_csv, refuse_text
 
 __all__ = ["find_column", "read_csv", "read_dataframe", "read_mat", "read_response", "select", "stem"]
@@ -86,7 +86,7 @@ def read_dataframe(frame, time) -> dict[str, np.ndarray]:
 
 
 def read_response(response, input, output):
-    """Return time, one input, one output of a response of python-control."""
+    """Return time, one input, one output of a response of python-control; of a mapping each output by key."""
     if not all(hasattr(response, k) for k in ("time", "inputs", "outputs")):
         raise TypeError(
             f"from_response needs a ct.TimeResponseData, as event_response returns; got {shown(response)}."
@@ -99,8 +99,17 @@ def read_response(response, input, output):
         )
     u, y = np.asarray(u, dtype=float), np.asarray(y, dtype=float)
     ku = _row(input, getattr(response, "input_labels", None), u, "input")
-    ky = _row(output, getattr(response, "output_labels", None), y, "output")
-    return t, _pick(u, ku, t, "inputs"), _pick(y, ky, t, "outputs")
+
+    def picked(which):
+        return _pick(y, _row(which, getattr(response, "output_labels", None), y, "output"), t, "outputs")
+
+    if not isinstance(output, Mapping):
+        return t, _pick(u, ku, t, "inputs"), picked(output)
+    chosen = {}
+    for word, given in output.items():
+        which, unit = given if isinstance(given, tuple | list) and len(given) == 2 else (given, None)
+        chosen[word] = picked(which) if unit is None else (picked(which), unit)
+    return t, _pick(u, ku, t, "inputs"), chosen
 
 
 def _row(which, labels, array, kind):
@@ -132,28 +141,50 @@ def _pick(array, row, t, kind):
 
 
 def select(
-    table: Mapping[str, Any], time, input, output, velocity, channels, keywords: dict[str, Any], source: str
+    table: Mapping[str, Any],
+    time,
+    input,
+    output,
+    outputs,
+    velocity,
+    channels,
+    keywords: dict[str, Any],
+    source: str,
 ) -> dict[str, Any]:
     """Return the keyword arguments of a `Measurement` for the columns asked for."""
     wanted_of = {"t": time, "u": input, "y": output}
+    if outputs is not None:
+        del wanted_of["y"]
     if velocity is not None:
         wanted_of["velocity"] = velocity
     unit_of = {"t": "time_unit", "u": "input_unit", "y": "output_unit", "velocity": "velocity_unit"}
     chosen: dict[str, Any] = {}
     taken: dict[str, str] = {}
     said = {"t": "time", "u": "input", "y": "output", "velocity": "velocity"}
-    for field, wanted in wanted_of.items():
+
+    def take(wanted, what):
         column, unit = find_column(table, wanted, source)
         if column in taken:
             raise ValueError(
-                f"{taken[column]} and {said[field]} need a column each; both are {column!r} of {source}. "
+                f"{taken[column]} and {what} need a column each; both are {column!r} of {source}. "
                 f"{_exist(list(table), source)}"
             )
-        taken[column] = said[field]
+        taken[column] = what
         refuse_text(table, column, source)
-        chosen[field] = table[column]
+        return table[column], unit
+
+    for field, wanted in wanted_of.items():
+        chosen[field], unit = take(wanted, said[field])
         if unit and keywords.get(unit_of[field]) is None:
             chosen[unit_of[field]] = unit
+    if outputs is not None:
+        chosen["outputs"] = {}
+        for word, given in mapping("a record", "outputs", outputs, "{'x': 'pos', 'v': 'tacho'}").items():
+            named = isinstance(given, tuple | list) and len(given) == 2
+            column, own = given if named else (given, None)
+            array, unit = take(column, f"output {word!r}")
+            unit = own or unit
+            chosen["outputs"][word] = (array, unit) if unit else array
     extra = {}
     for wanted in _several(channels):
         column, unit = find_column(table, wanted, source)

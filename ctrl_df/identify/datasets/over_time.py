@@ -10,7 +10,7 @@ from ..estimation.multiple_shooting import Problem
 from ..estimation.prepared import REFERENCE
 from ..estimation.refit_records import blurred, doubts, refit_records
 from ..estimation.segments import make_segments
-from ..estimation.simulator import Simulator
+from ..estimation.simulators import simulator_of
 from ..planning.inputs import input_that_separates
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
@@ -29,7 +29,7 @@ class TimeDataset(Dataset):
 
     def block_of(self, model):
         """Return the block itself, or that of a loop."""
-        return Simulator(model, self.records[0]).block
+        return simulator_of(model, self.records[0]).block
 
     def compare(self, model, mode, window):
         """Simulate the model over segments of the records, their initial states fitted."""
@@ -46,7 +46,7 @@ class TimeDataset(Dataset):
         """Return the comparison of a model whose initial states in each segment are known already."""
         rows = []
         for record, w, start in zip(self.records, segments, starts, strict=True):
-            simulated = Simulator(model, record).run(w, None, start, rounded=True)
+            simulated = simulator_of(model, record).run(w, None, start, rounded=True)
             rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted, model))
         return Comparison(model, tuple(rows))
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...simulate.crew import check
 from ..thresholds import GOOD
 from .initial_states import FREE
 from .noise_model import power
@@ -21,6 +22,7 @@ from .restarts import restart_segments, scan_gap_state
 from .segments import Segments, facts
 from .sensitivity import OutputSensitivity
 from .simulator import Simulator, feasible
+from .simulators import simulator_of
 from .variables import step_of_sensor, variables_of
 
 Signals = list[np.ndarray]
@@ -48,7 +50,7 @@ class Problem:
         self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
         self.known = [facts(r) for r in records]
-        self.block = Simulator(model, records[0]).block
+        self.block = simulator_of(model, records[0]).block
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
         self.steps = np.full(len(names), 1e-3)
         self.nfev = 0
@@ -74,7 +76,7 @@ class Problem:
 
     def stage(self, segments: list[Segments], thin, starts=None):
         """Set the segments; initial states begin at `starts` (corrections) or at what the data say."""
-        self.simulators = [Simulator(self.model, r, thin=thin, begins=self.begins) for r in self.records]
+        self.simulators = [simulator_of(self.model, r, thin=thin, begins=self.begins) for r in self.records]
         self.segments = segments
         self.measured = [r.y[w.samples] for r, w in zip(self.records, segments, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
@@ -94,6 +96,7 @@ class Problem:
 
     def simulate(self, theta, nuisance) -> Signals:
         """Return the outputs within the segments."""
+        check()
         self.nfev += 1
         values = self.values(theta)
         return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.segments, nuisance, strict=True)]

@@ -59,7 +59,9 @@ def of_block(block, record, u, thin: int) -> PreparedModel:
         if effect.role != "input":
             continue
         channel = effect.channel()
-        if all(isinstance(p, Delay) for p in channel):
+        if effect.law is not None:
+            static = False  # what is more than a channel stays where the motion is known
+        elif all(isinstance(p, Delay) for p in channel):
             # a dead time commutes with every law that does not know the time of day
             input_delay += sum(p.delay for p in channel)
             outside.append(key)

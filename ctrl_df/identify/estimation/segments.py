@@ -9,13 +9,17 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..data import derivatives
+from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
 from ..thresholds import NOISE_FREE
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band."""
+    """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band.
+
+    Also what it tells of position and force, whichever of them is the output.
+    """
 
     dt: float
     spread: float
@@ -25,6 +29,11 @@ class Facts:
     swing: float  # time of one to and fro [s]
     half: int  # samples either side of a local polynomial
     velocity: np.ndarray
+    position: float  # typical, about its mean
+    place: np.ndarray  # position
+    load: np.ndarray  # force
+    units: tuple[str, str]  # of both
+    imposed: bool = False  # motion in, force out
 
 
 _FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
@@ -33,6 +42,8 @@ _FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
 def facts(record: Measurement) -> Facts:
     """Return the scales of a record (kept for as long as the record lives)."""
     known = _FACTS.get(record)
+    if known is None and imposes_motion(record):
+        known = _FACTS[record] = _of_imposed(record)
     if known is None:
         _, grid, values = derivatives.uniform(record.t, record.y)
         dt = float(grid[1] - grid[0])
@@ -44,9 +55,27 @@ def facts(record: Measurement) -> Facts:
         known = Facts(
             dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
             max(record.noise_floor(), NOISE_FREE * float(np.std(record.y))), swing, half, velocity,
+            max(float(np.std(record.y)), 1e-300), record.y, record.u, (record.output_unit, record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
     return known
+
+
+def _of_imposed(record: Measurement) -> Facts:
+    """Return the scales of a record of a motion that was imposed, and of the force that it took."""
+    motion = imposed_motion(record)
+    dt, _, values = derivatives.uniform(record.t, motion.x)
+    force = max(float(np.std(record.y)), 1e-300)
+    # dry friction makes steps of the force, whose spectrum has no floor
+    noise = min(record.noise_floor(), derivatives.grain(record.y))
+    return Facts(
+        dt, force, max(float(np.sqrt(np.mean(motion.v**2))), 1e-300), force,
+        max(noise, NOISE_FREE * force),
+        min(2 * record.duration / max(_turns(values), 1), record.duration),
+        int(np.clip(0.25 / (motion.cutoff * dt), 4, max(len(record) // 8, 4))), motion.v,
+        max(float(np.std(motion.x)), 1e-300), motion.x, record.y, (record.input_unit, record.output_unit),
+        imposed=True,
+    )  # fmt: skip
 
 
 def _turns(y) -> int:

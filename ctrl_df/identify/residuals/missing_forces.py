@@ -16,6 +16,7 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_model
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.segments import facts
 from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
@@ -68,7 +69,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
     segments, record = sensitivity.pieces, data.train.records[0]
-    units = {"x": record.output_unit, "f": record.input_unit}
+    units = dict(zip("xf", facts(record).units, strict=True))
     if data.disturbed:
         # the residual is of forces here, as the fits see it
         noise = noise_model([residual[w] for w in segments], max_order=12)
@@ -134,7 +135,7 @@ class _Scene:
             self.motion,
             strict=True,
         ):
-            force = record.u + self.size * shape(motion)
+            force = facts(record).load + self.size * shape(motion)
             simulator = self.data.simulator(self.fit.model, record, force=force)
             changes.append((simulator.run(segments, None, start) - y) / self.size)
         return changes
@@ -164,26 +165,28 @@ class _Scene:
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 
     def _line(self) -> float:
-        """Return the frequency [Hz] at which the residual's acceleration stands out most."""
+        """Return the frequency [Hz] at which the residual's acceleration (its force) stands out most."""
         from scipy.ndimage import median_filter
 
         i = int(np.argmax([len(e) for e in self.fit.residual]))
         e, t = self.fit.residual[i], self.motion[i]["t"]
-        dt = float(np.median(np.diff(t)))
+        dt, count = float(np.median(np.diff(t))), len(e)
         # fine enough that a line between two bins is not lost
-        power = np.abs(np.fft.rfft(np.diff(e, 2) * np.hanning(len(e) - 2), 4 * len(e))) ** 2
+        e = e if facts(self.view.records[i]).imposed else np.diff(e, 2)
+        power = np.abs(np.fft.rfft(e * np.hanning(len(e)), 4 * count)) ** 2
         ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
         ratio[:12] = 0.0
-        return float(np.argmax(ratio)) / (4 * len(e) * dt)
+        return float(np.argmax(ratio)) / (4 * count * dt)
 
 
 def _motion(record, segments, y):
-    inside = segments.samples
-    x = np.array(record.y, dtype=float)
-    x[inside] = y
+    known = facts(record)
+    x, load = np.array(known.place, dtype=float), np.array(known.load, dtype=float)
+    # the output is the model's own: what it errs by is no function of itself
+    (load if known.imposed else x)[segments.samples] = y
     v = np.gradient(_smooth(x), record.t)
     a = np.gradient(_smooth(v), record.t)
-    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": np.asarray(record.u)}
+    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": load}
 
 
 def _smooth(x, reach=2):

@@ -107,7 +107,8 @@ def find_regions(tried, view):
             inside[error_filter.rows(segments)],
             error_filter.filtered(residual, segments) / tried.train.unit,
         )
+    known = facts(record)
     return error_regions(
-        record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],
-        force=record.u[inside], units=(record.output_unit, record.input_unit),
+        record.t[inside], residual, position=known.place[inside], velocity=known.velocity[inside],
+        force=known.load[inside], units=known.units,
     )  # fmt: skip

@@ -1,0 +1,70 @@
+"""What a recorded channel is of: quantities, the words for them, and their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...checks import choice, shown
+from ...units import dimension, si_unit
+
+UNITS: Mapping[str, tuple[str, ...]] = {
+    "position": ("m", "rad"),
+    "velocity": ("m/s", "rad/s"),
+    "acceleration": ("m/s^2", "rad/s^2"),
+    "force": ("N", "N m"),
+    "voltage": ("V",),
+    "current": ("A",),
+}
+"""Quantities, and the units each may have: on a line, about an axis."""
+
+OTHER = "signal"
+"""What a channel is of whose unit tells none of these."""
+
+_MOTION = ("position", "velocity", "acceleration")
+_WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "position": (("position",), "m"), "x": (("position",), "m"), "angle": (("position",), "rad"),
+    "velocity": (("velocity",), "m/s"), "v": (("velocity",), "m/s"), "speed": (("velocity",), "rad/s"),
+    "acceleration": (("acceleration",), "m/s^2"),
+    "force": (("force",), "N"), "F": (("force",), "N"), "torque": (("force",), "N m"),
+    "voltage": (("voltage",), "V"), "current": (("current",), "A"), "motion": (_MOTION, "m"),
+}  # fmt: skip
+
+
+def quantity_of(unit: str) -> str:
+    """Return the quantity that has this unit; `OTHER` where none has."""
+    powers = dimension(unit)
+    return next((q for q, units in UNITS.items() if any(dimension(u) == powers for u in units)), OTHER)
+
+
+def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tuple[str, float, str]:
+    """Return quantity, factor to SI and SI unit of a channel.
+
+    Parameters
+    ----------
+    keyword : str
+        What the message calls the channel: ``output``, ``input``.
+    word : str or None
+        The quantity, by any of its names; None: the unit decides.
+    unit : str or None
+        None: the usual one of the quantity, `usual` where that is not named either.
+    usual : str
+    """
+    if word is None:
+        unit = usual if unit is None else unit
+        return quantity_of(unit), *si_unit(unit)
+    choice("Measurement", keyword, word, _WORDS)
+    meant, own = _WORDS[word]
+    unit = own if unit is None else unit
+    found = quantity_of(unit)
+    if found not in meant:
+        units = " or ".join(u for q in meant for u in UNITS[q])
+        raise ValueError(
+            f"{keyword}={word!r} needs a unit such as {units}; got {keyword}_unit={shown(unit)}. "
+            "State the unit as it was recorded, or another quantity."
+        )
+    return found, *si_unit(unit)
+
+
+def leading(outputs: Mapping[str, object]) -> str:
+    """Return the quantity of several that stands for the record: the position, or the first."""
+    return "position" if "position" in outputs else next(iter(outputs))
