@@ -591,11 +591,12 @@ def _shows(base, motion, setting, sigma, known):
     return float(np.sqrt(np.mean((left - rows @ weights) ** 2))) / sigma
 
 
-def _faithful(base, motion, setting, sigma):
+def _faithful(values, motion, setting, sigma):
     """Check that the force as recorded moves the machine as the force did, which changes between samples."""
     if setting.ticks == 1:
         return
-    p, width = _array(base), int(WINDOW / setting.tick)
+    steady = {k: v for k, v in values.items() if k not in ("warming", "derating")}
+    p, width = _array(steady), int(WINDOW / setting.tick)
     h = physics.longest_step(p, setting.tick, 2 * float(np.std(motion.speed)), 60.0, 2.0)
     recorded, linear = _recorded(motion, setting), setting.linear
     for i in range(0, len(motion.place) - width, width):
@@ -694,13 +695,13 @@ def _draw(kind, number, rng):
         shows.append(shown)
     motion, measured = _run(values, setting, np.random.default_rng(seed), sigma)
     _suited(motion, setting)
-    _faithful(base, motion, setting, sigma)
+    _faithful(values, motion, setting, sigma)
     other = Setting(**{**setting.__dict__, "length": max(0.6 * setting.length, 6.0)})
     other.signal = str(rng.choice(list(signals.REFERENCES if closed else signals.FORCES)))
     other.size *= rng.uniform(0.7, 1.2)
     second, held = _run(values, other, np.random.default_rng(seed + 1), sigma)
     _suited(second, other)
-    _faithful(base, second, other, sigma)
+    _faithful(values, second, other, sigma)
     scale = _scales(rng, setting, motion, turns, "gravity" in names)
     velocity = rng.uniform(20, 60) if rng.random() < 0.2 and "sensor_quantization" not in names else None
     skip = float(rng.choice([0.0, rng.uniform(0.0, 2.0)]))
