@@ -7,10 +7,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
+from ..checks import known_name
+
 _MEASURED, _SIMULATED, _ERROR = "0.55", "#1f4e9c", "#b3402a"
 
 
-def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) -> ct.ControlPlot:
+def comparison_plot(
+    comparison, record=None, *, output=None, title=None, rows=8, **keywords
+) -> ct.ControlPlot:
     """Draw a `Comparison`; see `ctrl_df.identify.compare.Comparison.plot`.
 
     Parameters
@@ -18,6 +22,8 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     comparison : Comparison
     record : int or None
         Which record; None: the one with the largest error.
+    output : str or None
+        Which of several outputs, by quantity; None: the one that leads.
     title : str or None
         Over the picture.
     rows : int
@@ -26,6 +32,8 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     if keywords:
         raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     chosen = comparison.worst if record is None else comparison.records[record]
+    choices = chosen.by_output
+    chosen = choices[known_name("plot", "output", output or next(iter(choices)), choices)]
     data, unit = chosen.record, chosen.record.output_unit
     fig = plt.gcf() if not plt.gcf().axes else plt.figure()
     fig.set_size_inches(9, 6.5)
@@ -36,7 +44,7 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     lines = np.empty(3, dtype=object)
     lines[0] = [top.plot(data.t, data.y, color=_MEASURED, lw=2.2, label="measured")[0]]
     lines[0].append(top.plot(data.t, chosen.simulated, color=_SIMULATED, lw=1.0, label="simulated")[0])
-    top.set_ylabel(f"Output [{unit}]")
+    top.set_ylabel(f"{_word(data)} [{unit}]")
     top.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.99), fontsize=9)
     top.set_title(f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %", loc="left", fontsize=10)
     factor, small = _readable(chosen.residual, unit)
@@ -62,10 +70,17 @@ def comparison_plot(comparison, record=None, *, title=None, rows=8, **keywords) 
     return ct.ControlPlot(lines, np.array([top, below, bars], dtype=object), fig)
 
 
+def _word(record) -> str:
+    """Return what the output is called: a position or an angle, a velocity or a speed."""
+    turns = "rad" in record.output_unit
+    words = {"position": ("Position", "Angle"), "velocity": ("Velocity", "Speed")}
+    return words.get(record.output, ("Output", "Output"))[turns]
+
+
 def _readable(values, unit):
     """Return factor and unit that make numbers of order one to a thousand: micrometres rather than 1e-6 m."""
     largest = float(np.max(np.abs(values), initial=0.0))
-    if unit not in ("m", "rad", "N", "m/s") or largest == 0 or largest >= 0.5:
+    if unit not in ("m", "rad", "N", "m/s", "rad/s") or largest == 0 or largest >= 0.5:
         return 1.0, unit
     for factor, prefix in ((1e3, "m"), (1e6, "µ"), (1e9, "n")):
         if factor * largest >= 0.5:

@@ -430,8 +430,8 @@ class Measurement:
         output = quantities.leading(outputs)
         return {
             "outputs": MappingProxyType({k: _frozen(v) for k, v in outputs.items()}),
-            "units": MappingProxyType({k: self.units[k] for k in outputs}),
-            "output": output, "y": outputs[output], "output_unit": self.units[output],
+            "units": MappingProxyType({k: self.units.get(k, "") for k in outputs}),
+            "output": output, "y": outputs[output], "output_unit": self.units.get(output, ""),
         }  # fmt: skip
 
     def __getstate__(self):
@@ -441,10 +441,10 @@ class Measurement:
 
     def __setstate__(self, state):
         """Take the fields back, read-only again."""
-        state: dict[str, Any] = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in state.items()}
-        state |= {k: MappingProxyType({n: _frozen(v) for n, v in state[k].items()}) for k in _CHANNELS}
-        state["units"] = MappingProxyType(state["units"])
-        for key, value in state.items():
+        fields: dict[str, Any] = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in state.items()}
+        fields |= {k: MappingProxyType({n: _frozen(v) for n, v in state[k].items()}) for k in _CHANNELS}
+        fields["units"] = MappingProxyType(state["units"])
+        for key, value in fields.items():
             object.__setattr__(self, key, value)
 
     def __repr__(self) -> str:

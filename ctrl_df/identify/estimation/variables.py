@@ -10,7 +10,8 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...units import dimension, size
-from .segments import Facts
+from .segments import Facts, facts
+from .sensed import POSITION, sensed
 
 
 @dataclass(frozen=True)
@@ -38,12 +39,13 @@ class RecordScales:
 
 def seen_by(block, records, known: Facts) -> RecordScales:
     """Return what the records show of the effects of a block."""
-    reach = max(float(np.max(np.abs(r.y))) for r in records) - 4 * known.noise
+    reach = max(float(np.max(np.abs(facts(r).position))) for r in records) - 4 * known.noise
+    placed = all(POSITION in sensed(r).columns for r in records)
     shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
     mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
     return RecordScales(
         known.force, known.spread, known.speed, mass, min(r.dt for r in records),
-        max(r.duration for r in records), -math.inf if shifted else reach,
+        max(r.duration for r in records), -math.inf if shifted or not placed else reach,
     )  # fmt: skip
 
 

@@ -14,8 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from ..estimation.noise_model import NoiseModel, noise_model
+from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.segments import facts
+from ..estimation.sensed import POSITION, force_scale, place_unit, sensed
 from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
@@ -67,17 +69,17 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
             ]
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
-    segments, record = sensitivity.pieces, data.train.records[0]
-    units = {"x": record.output_unit, "f": record.input_unit}
+    segments, record, outputs = sensitivity.pieces, data.train.records[0], tried.train.outputs
+    units = {"x": place_unit(record), "f": record.input_unit}
     if data.disturbed:
         # the residual is of forces here, as the fits see it
-        noise = noise_model([residual[w] for w in segments], max_order=12)
+        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=12)
     found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = noise_model([left[w] for w in segments], max_order=12)
+        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=12)
         found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
@@ -118,6 +120,7 @@ class _Scene:
         self.fit = tried.train
         self.scale = data.scales.position
         self.size = TEST_FORCE * data.scales.force
+        self.given = self.size / force_scale(tried.block)  # what makes a force of that size
         self.motion = [
             _motion(r, w, y)
             for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
@@ -134,7 +137,7 @@ class _Scene:
             self.motion,
             strict=True,
         ):
-            force = record.u + self.size * shape(motion)
+            force = record.u + self.given * shape(motion)
             simulator = self.data.simulator(self.fit.model, record, force=force)
             changes.append((simulator.run(segments, None, start) - y) / self.size)
         return changes
@@ -168,20 +171,23 @@ class _Scene:
         from scipy.ndimage import median_filter
 
         i = int(np.argmax([len(e) for e in self.fit.residual]))
-        e, t = self.fit.residual[i], self.motion[i]["t"]
+        e, t = self.fit.residual[i][self.view.segments[i].blocks[0]], self.motion[i]["t"]
+        order = 2 - sensed(self.view.records[i]).columns[0]
         dt = float(np.median(np.diff(t)))
         # fine enough that a line between two bins is not lost
-        power = np.abs(np.fft.rfft(np.diff(e, 2) * np.hanning(len(e) - 2), 4 * len(e))) ** 2
+        power = np.abs(np.fft.rfft(np.diff(e, order) * np.hanning(len(e) - order), 4 * len(e))) ** 2
         ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
         ratio[:12] = 0.0
         return float(np.argmax(ratio)) / (4 * len(e) * dt)
 
 
 def _motion(record, segments, y):
-    inside = segments.samples
     x = np.array(record.y, dtype=float)
-    x[inside] = y
-    v = np.gradient(_smooth(x), record.t)
+    x[segments.samples] = y[segments.blocks[0]]
+    if sensed(record).columns[0] == POSITION:
+        v = np.gradient(_smooth(x), record.t)
+    else:
+        x, v = facts(record).position, _smooth(x)
     a = np.gradient(_smooth(v), record.t)
     return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": np.asarray(record.u)}
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.segments import facts
+from ..estimation.sensed import place_unit
 from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
@@ -97,7 +98,8 @@ def _sentences(left: Remainder, missed: list[MissingForce], where, measure: str)
 def find_regions(tried, view):
     """Return the regions of error of a fitted candidate on its longest record."""
     i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
-    record, inside, residual = view.records[i], view.segments[i].samples, np.asarray(tried.train.residual[i])
+    record, inside = view.records[i], view.segments[i].samples
+    residual = np.asarray(tried.train.residual[i])[view.segments[i].blocks[0]]
     if not np.all(np.isfinite(residual)):
         return None
     error_filter = tried.train.error_filter
@@ -108,6 +110,7 @@ def find_regions(tried, view):
             error_filter.filtered(residual, segments) / tried.train.unit,
         )
     return error_regions(
-        record.t[inside], residual, position=record.y[inside], velocity=facts(record).velocity[inside],
-        force=record.u[inside], units=(record.output_unit, record.input_unit),
+        record.t[inside], residual, position=facts(record).position[inside],
+        velocity=facts(record).velocity[inside], force=record.u[inside],
+        units=(place_unit(record), record.input_unit),
     )  # fmt: skip

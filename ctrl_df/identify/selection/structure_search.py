@@ -15,6 +15,8 @@ from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
+from ..estimation.segments import facts
+from ..estimation.sensed import POSITION, sensed
 from ..estimation.simulator import feasible
 from ..estimation.variables import default_free
 from ..starting.regression import force_regression, motion_of
@@ -82,7 +84,7 @@ class StructureSearch(Search):
         shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales)
+        w, _ = force_regression(motion_of(data.train, data.thin, block), data.scales)
         guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
@@ -100,6 +102,11 @@ class StructureSearch(Search):
         return self.data.train.records, validation
 
     @property
+    def placed(self) -> bool:
+        """Whether a sensor told the place."""
+        return all(POSITION in sensed(r).columns for r in self.data.train.records)
+
+    @property
     def measure(self) -> str:
         """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
         return "acceleration" if self.data.disturbed else "output"
@@ -108,6 +115,8 @@ class StructureSearch(Search):
 
     def candidates(self, classes, executor=None) -> list[CandidateFit]:
         """Return every effect that can be added, fitted, the one with most evidence first."""
+        if not self.placed:  # sensors' effects are of the place
+            classes = [c for c in classes if c.role != "output"]
         longest = self.segmentations[-1]
         base, found = self._look(classes, executor, self.data.sampled)
         there = base.rmse if self.data.disturbed else longest.moved(base).rmse
@@ -193,7 +202,7 @@ class StructureSearch(Search):
         ended = side_by_side(lambda t: self._ended(t, t in near and len(near) > 1, floor, least), close)
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
-        span = max(float(np.ptp(r.y)) for r in self.data.train.records)
+        span = max(float(np.ptp(facts(r).position)) for r in self.data.train.records)
         chosen, self.noise = ranked(self.base, [t for t in chosen if itself(t, span)])
         return chosen
 

@@ -13,6 +13,8 @@ from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
 from ..estimation.prepared import REFERENCE
+from ..estimation.segments import facts
+from ..estimation.sensed import driving_force
 from ..residuals.motion_phases import reversals
 from ..thresholds import FORCE_KNOWN
 from .curves import Curve, curve_over
@@ -128,7 +130,7 @@ def missing_force(model, record: Measurement) -> MissingForce:
     model : block of masses or inertias and effects, or loop of `ctrl_df.closed_loop` round one
         Of a loop the block is taken, driven by the force that was recorded.
     record : Measurement
-        Its output is the position.
+        Of position, velocity or both.
 
     Raises
     ------
@@ -154,7 +156,7 @@ def missing_force(model, record: Measurement) -> MissingForce:
     coordinates, core = block.coordinates, block.core
     at = 2 if core.bodies == 2 and core.measured == 1 else 0
     position, velocity = found.states[:, at], found.states[:, at + 1]
-    load = np.interp(found.time, record.t, record.u)
+    load = np.interp(found.time, record.t, driving_force(block, record, facts(record).velocity))
     slow = 0.05 * float(np.sqrt(np.mean(velocity**2)))
     travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(position)))))
     marks = np.maximum.accumulate(np.where(_turned(velocity, slow), travelled, 0.0))
