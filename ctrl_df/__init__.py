@@ -22,6 +22,7 @@ from .blocks.hysteresis import (
     relay_hysteresis_nonlinearity,
     relay_with_hysteresis,
 )
+from .blocks.massless import Massless
 from .blocks.mechanism import Mass, Mechanism, TwoMass, backlash_masses, friction_mass
 from .blocks.memoryless import (
     DescribingFunctionNonlinearity,
@@ -51,6 +52,7 @@ _LAZY = {
     "sampled": "simulate.sampled",
     "event_response": "simulate.response",
     "batch_response": "simulate.batch",
+    "imposed_response": "simulate.imposed_response",
     "DescribingFunctionResponse": "limit_cycles.predicted.predict",
     "describing_function_response": "limit_cycles.predicted.predict",
     "LimitCycle": "limit_cycles.predicted.grade",
@@ -78,6 +80,7 @@ __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     "Effect",
     "Inertia",
     "Mass",
+    "Massless",
     "Mechanism",
     "Parameter",
     "Status",

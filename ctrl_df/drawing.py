@@ -19,6 +19,7 @@ PICTURES = {
     "diagnosis": "diagnosis.plot_diagnosis",
     "table diagnosis": "table.plot_frequency_diagnosis",
     "ladder": "ladder.plot_ladder",
+    "horizons": "horizons.horizons_plot",
     "missing force": "missing_force.missing_force_plot",
     "gains": "gains.plot_limit_cycle_map",
 }

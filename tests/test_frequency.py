@@ -110,8 +110,11 @@ def test_what_leaves_no_trace_is_named():
     ],
 )
 def test_a_hidden_effect_is_named_from_its_print(name, added):
-    found = diagnose(user_block(), table(**added), candidates=FEW)
+    known = []
+    found = diagnose(user_block(), table(**added), candidates=FEW, callback=known.append)
+    assert known and {d.status for d in known} == {"under way"} and found.status == "complete"
     assert found.verdict == "effect", found.explanation
+    assert found.best.determined and found.best.error_by_horizon is None
     assert name in {found.best.id, *found.best.equivalents}
     assert found.best.nrmse_holdout < 0.006
     assert found.best.probability > 0.3 and found.best.evidence > 20
@@ -230,3 +233,14 @@ def test_errors_are_clear():
         diagnose(user_block(), mixed)
     with pytest.raises(ValueError, match="more points than parameters"):
         diagnose(user_block(), cdf.FrequencyMeasurement([10.0], [1.0, 2.0], [[1j, 1j]]))
+
+
+def test_a_spring_with_its_resonance_on_the_table_is_found():
+    """Errors of N have a resonance between start and truth; a balance of forces has none."""
+    axis, A, w = cdf.friction_mass(9, 5, 0.5), np.geomspace(6, 50, 6), np.geomspace(3, 20, 8)
+    N = cdf.describing_function_family(axis.with_effect(cdf.LinearSpring(200.0)), A, w).N
+    noise = 1 + 3e-3 * np.random.default_rng(0).standard_normal(N.shape)
+    table = cdf.FrequencyMeasurement(A, w, N * noise)
+    found = diagnose(axis, table, candidates=["linear_spring", "viscous"])
+    assert found.verdict == "effect" and found.best.id == "linear_spring"
+    assert found.best.parameters["stiffness"] == pytest.approx(200, rel=2e-3)

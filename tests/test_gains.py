@@ -4,6 +4,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from legible import illegible
 
 import ctrl_df as cdf
 from ctrl_df.gains.border import Border, refined, spread_points
@@ -231,43 +232,13 @@ def test_nothing_to_tune_in_the_large_is_refused():
 # --- drawn --------------------------------------------------------------------------------------------------
 
 
-def _boxes(figure):
-    """Texts that are drawn, and where."""
-    figure.draw_without_rendering()
-    renderer = figure.canvas.get_renderer()
-    texts = list(figure.texts)
-    for legend in figure.legends:
-        texts += legend.get_texts()
-    for ax in figure.axes:
-        texts += [*ax.texts, ax.title, ax._left_title]
-        if ax.axison:
-            texts += [ax.xaxis.label, ax.yaxis.label]
-            texts += [tick.label1 for axis in (ax.xaxis, ax.yaxis) for tick in axis._update_ticks()]
-    texts = [t for t in texts if t.get_visible() and t.get_text().strip()]
-    return [(t.get_text(), t.get_window_extent(renderer)) for t in texts]
-
-
-def _written(figure):
-    """Texts cut by the figure's rim, and pairs that lie on each other."""
-    boxes = [(text, box) for text, box in _boxes(figure) if box.width > 0]
-    width, height = figure.canvas.get_width_height()
-    cut = [t for t, b in boxes if b.x0 < -1 or b.y0 < -1 or b.x1 > width + 1 or b.y1 > height + 1]
-    over = [
-        (t, u)
-        for i, (t, b) in enumerate(boxes)
-        for u, c in boxes[i + 1 :]
-        if min(b.x1, c.x1) - max(b.x0, c.x0) > 1 and min(b.y1, c.y1) - max(b.y0, c.y0) > 1
-    ]
-    return cut, over
-
-
 @pytest.mark.parametrize("width", [3.3, 7.0])
 def test_the_map_is_drawn_legibly(hunting, width):
     hunting.marks["paper"] = {"kp": 2000, "ki": 44250}
     figure = plt.figure(figsize=(width, 1.1 * width if width < 4 else 0.72 * width), layout="constrained")
     cplt = hunting.plot(ax=figure.add_subplot())
     assert len(cplt.lines[0]) and len(cplt.lines[1]) and len(cplt.lines[3]) == 1
-    assert _written(figure) == ([], [])
+    assert illegible(figure) == ([], [])
     plt.close(figure)
 
 
@@ -282,7 +253,7 @@ def test_sliders_move_the_explorer(width):
     assert [c.omega for c in view.cycles] == pytest.approx([omega for _, omega, _ in single], rel=1e-6)
     view.set(kp=1000)
     assert view.sliders["kp"].val == 1000 and "kp=1000" in repr(view)
-    assert _written(view.figure) == ([], [])
+    assert illegible(view.figure) == ([], [])
     with pytest.raises(TypeError, match="sliders"):
         view.set(kd=1.0)
     plt.close(view.figure)

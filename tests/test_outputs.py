@@ -200,8 +200,8 @@ def test_pictures_name_the_output():
     import matplotlib.pyplot as plt
 
     comparison = cdf.compare(TRUE, records(TRUE)["both"])
-    assert comparison.plot().axes.flat[0].get_ylabel() == "Position [m]"
-    assert comparison.plot(output="velocity").axes.flat[0].get_ylabel() == "Velocity [m/s]"
+    assert comparison.plot().axes.flat[0].get_ylabel() == "position [mm]"
+    assert comparison.plot(output="velocity").axes.flat[0].get_ylabel() == "velocity [m/s]"
     with pytest.raises(ValueError, match="position, velocity"):
         comparison.plot(output="force")
     plt.close("all")

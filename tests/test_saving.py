@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.df.family import read_arrays
+from ctrl_df.df.family_file import read_arrays
 from ctrl_df.df.fingerprint import fingerprint
 from ctrl_df.df.journal import MAGIC, Journal, is_journal, lines_done
 

@@ -70,6 +70,39 @@ def outputs(core: Core, t: float, x) -> list[float]:
     return y + [x[2], x[3]] if core.bodies == 2 else y
 
 
+def holding_force(core: Core, t: float, x, a: float) -> tuple[float, list[float]]:
+    """Return the force that imposes motion `a` [m/s^2] on one body in state `x`, and the rates of its states.
+
+    Of friction that grows with the force carried the force is a part of itself: the balance is iterated.
+    """
+    dx = [0.0] * core.nstates
+    load = 0.0
+    for term in core.forces:
+        z, z_rate = term.state, [0.0] * term.effect.states
+        law = type(term.effect).law
+        load += law(t, x[0], x[1], x[z : z + term.effect.states], term.effect.values, z_rate)  # type: ignore[misc]
+        dx[z : z + term.effect.states] = z_rate
+    if core.contact is not None:
+        pushed = [0.0]
+        _stops(core, t, x, dx, pushed)
+        load += pushed[0]
+    free = core.masses[0] * a - load
+    force = free
+    for _ in range(_BALANCED):
+        told = (x[0], force, -load)
+        if core.presliding is not None:
+            dry = _presliding(core, x, dx, told)
+        else:
+            dry = _creep(core.friction[0], x[1], told)
+        before, force = force, free - dry
+        if abs(force - before) <= 1e-12 * abs(force):
+            break
+    return force, dx
+
+
+_BALANCED = 200  # rounds: friction of nine tenths of the force carried settles to 1e-9 in these
+
+
 def run_channel(channel: tuple[tuple[Primitive, int], ...], t: float, x, u: float, dx) -> float:
     """Pass a signal through the elements of a channel; writes the rates of their states into `dx`."""
     for element, state in channel:

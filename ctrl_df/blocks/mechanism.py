@@ -65,18 +65,23 @@ class Mechanism(ct.NonlinearIOSystem):
                     f"{effect.remedy}"
                 )
         self._core = self._build(self._values, self._effects)
-        core, called = self._core, self._coordinates.name
-        out = [called(signal) for signal in core.motions]
+        inputs, outputs, states = self._labels()
         super().__init__(
             self._updfcn,
             self._outfcn,
-            inputs=[called("F")],
-            outputs=out,
-            states=[*out, *core.state_names[len(out) :]],
+            inputs=inputs,
+            outputs=outputs,
+            states=states,
             dt=0,
             name=name,
             params={key: p.value for key, p in self.parameters.items()},
         )
+
+    def _labels(self) -> tuple[list[str], list[str], list[str]]:
+        """Return the names of inputs, outputs and states."""
+        called = self._coordinates.name
+        out = [called(signal) for signal in self._core.motions]
+        return [called("F")], out, [*out, *self._core.state_names[len(out) :]]
 
     def _build(self, values, effects) -> Core:
         masses = tuple(values[k] for k in self._inertias)

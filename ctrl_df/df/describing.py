@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-import control as ct
 import numpy as np
 
-from ..checks import count, flag, real_array
+from ..checks import count, flag
+from .arguments import (
+    amplitudes_of,
+    axis_of,
+    check_block,
+    check_omega,
+    check_options,
+    common_shape,
+    frequencies_of,
+)
 from .dispatch import method_for
 from .family import Family
 from .points import points
@@ -87,14 +95,14 @@ def _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)
     ):  # python-control's order: F, A, num_points, zero_check, try_method
         shifted = 100 if omega is None else int(omega)
         num_points, zero_check, try_method, omega = shifted, bool(num_points), zero_check, None
-    A = _amplitudes(A)
-    omega = None if omega is None else _frequencies(omega)
-    num_points = _check_block(F, num_points)
-    shape = _common_shape(A, omega)
+    A = amplitudes_of(A)
+    omega = None if omega is None else frequencies_of(omega)
+    num_points = check_block(F, num_points)
+    shape = common_shape(A, omega)
     largest = float(A.max()) if A.size and A.max() > 0 else 1.0
     method = method_for(F, output, try_method, num_points, largest, options)
-    _check_options(method, options)
-    _check_omega(method, omega)
+    check_options(method, options)
+    check_omega(method, omega)
     if A.size == 0 or np.prod(shape) == 0:
         return np.zeros(shape, dtype=complex), np.full(shape, ""), A, omega
     pairs = np.broadcast_to(A, shape), None if omega is None else np.broadcast_to(omega, shape)
@@ -168,88 +176,19 @@ def describing_function_family(
     >>> print(family.regime[:, 1])
     ['stuck' 'stick-slip' 'slip']
     """
-    A = _axis("A", _amplitudes(A), "unit of the input")
+    A = axis_of("A", amplitudes_of(A), "unit of the input")
     if (A <= 0).any():
         raise ValueError(
             "a family needs A > 0; got A=0. Leave it out, or ask describing_function for the slope."
         )
-    omega = None if omega is None else _axis("omega", _frequencies(omega), "rad/s")
+    omega = None if omega is None else axis_of("omega", frequencies_of(omega), "rad/s")
     orders = count("a family", "orders", orders, meaning="highest harmonic")
     if progress is not None:
         flag("a family", "progress", progress)
-    num_points = _check_block(F, num_points)
+    num_points = check_block(F, num_points)
     method = method_for(F, output, try_method, num_points, float(A.max()), options)
-    _check_options(method, options)
-    _check_omega(method, omega)
+    check_options(method, options)
+    check_omega(method, omega)
     work = Work(F, method, A, omega, orders, save)
     work.run(executor, progress)
     return work.family()
-
-
-def _check_block(F, num_points) -> int:
-    """Check what is described beyond what `method_for` asks: linear systems have one input, one output."""
-    if isinstance(F, ct.FrequencyResponseData):
-        raise TypeError(
-            "a describing function needs a block or a law; got measured points (FrequencyResponseData). "
-            "They are linear: their N is the response itself."
-        )
-    if isinstance(F, ct.StateSpace | ct.TransferFunction) and not F.issiso():
-        raise ValueError(
-            f"a describing function needs one input and one output; got {F.ninputs} inputs and {F.noutputs} "
-            "outputs. Select one channel, F[i, j]."
-        )
-    return count("a describing function", "num_points", num_points, meaning="calls a period")
-
-
-def _amplitudes(A) -> np.ndarray:
-    A = real_array("a describing function", "A", A, remedy="An amplitude is a peak value.")
-    if (A < 0).any():
-        bad = A[A < 0].flat[0]
-        raise ValueError(
-            f"cannot evaluate describing function for A < 0; got A={bad:g}. An amplitude is a peak value."
-        )
-    return A
-
-
-def _frequencies(omega) -> np.ndarray:
-    omega = real_array("a describing function", "omega", omega, "rad/s")
-    if (omega <= 0).any():
-        bad = omega[omega <= 0].flat[0]
-        raise ValueError(
-            f"a describing function needs omega > 0 and finite [rad/s]; got omega={bad}. Remove it."
-        )
-    return omega
-
-
-def _common_shape(A, omega):
-    if omega is None:
-        return A.shape
-    try:
-        return np.broadcast_shapes(A.shape, omega.shape)
-    except ValueError:
-        raise ValueError(
-            f"A and omega must broadcast; got shapes {A.shape} and {omega.shape}. "
-            "For every pair of both use describing_function_family."
-        ) from None
-
-
-def _axis(name, values, unit) -> np.ndarray:
-    values = np.array(np.atleast_1d(values))
-    if values.ndim != 1 or values.size == 0:
-        raise ValueError(
-            f"a family needs {name} as a 1-D array with at least one value [{unit}]; got shape "
-            f"{values.shape}."
-        )
-    return values
-
-
-def _check_omega(method, omega):
-    if method.needs_omega and omega is None:
-        raise ValueError(
-            "a block with dynamics has N(A, omega): give omega [rad/s]. Only memoryless blocks do without it."
-        )
-
-
-def _check_options(method, options):
-    if options and not method.takes_options:
-        raise TypeError(f"unrecognized keywords: {', '.join(options)}")

@@ -33,6 +33,8 @@ class Method:
         Whether the block is a law over the amplitude alone, whose corners are looked for.
     quick : bool
         Whether a point costs so little that a scan may take a finer grid than the family's.
+    between : bool
+        Whether pictures may ask for points between those of a family, where its motions have a period.
     light : bool
         Whether a family is computed sooner than sent to another process.
     takes_options : bool
@@ -54,6 +56,7 @@ class Method:
     dynamic: ClassVar[bool] = False
     static: ClassVar[bool] = False
     quick: ClassVar[bool] = False
+    between: ClassVar[bool] = False
     light: ClassVar[bool] = False
     takes_options: ClassVar[bool] = False
     along_amplitudes: ClassVar[bool] = False
@@ -310,6 +313,7 @@ class ImpactMap(_OfPosition):
 
     options: dict = field(default_factory=dict)
 
+    between = True
     at_once = 64  # each takes up to 10 ms where its motion has no period
 
     @staticmethod

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .methods import Method, Quadrature
-from .work import compute_part
+from .threads import go_on
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
+
+
+@dataclass(frozen=True, eq=False)
+class AtPairs:
+    """N of one method at pairs of amplitude and frequency: what a finished family is asked off its grid."""
+
+    method: Method
+
+    @property
+    def light(self) -> bool:
+        """Whether points cost so little that pictures may ask for hundreds."""
+        return self.method.quick or self.method.between
+
+    def __call__(self, A, omega) -> tuple[np.ndarray, np.ndarray]:
+        """Return N and regime at pairs of `A` and `omega`, which broadcast."""
+        A, omega = np.broadcast_arrays(np.asarray(A, dtype=float), np.asarray(omega, dtype=float))
+        N, regime, _ = points(self.method, A, omega if self.method.needs_omega else None)
+        return N, regime
 
 
 def points(method: Method, A, omega, zero_check=False):
@@ -80,3 +100,27 @@ def _slope_at_zero(method, largest, zero_check):
     if abs(N[0]) > 5 * abs(N[1]):
         return complex(np.inf)
     return N[0] if abs(N[0]) > 1e-13 * abs(N[2]) else 0j
+
+
+def compute_part(method: Method, A, omega, orders):
+    """Compute a few lines of a family; a plain function, so that it can be sent to another process.
+
+    Compiled closed forms hear no Ctrl-C: they are asked for some points at a time.
+    """
+    most = method.at_once
+    if most is None or A.size * omega.size <= most:
+        return (method.copied() or method).harmonics(A, omega, orders)
+    rows = max(1, most // omega.size)
+    pieces = [
+        _row_of_pieces(method, A[i : i + rows], omega, orders, max(1, most // rows))
+        for i in range(0, A.size, rows)
+    ]
+    return pieces[0] if len(pieces) == 1 else [np.concatenate(p) for p in zip(*pieces, strict=True)]
+
+
+def _row_of_pieces(method, A, omega, orders, most):
+    pieces = []
+    for k in range(0, omega.size, most):
+        go_on()
+        pieces.append(method.harmonics(A, omega[k : k + most], orders))
+    return [np.concatenate(p, axis=1) for p in zip(*pieces, strict=True)]

@@ -10,11 +10,13 @@ import numpy as np
 from ..checks import executor as checked_executor
 from ..simulate.runs import processors
 from .executors import by_executor, check_picklable
-from .family import FORMAT, Family, place_for, read_arrays, write_arrays
+from .family import Family
+from .family_file import FORMAT, place_for, read_arrays, write_arrays
 from .fingerprint import fingerprint
 from .journal import Journal, is_journal, read_header
 from .methods import Guarded, Method
-from .threads import Threads, go_on
+from .points import AtPairs, compute_part
+from .threads import Threads
 
 LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
@@ -231,6 +233,7 @@ class Work:
             block=self.F,
             description=describe(self.F),
             output=self.method.output,
+            at=AtPairs(self.method),
         )
 
 
@@ -244,30 +247,6 @@ def require_room(na: int, nw: int, orders: int) -> None:
             f"at most {LARGEST / 1e9:.3g} GB are computed at once. Give at most {side} x {side} points or "
             f"{LARGEST // point} in all, fewer harmonics, or several families side by side."
         )
-
-
-def compute_part(method: Method, A, omega, orders):
-    """Compute a few lines of a family; a plain function, so that it can be sent to another process.
-
-    Compiled closed forms hear no Ctrl-C: they are asked for some points at a time.
-    """
-    most = method.at_once
-    if most is None or A.size * omega.size <= most:
-        return (method.copied() or method).harmonics(A, omega, orders)
-    rows = max(1, most // omega.size)
-    pieces = [
-        _row_of_pieces(method, A[i : i + rows], omega, orders, max(1, most // rows))
-        for i in range(0, A.size, rows)
-    ]
-    return pieces[0] if len(pieces) == 1 else [np.concatenate(p) for p in zip(*pieces, strict=True)]
-
-
-def _row_of_pieces(method, A, omega, orders, most):
-    pieces = []
-    for k in range(0, omega.size, most):
-        go_on()
-        pieces.append(method.harmonics(A, omega[k : k + most], orders))
-    return [np.concatenate(p, axis=1) for p in zip(*pieces, strict=True)]
 
 
 def _multiples(size):

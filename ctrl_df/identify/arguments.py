@@ -6,9 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..blocks.effect import Effect, effect_class, effect_library
+from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
+from ..simulate.imposed_response import imposable
 from ..units import dimension
+from .data.imposed import imposes_motion
 from .data.measurement import Measurement
 from .data.quantities import quantity_of
 from .estimation.sensed import OUTPUT_COLUMNS
@@ -108,6 +111,8 @@ def check_quantities(model, records) -> None:
     block = model.parts.block if closed else model
     if not isinstance(block, Mechanism):
         return  # nothing is known of its signals
+    if isinstance(block, Massless) or any(imposes_motion(r) for r in records):
+        return _check_imposed(block, records, closed)
     given = block.signals
     label = block.input_labels[0]
     taken = [given[label], *([block.coordinates.unit] if closed else [])]
@@ -154,6 +159,28 @@ def _driven_by(block: Mechanism) -> str:
     """Return the word for the input of a mechanism."""
     quantity = quantity_of(block.signals[block.input_labels[0]])
     return block.coordinates.force if quantity == "force" else quantity
+
+
+def _check_imposed(block, records, closed) -> None:
+    """Check that records hold the motion that is imposed on a block, and the force that it took."""
+    moves = block.coordinates
+    if closed:
+        raise ValueError(
+            "a loop is driven by its reference; got a record of an imposed motion. Give the block alone."
+        )
+    imposable(block)
+    for record in records:
+        for what, unit, there in (
+            ("input", moves.unit, record.input_unit),
+            ("output", moves.force_unit, record.output_unit),
+        ):
+            if dimension(there) != dimension(unit):
+                raise ValueError(
+                    f"under an imposed motion this model takes {_article(moves.position)} [{moves.unit}] and "
+                    f"gives {_article(moves.force)} [{moves.force_unit}]; the {what} of {record.name!r} is "
+                    f"in {there or 'no unit'}. State {what}_unit= as it was recorded; for a record of force "
+                    "in, motion out give the block a mass."
+                )
 
 
 def _article(word: str) -> str:

@@ -60,6 +60,7 @@ $pictures
 <p>$model</p>
 <div class="scroll">$parameters</div>
 $doubts
+$neighbours
 <h2>Step by step</h2>
 $sections
 <p class="soft">$closing</p>
@@ -69,7 +70,7 @@ $sections
 _ERRORS = {
     "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
-    "model has, such as friction that wanders, are larger here than the noise of the sensor",
+    "model has, such as friction that varies, are larger here than the noise of the sensor",
     "N": "of |N|",
 }
 
@@ -107,8 +108,9 @@ def render(study) -> str:
         lead=html.escape(study.summary().split("\n")[0]),
         how=html.escape(
             "Each step adds the effect that explains most of what is left, and refits everything. It stays "
-            "only if the error on data it was not fitted to falls too. Errors are rms "
-            f"{_ERRORS[study.measure]}."
+            "only if the error on data it was not fitted to falls too. Effects added before are looked at "
+            "again beside it: those no longer needed go, those that stood in for another give way to it. "
+            f"Errors are rms {_ERRORS[study.measure]}."
         ),
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
         steps=_steps(study),
@@ -119,6 +121,7 @@ def render(study) -> str:
         ),
         parameters=_parameters(study, fit),
         doubts="".join(f"<p>{html.escape(s)}</p>" for s in fit.unidentifiable) if fit else "",
+        neighbours=_neighbours(study.neighbours),
         sections="\n".join(_section(i, s) for i, s in enumerate(study.steps)),
         closing=html.escape(
             "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's "
@@ -149,14 +152,47 @@ def _known(study):
 def _steps(study):
     rows = []
     for s in study.steps:
-        name = "+ " + s.effect.replace("_", " ") if s.effect else "start, refitted"
-        name += "".join(f"; without {d.replace('_', ' ')}" for d in s.dropped)
-        name += "".join(f", {d.replace('_', ' ')} in its place" for d in s.instead)
+        name = _did(s)
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
-        evidence = f"{s.evidence:,.0f}" if s.effect else "–"
+        evidence = f"{s.evidence:,.0f}" if s.effect or s.changes else "–"
         rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), evidence, same])
     rows.append(["noise floor", _percent(study.noise), "", "", ""])
     return _table(["Step", "Error", "Held out", "Evidence", "Same on these data"], rows, numeric=(1, 2, 3))
+
+
+def _did(step) -> str:
+    """Return what a step did, in words."""
+    added = [f"+ {_words(step.effect)}"] if step.effect else []
+    gone, new = " and ".join(map(_words, step.dropped)), " and ".join(map(_words, step.instead))
+    if new:
+        added.append(f"{new} in place of {gone}" if gone else f"with {new}")
+    elif gone:
+        added.append(f"without {gone}")
+    return "; ".join(added) or "start, refitted"
+
+
+def _neighbours(neighbours) -> str:
+    """Return the final model beside all that are one exchange away: a sentence, the nearest, and the rest."""
+    if not neighbours:
+        return ""
+    table = neighbours.table(len(neighbours))
+    rows = [list(row) for row in table.rows]
+    head = ["Neighbour", "Evidence", "Error", "Held out", "Verdict"]
+    near, far = rows[:10], rows[10:]
+    told = (
+        "Evidence is over the final model: negative where the data speak against the neighbour. Those "
+        "without a held-out error came nowhere near at a first look over short segments, of which their "
+        "evidence is."
+    )
+    parts = [
+        "<h2>One exchange away</h2>",
+        f'<p>{html.escape(neighbours.sentence)}</p><p class="soft">{html.escape(told)}</p>',
+        f'<div class="scroll">{_table(head, near, numeric=(1, 2, 3))}</div>',
+    ]
+    if far:
+        rest = f'<div class="scroll">{_table(head, far, numeric=(1, 2, 3))}</div>'
+        parts.append(f"<details><summary>{len(far)} more</summary>{rest}</details>")
+    return "\n".join(parts)
 
 
 def _percent(value) -> str:
@@ -182,11 +218,7 @@ def _section(number, step):
     d = step.diagnosis
     if d is None or not d.ranking:
         return ""
-    title = (
-        "What the start is missing"
-        if number == 0
-        else f"What is missing after {step.effect.replace('_', ' ')}"
-    )
+    title = "What the start is missing" if number == 0 else f"What is missing after: {_did(step)}"
     body = [
         f"<details{' open' if number == 0 else ''}><summary>{html.escape(title)}</summary>",
         f"<p>{html.escape(d.explanation)}</p>",

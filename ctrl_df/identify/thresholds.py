@@ -163,6 +163,13 @@ FILTERED = 40
 MANY_SEGMENTS = 50
 """Segments of a record from which on they tell how their errors go on from one to the next."""
 
+HORIZONS = 8
+"""Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
+shortest."""
+
+SHORTEST_HORIZON = 0.25
+"""The shortest, in to-and-fro motions: over less the fitted position and speed follow nearly anything."""
+
 HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
 
@@ -191,7 +198,11 @@ POINTS, POINTS_COSTLY = 20, 10
 """Points of a table for the first look, and for effects whose orbits take many times as long."""
 
 RIVALS = 2
-"""Candidates of a step of a ladder that are tried again when a later step is taken."""
+"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
+
+BRANCHES = 3
+"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
+hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
 
 BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
 """Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load
@@ -236,8 +247,15 @@ FINER = 3
 REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 """Travel after a reversal [typical positions] over which a force may build up."""
 
+HIDDEN_RTOL = 1e-6
+"""Tolerance of hidden states under an imposed motion: far below a load cell's noise, and three times as
+fast as seven digits."""
+
 TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 """Sizes of an effect of which nothing is known, over those of the table."""
+
+BALANCED_STARTS = 2
+"""Starts of an effect on a table from which its forces are balanced: sizes apart may balance alike."""
 
 WORK_LOW = {"max_steps": 4_000, "averages": 8}
 WORK_MEDIUM = {"max_steps": 25_000, "averages": 8}

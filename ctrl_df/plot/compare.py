@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from ..checks import known_name
+from .page import ERROR, MEASURED, MODEL, legend_above, page
 
-_MEASURED, _SIMULATED, _ERROR = "0.55", "#1f4e9c", "#b3402a"
+_LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
+
+
+_KINDS = {"low_speed": "speed"}  # the region may as well be one of high speed
 
 
 def comparison_plot(
-    comparison, record=None, *, output=None, title=None, rows=8, **keywords
+    comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None, **keywords
 ) -> ct.ControlPlot:
     """Draw a `Comparison`; see `ctrl_df.identify.compare.Comparison.plot`.
 
@@ -24,57 +30,72 @@ def comparison_plot(
         Which record; None: the one with the largest error.
     output : str or None
         Which of several outputs, by quantity; None: the one that leads.
+    beside : Comparison or sequence of them
+        Of other models with the same records, drawn in the same picture.
+    labels : sequence of str
+        Names of the models: that of `comparison` first.
     title : str or None
         Over the picture.
     rows : int
         Regions shown.
+    width : float or None
+        Of a new figure [in].
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
-    chosen = comparison.worst if record is None else comparison.records[record]
-    choices = chosen.by_output
-    chosen = choices[known_name("plot", "output", output or next(iter(choices)), choices)]
-    data, unit = chosen.record, chosen.record.output_unit
-    fig = plt.gcf() if not plt.gcf().axes else plt.figure()
-    fig.set_size_inches(9, 6.5)
-    grid = fig.add_gridspec(2, 2, width_ratios=(2.1, 1), height_ratios=(1.5, 1))
-    top = fig.add_subplot(grid[0, 0])
-    below = fig.add_subplot(grid[1, 0], sharex=top)
-    bars = fig.add_subplot(grid[:, 1])
-    lines = np.empty(3, dtype=object)
-    lines[0] = [top.plot(data.t, data.y, color=_MEASURED, lw=2.2, label="measured")[0]]
-    lines[0].append(top.plot(data.t, chosen.simulated, color=_SIMULATED, lw=1.0, label="simulated")[0])
-    top.set_ylabel(f"{_word(data)} [{unit}]")
-    top.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1, 0.99), fontsize=9)
-    top.set_title(f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %", loc="left", fontsize=10)
-    factor, small = _readable(chosen.residual, unit)
-    lines[1] = below.plot(data.t, chosen.residual, color=_ERROR, lw=0.7)
-    below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
-    white = chosen.white
-    below.set_title(
-        f"rmse {factor * chosen.rmse:.3g} {small}; {'white' if white else 'not white'} "
-        f"(p {'< 1e-6' if white.p_value < 1e-6 else f'= {white.p_value:.2g}'})",
-        loc="left", fontsize=10,
-    )  # fmt: skip
-    below.set_ylabel(f"Measured - simulated [{small}]")
-    below.set_xlabel("Time [s]")
-    for edge in chosen.edges[1:-1]:
-        for ax in (top, below):
-            ax.axvline(data.t[edge], color="0.8", lw=0.6, zorder=0)
-    lines[2] = _regions(bars, chosen.where, rows)
-    for ax in (top, below, bars):
-        ax.spines[["top", "right"]].set_visible(False)
-    top.tick_params(labelbottom=False)
-    fig.suptitle(data.name if title is None else title, fontsize=11)
-    fig.tight_layout()
-    return ct.ControlPlot(lines, np.array([top, below, bars], dtype=object), fig)
+    others = [beside] if hasattr(beside, "records") else list(beside)
+    index = comparison.records.index(comparison.worst) if record is None else record
+    choices = comparison.records[index].by_output
+    quantity = known_name("plot", "output", output or next(iter(choices)), choices)
+    models = [c.records[index].by_output[quantity] for c in (comparison, *others)]
+    chosen, data = models[0], models[0].record
+    if any(len(m.residual) != len(chosen.residual) for m in models):
+        raise ValueError("comparisons in one picture need the same records; these differ in length.")
+    names = [*labels, *(f"model {i + 1}" for i in range(len(labels), len(models)))]
+    if len(models) == 1 and not labels:
+        names = ["simulated"]
+    with page(0.72, narrow=1.9, width=width, keywords=keywords) as drawn:
+        found = drawn.rows(
+            wide=["yw", "ew"], narrow=["y", "e", "w"], width_ratios=(2.0, 1), narrow_ratios=(1.2, 1, 1.3)
+        )
+        top, below, bars = found["y"], found["e"], found["w"]
+        below.sharex(top)
+        drawn.keep = [top, below, bars]
+        lines = np.empty(3, dtype=object)
+        lines[0] = top.plot(data.t, data.y, color=MEASURED, lw=2.6, label="measured")
+        lines[1] = []
+        factor, small = _readable(np.concatenate([m.residual for m in models]), data.output_unit)
+        size, unit = _readable(data.y, data.output_unit)
+        for m, name, (color, style) in zip(models, names, _LOOKS, strict=False):
+            lines[0] += top.plot(data.t, m.simulated, color=color, ls=style, lw=1.0, label=name)
+            color = ERROR if len(models) == 1 else color
+            lines[1] += below.plot(data.t, m.residual, color=color, ls=style, lw=0.7)
+        top.set_ylabel(f"{_said(chosen)} [{unit}]")
+        top.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{size * value:.4g}"))
+        below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
+        told = f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %"
+        if len(models) > 1:
+            told = "nrmse " + ", ".join(f"{m.nrmse:.3g}" for m in models)
+        legend_above(top, told)
+        white = chosen.white
+        below.set_title(
+            f"rmse {factor * chosen.rmse:.3g} {small}; {'white' if white else 'not white'} "
+            f"(p {'< 1e-6' if white.p_value < 1e-6 else f'= {white.p_value:.2g}'})"
+        )
+        below.set_ylabel(f"measured - simulated [{small}]")
+        below.set_xlabel("time [s]")
+        for edge in chosen.edges[1:-1]:
+            for ax in (top, below):
+                ax.axvline(data.t[edge], color="0.85", lw=0.6, zorder=0)
+        lines[2] = _regions(bars, chosen.where, rows)
+        top.tick_params(labelbottom=False)
+        drawn.finished([], data.name if title is None else title)
+        return ct.ControlPlot(lines, np.array(drawn.keep, dtype=object), drawn.figure)
 
 
-def _word(record) -> str:
-    """Return what the output is called: a position or an angle, a velocity or a speed."""
-    turns = "rad" in record.output_unit
-    words = {"position": ("Position", "Angle"), "velocity": ("Velocity", "Speed")}
-    return words.get(record.output, ("Output", "Output"))[turns]
+def _said(comparison) -> str:
+    """Return what the output is, in a word."""
+    return {"m": "position", "rad": "angle", "m/s": "velocity", "rad/s": "speed"}.get(
+        comparison.record.output_unit, "output"
+    )
 
 
 def _readable(values, unit):
@@ -92,21 +113,22 @@ def _regions(ax, regions, rows):
     """Bars: share of the error; ticks: share of the samples. Filled where beyond chance."""
     significant = regions.significant
     shown = (significant if len(significant) else regions)[:rows][::-1]
-    ax.set_title(
-        "Where the error is" if len(significant) else "No region stands out", loc="left", fontsize=10
-    )
+    ax.set_title("where the error is" if len(significant) else "no region stands out")
     if not shown:
         ax.set_axis_off()
         return []
     place = np.arange(len(shown))
     share = [100 * r.share for r in shown]
-    colour = [_ERROR if r.p_value < 0.01 else "0.8" for r in shown]
-    bars = list(ax.barh(place, share, 0.42, color=colour))
+    colour = [ERROR if r.p_value < 0.01 else "0.8" for r in shown]
+    bars = list(ax.barh(place, share, 0.36, color=colour))
     for i, region in enumerate(shown):
         expected = 100 * region.expected_share
-        ax.plot([expected, expected], [i - 0.21, i + 0.21], color="black", lw=1.5)
-        ax.text(0, i + 0.27, f"{region.kind.replace('_', ' ')}: {region.label}", fontsize=8, va="bottom")
+        ax.plot([expected, expected], [i - 0.18, i + 0.18], color="black", lw=1.5)
+        words = f"{_KINDS.get(region.kind, region.kind.replace('_', ' '))}: {region.label}"
+        words = "\n".join(textwrap.wrap(words, 36))
+        ax.text(0, i + 0.22, words, fontsize=plt.rcParams["legend.fontsize"], va="bottom", linespacing=0.95)
     ax.set_yticks([])
     ax.set_ylim(min(len(shown), 5) - 5.6, len(shown) - 0.1)  # few bars stay slim, at the top
-    ax.set_xlabel("Share of squared error [%]\n(black: share of the samples)", fontsize=9)
+    ax.set_xlim(0, max(1.25 * max(share), 1.05 * max(100 * r.expected_share for r in shown)))
+    ax.set_xlabel("share of squared error [%]\n(black: of the samples)")
     return bars

@@ -1,17 +1,20 @@
-"""What the pictures of -1/N share: views, curves and their labels, units, axes."""
+"""What the pictures of -1/N share: views, curves as smooth as they are, their labels, units."""
 
 from __future__ import annotations
 
 import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import ticker
 
 from ..blocks.mechanism import Mechanism
 from ..units import over
+from .labels import Labels, settle
+from .page import AMPLITUDE_COLOR, OMEGA_COLOR
 
-AMPLITUDE_COLOR, OMEGA_COLOR, NYQUIST_COLOR, CROSSING_COLOR = "#1f5a99", "#b3541e", "#222222", "#a3123a"
+_TURN = np.radians(4.0)  # between two pieces of a polyline, seen as a curve up to it
+_ROUNDS, _POINTS = 6, 1500  # of refinement, and of points of a curve
+_IRREGULAR = "aperiodic"  # a mean over a motion without a period: no curve
 
 
 def memoryless(family) -> bool:
@@ -33,17 +36,6 @@ def units(family) -> tuple[str, str, str]:
 def in_brackets(unit) -> str:
     """Return `` [unit]``, or nothing."""
     return f" [{unit.strip()}]" if unit else ""
-
-
-def axes_for(ax):
-    """Return (figure, axes): those given, an empty current figure's, or a new figure's."""
-    if ax is not None:
-        ax = np.asarray(ax, dtype=object).reshape(-1)[0]
-        return ax.figure, ax
-    fig = plt.gcf()
-    if fig.axes:
-        fig = plt.figure()
-    return fig, fig.add_subplot()
 
 
 def view_of(values, include=()) -> tuple[float, float, float, float]:
@@ -89,52 +81,128 @@ def set_view(ax, view):
     ax.set_ylim(view[2], view[3])
 
 
-def draw_single(ax, amplitudes, curve, *, ticks=4, **kwargs):
-    """Draw the one -1/N curve of a memoryless block, with a few amplitudes marked; return the line."""
+def draw_single(ax, amplitudes, curve, **kwargs):
+    """Draw the one -1/N curve of a memoryless block; return the line."""
     options = {"color": AMPLITUDE_COLOR, "lw": 1.8, **kwargs}
     finite = np.where(np.isfinite(curve), curve, np.nan)
-    line = ax.plot(np.real(finite), np.imag(finite), **options)[0]
-    inside = np.nonzero(_inside(ax, finite))[0]
-    if inside.size:
-        chosen = inside[np.unique(np.linspace(0, inside.size - 1, ticks).round().astype(int))]
-        ax.plot(np.real(finite[chosen]), np.imag(finite[chosen]), ".", color=line.get_color(), ms=5)
-        taken: list = []
-        for i in chosen:
-            text = f"{'A = ' if i == chosen[0] else ''}{amplitudes[i]:.3g}"
-            _label(ax, finite[i], text, line.get_color(), taken, offset=(2, -12))
-    return line
+    return ax.plot(np.real(finite), np.imag(finite), **options)[0]
+
+
+def name_amplitudes(labels: Labels, amplitudes, curve, color, *, ticks=4):
+    """Mark a few amplitudes along the -1/N curve of a memoryless block."""
+    ax = labels.ax
+    inside = np.nonzero(_inside(ax, curve))[0]
+    if not inside.size:
+        return
+    chosen = inside[np.unique(np.linspace(0, inside.size - 1, ticks).round().astype(int))]
+    ax.plot(np.real(curve[chosen]), np.imag(curve[chosen]), ".", color=color, ms=5)
+    for i in chosen:
+        text = f"{'A = ' if i == chosen[0] else ''}{amplitudes[i]:.3g}"
+        labels.write(
+            text, [(curve[i].real, curve[i].imag)],
+            offsets=((3, -4), (3, 4), (-3, 4), (-3, -4), (0, 8), (0, -8)), color=color,
+        )  # fmt: skip
 
 
 def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):
-    """Draw -1/N at a few constant amplitudes (solid) and frequencies (dashed), labelled at their ends."""
+    """Draw -1/N at a few constant amplitudes (solid) and frequencies (dashed).
+
+    Returns
+    -------
+    solid, dashed : lists of lines
+    names : list of (symbol, value, unit, curve, color)
+        For `name_curves`.
+    """
     z = family.minus_inverse
     shown = _inside(ax, z)
     rows, columns = _chosen(shown.any(axis=1), amplitudes), _chosen(shown.any(axis=0), frequencies)
-    solid, dashed, taken = [], [], []
-    for n, i in enumerate(rows):
-        options = {"color": AMPLITUDE_COLOR, "lw": 1.1, "alpha": 0.9, **kwargs}
-        curve = unbroken(z[i], family.regime[i])
+    solid, dashed, names = [], [], []
+    for i in rows:
+        options = {"color": AMPLITUDE_COLOR, "lw": 1.1, "alpha": 0.9, "label": "_", **kwargs}
+        A = family.amplitudes[i]
+        curve = _curve(ax, family, A, family.omega, z[i], family.regime[i])
         solid += ax.plot(np.real(curve), np.imag(curve), **options)
-        text = (
-            f"A = {family.amplitudes[i]:.3g}{units(family)[0]}" if n == 0 else f"{family.amplitudes[i]:.3g}"
-        )
-        _end_label(ax, z[i], text, AMPLITUDE_COLOR, taken)
-    for n, k in enumerate(columns):
-        options = {"color": OMEGA_COLOR, "lw": 1.1, "ls": (0, (4, 2)), "alpha": 0.9, **kwargs}
-        curve = unbroken(z[:, k], family.regime[:, k])
+        names.append(("A", A, units(family)[0], curve[::-1], AMPLITUDE_COLOR))
+    for k in columns:
+        options = {"color": OMEGA_COLOR, "lw": 1.1, "ls": (0, (4, 2)), "alpha": 0.9, "label": "_", **kwargs}
+        w = family.omega[k]
+        curve = _curve(ax, family, family.amplitudes, w, z[:, k], family.regime[:, k])
         dashed += ax.plot(np.real(curve), np.imag(curve), **options)
-        text = f"ω = {family.omega[k]:.3g} rad/s" if n == 0 else f"{family.omega[k]:.3g}"
-        _end_label(ax, z[:, k], text, OMEGA_COLOR, taken, from_start=True)
-    return solid, dashed
+        names.append(("ω", w, " rad/s", curve, OMEGA_COLOR))
+    return solid, dashed, names
 
 
-def finish(ax, title, unit=""):
-    """Axes through the origin, labels and title; `unit` that of -1/N."""
+def name_curves(labels: Labels, names):
+    """Write the value at which each curve was drawn at its end, or as near to it as there is room.
+
+    The first of each kind says of what it is the value.
+    """
+    said = set()
+    for symbol, value, unit, curve, color in names:
+        inside = curve[_inside(labels.ax, curve)]
+        if not inside.size:
+            continue
+        some = inside[np.unique(np.linspace(0, inside.size - 1, 16).round().astype(int))]
+        written = labels.write(
+            f"{value:.3g}" if symbol in said else f"{symbol} = {value:.3g}{unit}",
+            [(z.real, z.imag) for z in some], offsets=((3, 3), (3, -3), (-3, 3), (-3, -3)), color=color,
+            bbox=dict(boxstyle="round,pad=0.05", fc="white", ec="none", alpha=0.8),
+        )  # fmt: skip
+        if written is not None:
+            said.add(symbol)
+
+
+def labels_of(ax, lines) -> Labels:
+    """Return the labels of axes on which lines were drawn, all else being set."""
+    settle(ax.figure)
+    return Labels(ax, [np.column_stack(line.get_data()) for line in lines if line is not None])
+
+
+def _curve(ax, family, A, omega, z, regime):
+    """Return -1/N along a line of the grid, cut at jumps; computed between its nodes where that is quick."""
+    at = getattr(family, "at", None)
+    if at is None or not at.light:
+        return unbroken(z, regime)
+    A, omega = np.broadcast_arrays(A, omega)
+    over_omega = A[0] == A[-1]
+    p = np.array(np.log(omega if over_omega else A))
+    z, regime = np.array(z), np.array(regime)
+    for _ in range(_ROUNDS):
+        wanted = _coarse(ax, z)
+        wanted = wanted[~((regime[wanted] == _IRREGULAR) & (regime[wanted + 1] == _IRREGULAR))]
+        if not wanted.size or p.size + wanted.size > _POINTS:
+            break
+        new = 0.5 * (p[wanted] + p[wanted + 1])
+        N, names = at(A[0], np.exp(new)) if over_omega else at(np.exp(new), omega[0])
+        with np.errstate(all="ignore"):
+            value = -1 / N
+        p, z = np.insert(p, wanted + 1, new), np.insert(z, wanted + 1, value)
+        regime = np.insert(regime, wanted + 1, names)
+    return unbroken(z, regime)
+
+
+def _coarse(ax, z):
+    """Return the pieces of a polyline, within the picture, at whose ends it turns visibly."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    at = z.real / (right - left) + 1j * z.imag / (top - bottom)
+    seen = _inside(ax, z)
+    step = np.diff(at)
+    with np.errstate(all="ignore"):
+        turn = np.abs(np.angle(step[1:] / step[:-1])) * (np.minimum(abs(step[1:]), abs(step[:-1])) > 2e-3)
+    bent = np.zeros(step.size, bool)
+    sharp = np.nan_to_num(turn) > _TURN
+    bent[:-1] |= sharp
+    bent[1:] |= sharp
+    bent |= np.nan_to_num(np.abs(step)) > 0.1
+    return np.nonzero(bent & (seen[:-1] | seen[1:]) & np.isfinite(step))[0]
+
+
+def finish(ax, unit=""):
+    """Axes through the origin and their labels; `unit` that of -1/N."""
     ax.axhline(0, color="0.75", lw=0.8, zorder=0)
     ax.axvline(0, color="0.75", lw=0.8, zorder=0)
     ax.set_xlabel(f"Real part{in_brackets(unit)}")
     ax.set_ylabel(f"Imaginary part{in_brackets(unit)}")
-    ax.set_title(title, fontsize=10)
     plain_spines(ax)
 
 
@@ -184,36 +252,3 @@ def _inside(ax, z):
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     with np.errstate(invalid="ignore"):
         return np.isfinite(z) & (z.real >= left) & (z.real <= right) & (z.imag >= bottom) & (z.imag <= top)
-
-
-def _end_label(ax, curve, text, color, taken, from_start=False):
-    inside = np.nonzero(_inside(ax, curve))[0]
-    order = inside if from_start else inside[::-1]
-    for index in order:
-        if _label(ax, curve[index], text, color, taken):
-            return
-
-
-def _label(ax, place, text, color, taken, offset=(3, 3)) -> bool:
-    """Write a label unless another one is near; return whether it was written."""
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    x, y = (place.real - left) / (right - left), (place.imag - bottom) / (top - bottom)
-    if not (0.01 < x < 0.93 and 0.01 < y < 0.96):
-        return False
-    box = ax.get_position()
-    wide = 5.5 * len(text) / (72 * ax.figure.get_figwidth() * box.width)  # of the axes; 5.5 points a letter
-    if any(x < end and start < x + wide and abs(y - v) < 0.05 for start, end, v in taken):
-        return False
-    taken.append((x, x + wide, y))
-    ax.annotate(
-        text,
-        (place.real, place.imag),
-        xytext=offset,
-        textcoords="offset points",
-        color=color,
-        fontsize=8.5,
-        bbox=dict(boxstyle="round,pad=0.1", fc="white", ec="none", alpha=0.75),
-        zorder=4,
-        annotation_clip=True,
-    )
-    return True

@@ -5,22 +5,26 @@ from __future__ import annotations
 import warnings
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.lines import Line2D
 
 from ..limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
 from .curves import (
-    CROSSING_COLOR,
-    NYQUIST_COLOR,
-    axes_for,
     draw_curves,
     draw_single,
     finish,
+    labels_of,
     memoryless,
+    name_amplitudes,
+    name_curves,
     set_view,
     short,
     units,
     view_of,
 )
+from .family import keys
+from .page import CROSSING_COLOR, NYQUIST_COLOR, OMEGA_COLOR, in_lines, legend_above, page, style
 
 _ANALYSIS = (
     "refine",
@@ -60,6 +64,8 @@ def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **k
         Name of the Nyquist curve.
     ax, title
         As in ``ct.nyquist_plot``.
+    width
+        Of a new figure [in], where a family is drawn.
     refine, warn_nyquist, output, orders, num_points, try_method, executor, save, progress, options
         Passed to `describing_function_response`.
     **kwargs
@@ -115,7 +121,8 @@ def _over_nyquist(response, point_label, label, kwargs):
     kwargs.setdefault("max_curve_magnitude", reach)  # its default would bend the curve where the crossing is
     if isinstance(label, str):
         kwargs["label"] = label
-    kwargs.setdefault("title", _title(response))
+    width = _width_of(kwargs.get("ax"))
+    kwargs.setdefault("title", in_lines(_title(response), width, 0.65))
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*tight_layout.*|.*constrained_layout.*")
         cplt = response.response.plot(**kwargs)
@@ -126,83 +133,116 @@ def _over_nyquist(response, point_label, label, kwargs):
     if response.positions:
         _keep_in_view(ax, response.positions)
     amplitudes = response.family.amplitudes
-    lines[1] = [draw_single(ax, amplitudes, curve[-amplitudes.size :], color="#b3541e")]
-    _mark(ax, response, point_label)
+    curve = curve[-amplitudes.size :]
+    with plt.rc_context(style(width)):
+        lines[1] = [draw_single(ax, amplitudes, curve, color=OMEGA_COLOR)]
+        labels = labels_of(ax, [*lines[0], *lines[1]])
+        _mark(labels, response, point_label)
+        name_amplitudes(labels, amplitudes, curve, OMEGA_COLOR)
     return ct.ControlPlot(lines, cplt.axes, cplt.figure)
 
 
 def _family_picture(response, point_label, label, kwargs):
-    fig, ax = axes_for(kwargs.pop("ax", None))
     title = kwargs.pop("title", None)
     family, H = response.family, response.response
-    w = np.abs(np.imag(H.contour)) if not H.dt else np.angle(H.contour) / H.dt
-    seen = (w >= family.omega.min() * (1 - 1e-9)) & (w <= family.omega.max() * (1 + 1e-9))
-    curve = np.asarray(H.response)[seen]
-    include = response.positions or ()
-    z = family.minus_inverse.ravel()
-    set_view(ax, view_of(z if include else np.concatenate([z, curve]), include))
-    solid, dashed = draw_curves(ax, family)
+    with page(0.72, narrow=0.95, width=kwargs.pop("width", None), ax=kwargs.pop("ax", None)) as drawn:
+        ax = drawn.panels(1)[0]
+        w = np.abs(np.imag(H.contour)) if not H.dt else np.angle(H.contour) / H.dt
+        seen = (w >= family.omega.min() * (1 - 1e-9)) & (w <= family.omega.max() * (1 + 1e-9))
+        curve = np.asarray(H.response)[seen]
+        include = response.positions or ()
+        z = family.minus_inverse.ravel()
+        set_view(ax, view_of(z if include else np.concatenate([z, curve]), include))
+        solid, dashed, names = draw_curves(ax, family)
+        options = {"color": NYQUIST_COLOR, "lw": 2.0, "label": label or None, **kwargs}
+        nyquist = ax.plot(np.real(curve), np.imag(curve), **options)
+        finish(ax, units(family)[2])
+        named = label if isinstance(label, str) else "H(jω)"
+        handles = [Line2D([], [], color=nyquist[0].get_color(), lw=2.0, label=named), *keys()]
+        handles += _kinds(response)
+        title = _title(response) if title is None else title
+        legend_above(ax, title, handles=handles, columns=3)
+        labels = labels_of(ax, [*nyquist, *solid, *dashed])
+        _mark(labels, response, point_label)
+        name_curves(labels, names)
+        return ct.ControlPlot(_two(nyquist, solid + dashed), np.array([[ax]]), drawn.figure)
+
+
+def _width_of(ax) -> float:
+    """Return the width of the figure that will be drawn on [in]."""
+    if ax is not None:
+        return float(np.ravel(np.asarray(ax, dtype=object))[0].figure.get_figwidth())
+    return float(plt.gcf().get_figwidth() if plt.get_fignums() else plt.rcParams["figure.figsize"][0])
+
+
+def _two(first, second):
     lines = np.empty(2, dtype=object)
-    options = {"color": NYQUIST_COLOR, "lw": 2.2, "label": label or None, **kwargs}
-    lines[0] = ax.plot(np.real(curve), np.imag(curve), **options)
-    lines[1] = solid + dashed
-    _name_curve(ax, curve, label if isinstance(label, str) else "H(jω)")
-    _mark(ax, response, point_label)
-    finish(ax, _title(response) if title is None else title, units(family)[2])
-    return ct.ControlPlot(lines, np.array([[ax]]), fig)
+    lines[0], lines[1] = list(first), list(second)
+    return lines
 
 
-def _name_curve(ax, curve, name):
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    inside = (curve.real > left) & (curve.real < right) & (curve.imag > bottom) & (curve.imag < top)
-    index = np.nonzero(inside)[0]
-    if index.size:
-        place = curve[index[int(0.93 * (index.size - 1))]]
-        ax.annotate(
-            name,
-            (place.real, place.imag),
-            xytext=(6, 0),
-            textcoords="offset points",
-            color=NYQUIST_COLOR,
-            fontsize=10,
-        )
-
-
-def _mark(ax, response, point_label):
-    """Mark the crossings: filled where Loeb calls the cycle stable, open otherwise.
+def _look(cycle) -> dict:
+    """Return how a crossing is drawn: filled where Loeb calls the cycle stable, open otherwise.
 
     Open diamonds stand on a motion that N does not name; the curves drawn do not pass through them.
     """
-    force = units(response.family)[0]
+    fill = CROSSING_COLOR if cycle.stable and not cycle.branch else "white"
+    return dict(
+        marker="D" if cycle.branch else "o", ms=6, mfc=fill, mec=CROSSING_COLOR, mew=1.4, ls="none", zorder=6
+    )
+
+
+def _kinds(response) -> list[Line2D]:
+    """Return what the legend says of the crossings there are."""
+    handles = {}
+    for cycle in response.limit_cycles:
+        kind = (
+            "cycle on another motion of the block" if cycle.branch
+            else "predicted cycle, stable" if cycle.stable
+            else "predicted cycle, unstable" if cycle.stable is not None
+            else "predicted cycle, stability open"
+        )  # fmt: skip
+        handles[kind] = Line2D([], [], label=kind, **_look(cycle))
+    return list(handles.values())
+
+
+def _mark(labels, response, point_label):
+    """Mark the crossings and write amplitude and frequency beside each."""
+    ax, force = labels.ax, units(response.family)[0]
     if force and point_label == _POINT_LABEL:
         point_label = f"%.4g{force} @ %.4g rad/s"
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    places = [
-        ((p.real - left) / (right - left), (p.imag - bottom) / (top - bottom)) for p in response.positions
-    ]
-    for (x, y), position, cycle in zip(places, response.positions, response.limit_cycles, strict=True):
-        fill = CROSSING_COLOR if cycle.stable and not cycle.branch else "white"
-        shape = "D" if cycle.branch else "o"
-        ax.plot(position.real, position.imag, shape, ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
-        if not point_label:
-            continue
-        # of two that lie together the lower one's label goes below
-        shift = -16 if any(abs(x - u) < 0.25 and 0 < v - y < 0.1 for u, v in places) else 6
-        below = cycle.branch != "" and shift < 0  # two lines hang from the crossing
-        aside = (-8, "right") if x > 0.72 else (8, "left")
-        ax.annotate(
+    for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
+        ax.plot(position.real, position.imag, **{**_look(cycle), "ms": 7})
+    labels.block_points([(p.real, p.imag) for p in response.positions], 7)
+    if not point_label:
+        return
+    for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
+        labels.write(
             (point_label % (cycle.amplitude, cycle.omega)).strip() + _standing(cycle),
-            (position.real, position.imag),
-            xytext=(aside[0], 2 if below else shift),
-            textcoords="offset points",
-            ha=aside[1],
-            va="top" if below else "baseline",
-            color=CROSSING_COLOR,
-            fontsize=10,
-            fontweight="normal" if cycle.branch else "bold",
-            bbox=dict(boxstyle="round,pad=0.15", fc="white", ec="none", alpha=0.85),
-            zorder=7,
-        )
+            [(position.real, position.imag)],
+            offsets=_away(ax, position, response.positions),
+            must=True, avoid=False, color=CROSSING_COLOR, fontweight="normal" if cycle.branch else "bold",
+            bbox=dict(boxstyle="round,pad=0.1", fc="white", ec="none", alpha=0.85), zorder=7,
+        )  # fmt: skip
+
+
+_ASIDE = np.array(
+    [(7, 5), (7, -5), (-7, 5), (-7, -5), (0, 9), (0, -9), (10, 13), (10, -13), (-10, 13), (-10, -13)]
+)
+"""Where a label may stand beside its crossing [pt], the best first."""
+
+
+def _away(ax, position, positions):
+    """Return the places beside a crossing, those away from a near one first."""
+    at = ax.transData.transform([(p.real, p.imag) for p in positions])
+    own = ax.transData.transform((position.real, position.imag))
+    apart = at - own
+    far = np.hypot(*apart.T)
+    near = apart[(far > 0) & (far < 40)]
+    if not len(near):
+        return _ASIDE.tolist()
+    toward = _ASIDE @ (near[0] / np.hypot(*near[0]))
+    return _ASIDE[np.argsort(toward > 0, kind="stable")].tolist()
 
 
 def _standing(cycle) -> str:

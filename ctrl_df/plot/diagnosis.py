@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
 
-from .sheet import finished, sheet
+from .labels import settle
+from .page import MODEL, OTHER, QUIET, page
 
-_BEST, _OTHER, _NOTHING = "#1f4e9c", "#9db4d8", "0.75"
 
-
-def plot_diagnosis(diagnosis, *, rows=8, title=None, **keywords) -> ct.ControlPlot:
+def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> ct.ControlPlot:
     """Draw a `Diagnosis`: held-out error of every candidate beside that of the refitted model.
 
     Parameters
@@ -20,13 +20,16 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, **keywords) -> ct.ControlPl
         Candidates shown.
     title : str or None
         Over the picture.
+    width : float or None
+        Of a new figure [in].
     """
-    fig = sheet(8, 1.15 + 0.36 * (min(rows, len(diagnosis.ranking)) + 1), keywords)
-    ax = fig.add_subplot()
-    bars = draw_ranking(ax, diagnosis, rows)
-    of = "acceleration" if diagnosis.measure == "acceleration" else "output"
-    ax.set_xlabel(f"Held-out error, rms over rms of the {of} [%]")
-    return finished(fig, [ax], [bars], verdict_title(diagnosis, title))
+    inches = 1.0 + 0.3 * (min(rows, len(diagnosis.ranking)) + 1)
+    with page(inches / 7.0, narrow=inches / 3.3, width=width, keywords=keywords) as drawn:
+        ax = drawn.panels(1)[0]
+        bars = draw_ranking(ax, diagnosis, rows)
+        of = "acceleration" if diagnosis.measure == "acceleration" else "output"
+        ax.set_xlabel(f"held-out error, rms over rms of the {of} [%]")
+        return drawn.finished([bars], verdict_title(diagnosis, title))
 
 
 def verdict_title(diagnosis, title) -> str:
@@ -40,24 +43,39 @@ def draw_ranking(ax, diagnosis, rows):
     entries = [None, *shown]
     values = 100 * np.array([diagnosis.nrmse_holdout, *(c.nrmse_holdout for c in shown)])
     labels = ["nothing added", *(c.id.replace("_", " ") for c in shown)]
-    shades = [_NOTHING] + [_BEST if c is diagnosis.best else _OTHER for c in shown]
+    shades = [QUIET] + [MODEL if c is diagnosis.best else OTHER for c in shown]
     # A candidate far worse than the model without it must not squeeze the others.
     end = 1.15 * max(values[np.isfinite(values) & (values <= 2 * values[0])], default=1.0)
     at = np.arange(len(values))[::-1]
     known = np.isfinite(values)
     bars = ax.barh(at, np.where(known, np.minimum(values, end), 0.0), color=shades, height=0.62)
+    ax.set_yticks(at, labels)
+    ax.set_ylim(-0.6, len(values) - 0.4)
+    small = plt.rcParams["legend.fontsize"]
+    notes = []
     for y, value, c in zip(at, values, entries, strict=True):
         if not np.isfinite(value):
-            ax.text(0, y, " passed over at the first look", va="center", fontsize=8, color="0.45")
+            notes.append(ax.text(0, y, " not confirmed", va="center", fontsize=small, color="0.45"))
             continue
         text = f" {value:.3g} %" + (" >>" if value > end else "")
         if c is not None and c.probability >= 0.005:
-            text += f"   p = {c.probability:.0%}"
+            text += f"  p = {c.probability:.0%}"
         if c is not None and c.equivalents:
-            text += "   same as " + ", ".join(e.replace("_", " ") for e in c.equivalents)
-        ax.text(min(value, end), y, text, va="center", fontsize=8)
-    ax.set_yticks(at, labels)
-    ax.set_xlim(0, 1.9 * end)
-    ax.set_ylim(-0.6, len(values) - 0.4)
-    ax.spines[["top", "right"]].set_visible(False)
+            same = [e.replace("_", " ") for e in c.equivalents]
+            text += "\n same as " + ", ".join(same[:2]) + (" …" if len(same) > 2 else "")
+        notes.append(ax.text(min(value, end), y, text, va="center", fontsize=small, linespacing=0.95))
+    _make_room(ax, end, notes)
     return bars
+
+
+def _make_room(ax, end, notes):
+    """Widen the axis until what is written behind the bars fits."""
+    ax.set_xlim(0, end)
+    settle(ax.figure)
+    renderer = ax.figure.canvas.get_renderer()
+    whole = ax.get_window_extent(renderer).width
+    share = 1.0
+    for note in notes:
+        wide = note.get_window_extent(renderer).width
+        share = min(share, max(0.15, (1 - wide / whole) * end / max(note.get_position()[0], 1e-12 * end)))
+    ax.set_xlim(0, end / share)

@@ -7,7 +7,6 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.path import Path
 from matplotlib.widgets import Slider
 
 from ..checks import flag, number, real_array, shown, unknown_keywords
@@ -19,19 +18,19 @@ from ..gains.predicted import PredictedCycle, at_one
 from ..gains.simulated import Simulated, simulated
 from ..gains.stability import unstable_poles
 from .curves import (
-    AMPLITUDE_COLOR,
-    CROSSING_COLOR,
-    NYQUIST_COLOR,
-    OMEGA_COLOR,
     draw_curves,
     draw_single,
     finish,
     in_brackets,
+    labels_of,
     memoryless,
+    name_amplitudes,
+    name_curves,
     set_view,
     units,
     view_of,
 )
+from .page import AMPLITUDE_COLOR, CROSSING_COLOR, NYQUIST_COLOR, style
 
 _OWNER = "explore"
 _SHOWN = (48, 64)  # amplitudes and frequencies of the curves drawn
@@ -182,6 +181,10 @@ class Explorer:
         self.figure.canvas.draw_idle()
 
     def _draw(self):
+        with plt.rc_context(style(self.figure.get_figwidth())):
+            self._draw_plane()
+
+    def _draw_plane(self):
         plane, ax = self.plane, self.ax
         self.cycles = at_one(plane, self.gains, next(iter(self.sliders)))
         self.simulated = simulated(plane.structure, self.gains) if self.exact else None
@@ -199,23 +202,27 @@ class Explorer:
             marked.append(complex(plane.structure.loop_gain(self.gains, np.array([orbit.omega]))[0]))
         z = self._family.minus_inverse.ravel()
         set_view(ax, view_of(z if marked else np.concatenate([z, curve]), marked))
+        names: list = []
+        lines = ax.plot(curve.real, curve.imag, color=NYQUIST_COLOR, lw=2.0, zorder=3)
+        amplitudes, single = self._family.amplitudes, self._family.minus_inverse[:, 0]
         if memoryless(self._family):
-            draw_single(ax, self._family.amplitudes, self._family.minus_inverse[:, 0])
+            lines.append(draw_single(ax, amplitudes, single))
         else:
-            draw_curves(ax, self._family, *((3, 3) if self._narrow else (5, 5)))
-        ax.plot(curve.real, curve.imag, color=NYQUIST_COLOR, lw=2.0, zorder=3)
+            solid, dashed, names = draw_curves(ax, self._family, *((3, 3) if self._narrow else (5, 5)))
+            lines += solid + dashed
         for place, cycle in zip(places, self.cycles, strict=True):
             fill = CROSSING_COLOR if cycle.stable else "white"
             ax.plot(place.real, place.imag, "o", ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
         if orbit is not None:
             ax.plot(marked[-1].real, marked[-1].imag, "*", ms=13, mfc=_EXACT_COLOR, mec="white", zorder=7)
-        finish(ax, "", units(self._family)[2])
-        ax.set_title(self._told(orbit), fontsize=7 if self._narrow else 9, loc="left")
-        size = 7 if self._narrow else 9
-        ax.tick_params(labelsize=size)
-        ax.xaxis.label.set_fontsize(size)
-        ax.yaxis.label.set_fontsize(size)
-        _clear(ax, marked, curve)
+        finish(ax, units(self._family)[2])
+        ax.set_title(self._told(orbit))
+        ax.tick_params(labelsize=plt.rcParams["xtick.labelsize"])
+        labels = labels_of(ax, lines)
+        labels.block_points([(z.real, z.imag) for z in marked], 10)
+        name_curves(labels, names)
+        if not names:
+            name_amplitudes(labels, amplitudes, single, AMPLITUDE_COLOR)
 
     def _told(self, orbit) -> str:
         """Lines above the picture: predicted, and what the loop does."""
@@ -234,31 +241,6 @@ class Explorer:
             poles = int(unstable_poles(self.plane, *(self.gains[name] for name in GAINS)))
             lines.append(f"in the large the loop is {'unstable' if poles else 'stable'}")
         return "\n".join(lines)
-
-
-def _clear(ax, places, curve):
-    """Leave out labels on a mark, on the controller's curve or over the rim; say what those left are."""
-    ax.figure.draw_without_rendering()
-    renderer, rim = ax.figure.canvas.get_renderer(), ax.get_window_extent()
-    marks = [ax.transData.transform((z.real, z.imag)) for z in places]
-    line = Path(ax.transData.transform(np.column_stack([curve.real, curve.imag])))
-
-    def clear(text):
-        box = text.get_window_extent(renderer)
-        over = not (rim.x0 <= box.x0 and box.x1 <= rim.x1 + _RIM and rim.y0 <= box.y0 and box.y1 <= rim.y1)
-        near = any(box.padded(_MARK).contains(*mark) for mark in marks)
-        return not (over or near or line.intersects_bbox(box, filled=False))
-
-    for text in ax.texts:
-        text.set_visible(clear(text))
-    for color, symbol in ((AMPLITUDE_COLOR, "A"), (OMEGA_COLOR, "ω")):
-        left = [text for text in ax.texts if text.get_visible() and text.get_color() == color]
-        for text in left if not any("=" in text.get_text() for text in left) else ():
-            bare = text.get_text()
-            text.set_text(f"{symbol} = {bare}")
-            if clear(text):
-                break
-            text.set_text(bare)
 
 
 def _range(name, value) -> tuple[float, float, float]:

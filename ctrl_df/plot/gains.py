@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 
 from ..blocks.mechanism import Mechanism
 from ..gains.map import Fine, LimitCycleMap
-from .curves import AMPLITUDE_COLOR, CROSSING_COLOR, OMEGA_COLOR, in_brackets, plain_spines
+from .curves import in_brackets, plain_spines
+from .page import AMPLITUDE_COLOR, CROSSING_COLOR, NARROW, OMEGA_COLOR
 
 _REST, _CYCLE, _BOTH, _HATCH = "#ffffff", "#d9d9d9", "#efefef", "////"
-_NARROW = 4.5  # [in] below which fewer contours are drawn
 
 
 def plot_limit_cycle_map(
@@ -62,7 +62,7 @@ def plot_limit_cycle_map(
         figure = ax.figure
     ax.set_xlim(gains_map.x[0], gains_map.x[-1])
     ax.set_ylim(gains_map.y[0], gains_map.y[-1])
-    narrow = figure.get_figwidth() * ax.get_position().width < _NARROW
+    narrow = figure.get_figwidth() * ax.get_position().width < NARROW
     fine = gains_map.fine()
     names = _regions(ax, fine)
     drawn = np.empty(4, dtype=object)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from .curves import log_ticks
+from .page import MODEL, OTHER, legend_above, page
+
 OF = {
-    "output": "Error [% of the output's rms]",
-    "acceleration": "Error of the acceleration [% of its rms]",
-    "N": "Error [% of |N|]",
+    "output": "error [% of the output's rms]",
+    "acceleration": "error of the acceleration [% of its rms]",
+    "N": "error [% of |N|]",
 }
 """What errors are drawn as shares of."""
 
 
-def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
+def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
     """Draw the error of each step on training and held-out data; the grey band is the noise floor.
 
     Parameters
@@ -22,44 +27,38 @@ def plot_ladder(study, *, title=None, **keywords) -> ct.ControlPlot:
     study : Study
     title : str or None
         Over the picture.
+    width : float or None
+        Of a new figure [in].
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     steps = study.steps
-    fig = plt.gcf() if not plt.gcf().axes else plt.figure()
-    fig.set_size_inches(max(5.5, 1.6 * len(steps) + 1.5), 3.6)
-    ax = fig.add_subplot()
-    at = np.arange(len(steps))
-    train = 100 * np.array([s.nrmse for s in steps])
-    held = 100 * np.array([s.nrmse_holdout for s in steps])
-    lines = np.empty(3, dtype=object)
-    lines[0] = list(ax.bar(at - 0.19, train, 0.36, color="#9db4d8"))
-    lines[1] = list(ax.bar(at + 0.19, held, 0.36, color="#1f4e9c"))
-    bottom = 0.5 * min(100 * study.noise, train.min(), held.min())
-    lines[2] = [ax.axhspan(bottom, max(100 * study.noise, bottom * 1.001), color="0.85", zorder=0)]
-    ax.set_yscale("log")
-    ax.yaxis.set_major_formatter("{x:g}")
-    ax.yaxis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:.0e}"[0] in "25" else "")
-    ax.set_ylim(bottom, 2.2 * max(train.max(), held.max()))
-    for x, a, b in zip(at, train, held, strict=True):
-        ax.text(x - 0.19, a * 1.05, f"{a:.3g}", ha="center", fontsize=8)
-        ax.text(x + 0.19, b * 1.05, f"{b:.3g}", ha="center", fontsize=8)
-    ax.text(at[0] - 0.19, train[0] * 0.8, "train", ha="center", va="top", fontsize=8, rotation=90)
-    ax.text(
-        at[0] + 0.19, held[0] * 0.8, "held out", ha="center", va="top", fontsize=8, rotation=90, color="w"
-    )
-    ax.set_xlim(-0.6, len(steps) - 0.4)
-    ax.text(len(steps) - 0.38, 100 * study.noise, "noise", va="center", ha="left", fontsize=8)
-    names = ["refitted", *("+ " + s.effect.replace("_", " ") for s in steps[1:])]
-    ax.set_xticks(
-        at,
-        [
-            n + "".join(f"\n{sign} {d.replace('_', ' ')}" for sign, d in s.changes)
-            for n, s in zip(names, steps, strict=True)
-        ],
-    )
-    ax.set_ylabel(OF[study.measure])
-    ax.spines[["top", "right"]].set_visible(False)
-    fig.suptitle("Error of every step" if title is None else title, fontsize=11)
-    fig.tight_layout()
-    return ct.ControlPlot(lines, np.array([ax], dtype=object), fig)
+    with page(0.52, narrow=0.95, width=width, keywords=keywords) as drawn:
+        ax = drawn.panels(1)[0]
+        small = plt.rcParams["legend.fontsize"]
+        at = np.arange(len(steps))
+        train = 100 * np.array([s.nrmse for s in steps])
+        held = 100 * np.array([s.nrmse_holdout for s in steps])
+        bars = [
+            ax.bar(at - 0.19, train, 0.36, color=OTHER, label="fitted data"),
+            ax.bar(at + 0.19, held, 0.36, color=MODEL, label="held-out data"),
+        ]
+        bottom = 0.5 * min(100 * study.noise, train.min(), held.min())
+        noise = ax.axhspan(
+            bottom, max(100 * study.noise, bottom * 1.001), color="0.88", zorder=0, label="noise"
+        )
+        ax.set_yscale("log")
+        ax.set_ylim(bottom, 2.2 * max(train.max(), held.max()))
+        log_ticks(ax.yaxis, *ax.get_ylim())
+        for x, a, b in zip(at, train, held, strict=True):
+            ax.text(x - 0.19, a * 1.05, f"{a:.2g}", ha="center", fontsize=small)
+            ax.text(x + 0.19, b * 1.05, f"{b:.2g}", ha="center", fontsize=small)
+        ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
+        room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
+        ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])
+        ax.set_ylabel(OF[study.measure])
+        legend_above(ax, "Error of every step" if title is None else title)
+        return drawn.finished([*bars, [noise]])
+
+
+def _in_lines(parts, room) -> str:
+    """Return what a step did, broken into lines of so many letters."""
+    return "\n".join("\n".join(textwrap.wrap(part.replace("_", " "), room)) for part in parts)

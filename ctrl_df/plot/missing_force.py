@@ -5,17 +5,17 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
-from .sheet import finished, sheet
+from .page import legend_above, page
 
 _POINTS, _CURVE = "#7f9cc6", "#b3402a"
 _WORDS = {
-    "time": "Time", "position": "Position", "velocity": "Velocity", "load": "Force recorded",
-    "reversal": "Distance since the last reversal",
+    "time": "time", "position": "position", "velocity": "velocity", "load": "force recorded",
+    "reversal": "distance since the last reversal",
 }  # fmt: skip
-_TURNING = {"position": "Angle", "velocity": "Speed", "load": "Torque recorded"}
+_TURNING = {"position": "angle", "velocity": "speed", "load": "torque recorded"}
 
 
-def missing_force_plot(missing, *, against="time", title=None, **keywords) -> ct.ControlPlot:
+def missing_force_plot(missing, *, against="time", title=None, width=None, **keywords) -> ct.ControlPlot:
     """Draw a `MissingForce`; see `ctrl_df.identify.smoothing.missing_force.MissingForce.plot`.
 
     Parameters
@@ -26,39 +26,44 @@ def missing_force_plot(missing, *, against="time", title=None, **keywords) -> ct
         at which the force is known, and their mean as a curve.
     title : str or None
         Over the picture.
+    width : float or None
+        Of a new figure [in].
     """
-    fig = sheet(7, 3.8, keywords)
-    ax = fig.add_subplot()
-    turning = missing.unit != "N"
-    what = "torque" if turning else "force"
-    if against == "time":
-        band = ax.fill_between(
-            missing.time, missing.force - 2 * missing.std, missing.force + 2 * missing.std,
-            color=_POINTS, alpha=0.45, lw=0, label="two standard deviations",
-        )  # fmt: skip
-        line = ax.plot(missing.time, missing.force, color=_CURVE, lw=0.9, label=f"missing {what}")[0]
-        lines = [[band, line]]
-    else:
-        curve = missing.curve(against)
-        points = ax.plot(*curve.points, ".", ms=2.5, color=_POINTS, rasterized=True, label="each instant")[0]
-        drawn = ax.errorbar(
-            curve.at, curve.force, 2 * curve.std, color=_CURVE, lw=1.2, capsize=2,
-            label="mean, two standard errors",
-        )  # fmt: skip
-        lines = [[points, drawn]]
-    ax.axhline(0.0, color="0.6", lw=0.7, zorder=0)
-    words = (
-        {**_WORDS, "position": "Angle", "velocity": "Speed", "load": "Torque recorded"} if turning else _WORDS
-    )
-    ax.set_xlabel(f"{words[against]} [{missing.units[against]}]")
-    along = " along the motion" if against == "reversal" else ""
-    ax.set_ylabel(f"Missing {what}{along} [{missing.unit}]")
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1, 1), fontsize=9, borderaxespad=0.2)
-    if against == "time":
-        ax.set_xlim(missing.time[0], missing.time[-1])
-        ax.set_ylim(*_limits(missing))
-    return finished(fig, [ax], lines, missing.name if title is None else title)
+    with page(0.55, narrow=0.8, width=width, keywords=keywords) as drawn:
+        ax = drawn.panels(1)[0]
+        turning = missing.unit != "N"
+        what = "torque" if turning else "force"
+        if against == "time":
+            band = ax.fill_between(
+                missing.time, missing.force - 2 * missing.std, missing.force + 2 * missing.std,
+                color=_POINTS, alpha=0.45, lw=0, label="two standard deviations",
+            )  # fmt: skip
+            line = ax.plot(missing.time, missing.force, color=_CURVE, lw=0.9, label=f"missing {what}")[0]
+            lines = [[band, line]]
+        else:
+            curve = missing.curve(against)
+            points = ax.plot(
+                *curve.points, ".", ms=2.5, color=_POINTS, rasterized=True, label="each instant"
+            )[0]
+            means = ax.errorbar(
+                curve.at, curve.force, 2 * curve.std, color=_CURVE, lw=1.2, capsize=2,
+                label="mean, two standard errors",
+            )  # fmt: skip
+            lines = [[points, means]]
+        ax.axhline(0.0, color="0.6", lw=0.7, zorder=0)
+        words = (
+            {**_WORDS, "position": "angle", "velocity": "speed", "load": "torque recorded"}
+            if turning
+            else _WORDS
+        )
+        ax.set_xlabel(f"{words[against]} [{missing.units[against]}]")
+        along = " along the motion" if against == "reversal" else ""
+        ax.set_ylabel(f"missing {what}{along} [{missing.unit}]")
+        if against == "time":
+            ax.set_xlim(missing.time[0], missing.time[-1])
+            ax.set_ylim(*_limits(missing))
+        legend_above(ax, missing.name if title is None else title)
+        return drawn.finished(lines)
 
 
 def _limits(missing):

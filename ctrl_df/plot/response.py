@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import control as ct
-import matplotlib.pyplot as plt
 import numpy as np
 
 from ..blocks.coordinates import AXIS, LINE
+from .page import legend_above, page
 
 
-def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None) -> ct.ControlPlot:
+def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None, width=None) -> ct.ControlPlot:
     """Draw the force above and the position [mm] below (torque and angle [mrad] of what turns), over time.
 
     Parameters
@@ -23,18 +23,23 @@ def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None) -> 
     title : str, optional
     ax : pair of Axes, optional
         Force, position.
+    width : float, optional
+        Of a new figure [in].
 
     Returns
     -------
     ControlPlot
     """
     runs = [runs] if hasattr(runs, "time") else list(runs)
-    if ax is None:
-        figure = plt.figure(figsize=(7.6, 4.6), layout="constrained")
-        axes = figure.subplots(2, 1, sharex=True)
-    else:
-        axes = np.ravel(ax)
-        figure = axes[0].figure
+    with page(0.6, narrow=1.0, width=width, ax=ax) as drawn:
+        axes = list(drawn.rows(wide="Fx", narrow="Fx", sharex=True).values())
+        lines = _drawn(axes, runs, labels, window)
+        if title:
+            drawn.finished([], title)
+        return ct.ControlPlot(lines, np.array(axes, dtype=object).reshape(2, 1), drawn.figure)
+
+
+def _drawn(axes, runs, labels, window):
     styles = (dict(color="k", lw=1.2), dict(color="0.5", lw=1.2, ls="--"))
     lines = np.empty((2, 1), dtype=object)
     lines[0, 0], lines[1, 0] = [], []
@@ -50,13 +55,8 @@ def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None) -> 
     axes[1].set_ylabel(f"{moves.position} [m{moves.unit}]")
     axes[1].set_xlabel("time [s]")
     for axis in axes:
-        axis.grid(True, color="0.92", lw=0.7)
+        axis.grid(True)
         axis.margins(x=0.01)
-        axis.spines[["top", "right"]].set_visible(False)
     if any(labels):
-        axes[0].legend(
-            frameon=False, fontsize="small", ncols=len(runs), loc="lower left", bbox_to_anchor=(0, 1.0)
-        )
-    if title:
-        figure.suptitle(title, fontsize="medium")
-    return ct.ControlPlot(lines, axes.reshape(2, 1), figure)
+        legend_above(axes[0])
+    return lines

@@ -6,11 +6,14 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from .curves import log_ticks
 from .diagnosis import draw_ranking, verdict_title
-from .sheet import finished, sheet
+from .page import legend_above, page
 
 
-def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **keywords) -> ct.ControlPlot:
+def table_comparison_plot(
+    comparison, record=None, *, title=None, curves=6, width=None, **keywords
+) -> ct.ControlPlot:
     """Draw a `FrequencyComparison`: magnitude and phase over frequency, dots measured, lines model; error.
 
     Parameters
@@ -22,15 +25,28 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **ke
         Over the picture.
     curves : int
         Amplitudes drawn at most.
+    width : float or None
+        Of a new figure [in].
     """
-    fig = sheet(9.5, 5.2, keywords)
     chosen = comparison.worst if record is None else comparison.records[record]
     data = chosen.record
-    grid = fig.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.3, 1))
-    top = fig.add_subplot(grid[0, 0])
-    below = fig.add_subplot(grid[1, 0], sharex=top)
-    plane = fig.add_subplot(grid[:, 1])
-    dots, curves_drawn = [], []
+    with page(0.62, narrow=2.1, width=width, keywords=keywords) as drawn:
+        found = drawn.rows(
+            wide=["ne", "pe"], narrow=["n", "p", "e"], width_ratios=(1.25, 1), narrow_ratios=(1.2, 1, 1.2)
+        )
+        top, below, plane = found["n"], found["p"], found["e"]
+        below.sharex(top)
+        dots, lines = _over_frequency(top, below, data, chosen, curves)
+        legend_above(top, f"error {chosen.nrmse:.2%} of |N| (dots measured, lines model)")
+        cells = error_plane(drawn.figure, plane, data, np.abs(chosen.relative))
+        plane.set_title("error over the plane")
+        drawn.keep = [top, below, plane]
+        return drawn.finished([dots, lines, [cells]], data.name if title is None else title)
+
+
+def _over_frequency(top, below, data, chosen, curves):
+    """Draw magnitude and phase at a few amplitudes; return measured dots and the model's lines."""
+    dots, lines = [], []
     rows = np.unique(np.linspace(0, len(data.A) - 1, min(curves, len(data.A))).astype(int))
     for i in rows:
         shade = plt.get_cmap("viridis")(0.85 * i / max(len(data.A) - 1, 1))
@@ -42,25 +58,19 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, **ke
         phase = np.degrees(np.unwrap(np.angle(measured)))
         phase -= 360 * np.ceil(np.max(phase) / 360 - 0.5)
         step = np.degrees(np.angle(model / measured)) - turn
-        dots += top.loglog(w, np.abs(measured), "o", color=shade, ms=4)
-        curves_drawn += top.loglog(w, np.abs(model), "-", color=shade, lw=1.2)
-        below.semilogx(w, phase, "o", color=shade, ms=4)
-        below.semilogx(w, phase + step, "-", color=shade, lw=1.2)
-        curves_drawn[-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
-    top.legend(frameon=False, fontsize=8, loc="lower left", handlelength=1.2, labelspacing=0.25)
+        dots += top.loglog(w, np.abs(measured), "o", color=shade, ms=3)
+        lines += top.loglog(w, np.abs(model), "-", color=shade, lw=1.1)
+        below.semilogx(w, phase, "o", color=shade, ms=3)
+        below.semilogx(w, phase + step, "-", color=shade, lw=1.1)
+        lines[-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
     top.set_ylabel(f"|N| [{data.output_unit}/{data.input_unit}]")
-    below.set_ylabel("Phase [deg]")
-    below.set_xlabel("Frequency [rad/s]")
-    top.set_title(f"error {chosen.nrmse:.2%} of |N| (dots measured, lines model)", loc="left", fontsize=10)
-    cells = error_plane(fig, plane, data, np.abs(chosen.relative))
+    below.set_ylabel("phase [deg]")
+    below.set_xlabel("frequency ω [rad/s]")
     for ax in (top, below):
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.grid(True, which="major", color="0.92", lw=0.7)
-    _plain_ticks(below.xaxis)
+        ax.grid(True, which="major")
+    log_ticks(below.xaxis, data.omega.min(), data.omega.max())
     top.tick_params(which="both", labelbottom=False)
-    plane.set_title("Error over the plane", loc="left", fontsize=10)
-    lines = [dots, curves_drawn, [cells]]
-    return finished(fig, [top, below, plane], lines, data.name if title is None else title)
+    return dots, lines
 
 
 def error_plane(fig, ax, data, error, limits=None, bar=True):
@@ -76,22 +86,13 @@ def error_plane(fig, ax, data, error, limits=None, bar=True):
     )  # fmt: skip
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.set_xlabel("Frequency [rad/s]")
-    ax.set_ylabel(f"Amplitude [{data.input_unit}]")
-    _plain_ticks(ax.xaxis)
-    _plain_ticks(ax.yaxis)
+    ax.set_xlabel("frequency ω [rad/s]")
+    ax.set_ylabel(f"amplitude A [{data.input_unit}]")
+    log_ticks(ax.xaxis, data.omega.min(), data.omega.max())
+    log_ticks(ax.yaxis, data.A.min(), data.A.max())
     if bar:
-        fig.colorbar(picture, ax=ax, label="Error [% of |N|]", shrink=0.85)
+        fig.colorbar(picture, ax=ax, label="error [% of |N|]", shrink=0.85)
     return picture
-
-
-def _plain_ticks(axis):
-    """Label a logarithmic axis at 1, 2, 5, 10, ... in plain numbers: it spans a decade or two."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _edges(values):
@@ -103,7 +104,7 @@ def _edges(values):
     return np.exp(np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]]))
 
 
-def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, **keywords) -> ct.ControlPlot:
+def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **keywords) -> ct.ControlPlot:
     """Draw a `FrequencyDiagnosis`: the ranking, and the error on the plane before and after the first of it.
 
     Parameters
@@ -113,24 +114,32 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, **keywords) -> ct
         Candidates shown.
     title : str or None
         Over the picture.
+    width : float or None
+        Of a new figure [in].
     """
-    fig = sheet(9.5, 6.0, keywords)
-    top, bottom = fig.add_gridspec(2, 1, height_ratios=(1, 1.15))
-    ax = fig.add_subplot(top)
-    bars = draw_ranking(ax, diagnosis, rows)
-    ax.set_xlabel("Held-out error, rms over |N| [%]")
-    grid = bottom.subgridspec(1, 2)
-    left, right = fig.add_subplot(grid[0]), fig.add_subplot(grid[1])
-    i = diagnosis.before.records.index(diagnosis.before.worst)
-    before, after = (np.abs(c.records[i].relative) for c in (diagnosis.before, diagnosis.after))
-    both = np.concatenate([before[before > 0], after[after > 0]])
-    limits = (float(np.nanquantile(both, 0.05)), float(np.nanmax(both))) if len(both) else None
-    data = diagnosis.before.records[i].record
-    error_plane(fig, left, data, before, limits, bar=False)
-    error_plane(fig, right, data, after, limits)
-    left.set_title(f"model refitted, {diagnosis.nrmse:.2%}", loc="left", fontsize=10)
-    name = diagnosis.ranking[0].id.replace("_", " ") if diagnosis.ranking else "nothing"
-    error = diagnosis.ranking[0].nrmse if diagnosis.ranking else diagnosis.nrmse
-    right.set_title(f"with {name}, {error:.2%}", loc="left", fontsize=10)
-    right.set_ylabel("")
-    return finished(fig, [ax, left, right], [bars], verdict_title(diagnosis, title))
+    inches = 0.9 + 0.3 * (min(rows, len(diagnosis.ranking)) + 1)
+    with page((inches + 2.9) / 7, narrow=(inches + 4.4) / 3.3, width=width, keywords=keywords) as drawn:
+        found = drawn.rows(
+            wide=["rr", "ba"], narrow=["r", "b", "a"], height_ratios=(inches, 2.9),
+            narrow_ratios=(inches, 2.2, 2.2),
+        )  # fmt: skip
+        ax, left, right = found["r"], found["b"], found["a"]
+        i = diagnosis.before.records.index(diagnosis.before.worst)
+        before, after = (np.abs(c.records[i].relative) for c in (diagnosis.before, diagnosis.after))
+        both = np.concatenate([before[before > 0], after[after > 0]])
+        limits = (float(np.nanquantile(both, 0.05)), float(np.nanmax(both))) if len(both) else None
+        data = diagnosis.before.records[i].record
+        error_plane(drawn.figure, left, data, before, limits, bar=drawn.narrow)
+        error_plane(drawn.figure, right, data, after, limits)
+        left.set_title(f"model refitted, {diagnosis.nrmse:.2%}")
+        name = diagnosis.ranking[0].id.replace("_", " ") if diagnosis.ranking else "nothing"
+        error = diagnosis.ranking[0].nrmse if diagnosis.ranking else diagnosis.nrmse
+        right.set_title(f"with {name}, {error:.2%}")
+        if not drawn.narrow:
+            right.set_ylabel("")
+        ax.set_xlabel("held-out error, rms over |N| [%]")
+        drawn.keep = [ax, left, right]
+        done = drawn.finished([], verdict_title(diagnosis, title))
+        lines = np.empty(1, dtype=object)
+        lines[0] = list(draw_ranking(ax, diagnosis, rows))
+        return ct.ControlPlot(lines, done.axes, done.figure)

@@ -15,6 +15,8 @@ from .input_channel import InputDeadZone, InputDelay, InputGain, InputLag, Input
 from .linear_spring import LinearSpring
 from .load_dependent_friction import LoadDependentFriction
 from .load_friction import LoadFriction
+from .loose_linkage import LooseLinkage
+from .maxwell_slip import MaxwellSlip
 from .position_dependent_friction import PositionDependentFriction
 from .position_ripple import PositionRipple
 from .quadratic_drag import QuadraticDrag
@@ -45,6 +47,8 @@ __all__ = [
     "LinearSpring",
     "LoadDependentFriction",
     "LoadFriction",
+    "LooseLinkage",
+    "MaxwellSlip",
     "PositionDependentFriction",
     "PositionRipple",
     "QuadraticDrag",

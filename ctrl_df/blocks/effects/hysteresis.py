@@ -56,6 +56,10 @@ class Hysteresis(Effect):
         """Return what z comes to."""
         return (1.0,)
 
+    def ranges(self, seen):
+        """Return strokes that take a good part of a sample: shorter ones are dry friction."""
+        return {"stroke": (0.5 * seen.speed * seen.dt, float("inf"))}
+
     @classmethod
     def suggest(cls, screen):
         """Yield strokes of shares of the motion, at a tenth of the force."""

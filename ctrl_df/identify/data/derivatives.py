@@ -81,7 +81,7 @@ def automatic_cutoff(y: np.ndarray, dt: float) -> float:
 
 
 def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -> np.ndarray:
-    """Return the zero-phase low-passed derivative of `order` 0, 1 or 2 at the times given."""
+    """Return the zero-phase low-passed derivative of `order` 1 or 2 (0: the signal) at the times given."""
     from scipy.signal import butter, sosfiltfilt
 
     dt, grid, values = uniform(t, y)

@@ -13,7 +13,7 @@ from ..estimation.prepared import REFERENCE
 from ..estimation.refit_records import blurred, doubts, refit_records
 from ..estimation.segments import make_segments
 from ..estimation.sensed import sensed
-from ..estimation.simulator import Simulator
+from ..estimation.simulators import simulator_of
 from ..planning.inputs import input_that_separates
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
@@ -32,7 +32,7 @@ class TimeDataset(Dataset):
 
     def block_of(self, model):
         """Return the block itself, or that of a loop."""
-        return Simulator(model, self.records[0]).block
+        return simulator_of(model, self.records[0]).block
 
     def compare(self, model, mode, window):
         """Simulate the model over segments of the records, their initial states fitted."""
@@ -49,7 +49,7 @@ class TimeDataset(Dataset):
         """Return the comparison of a model whose initial states in each segment are known already."""
         rows = []
         for record, w, start in zip(self.records, segments, starts, strict=True):
-            run = Simulator(model, record).run(w, None, start, rounded=True)
+            run = simulator_of(model, record).run(w, None, start, rounded=True)
             simulated = sensed(record).apart(run)
             beside = simulated[record.output]
             rows.append(

@@ -17,7 +17,7 @@ from .multiple_shooting import Problem
 from .noise_model import NoiseModel
 from .segments import Segments, facts, make_segments, usual_segment
 from .sensitivity import OutputSensitivity
-from .simulator import Simulator
+from .simulators import simulator_of
 from .variables import default_free
 
 
@@ -132,7 +132,7 @@ def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=N
     """Return per record the length of segment [s] that `mode` means; None: the whole record."""
     lengths: list[float | None] = []
     for record in records:
-        simulator = Simulator(model, record)
+        simulator = simulator_of(model, record)
         usual = float(window) if window is not None else usual_segment(record)
         free = mode == "free" or simulator.closed
         if mode == "auto" and window is None:
@@ -192,9 +192,9 @@ def fit_records(
         Bound on the iterations over the full segments.
     """
     records = list(records)
-    first = Simulator(model, records[0])
+    first = simulator_of(model, records[0])
     model = first.with_values(dict(start)) if start else model
-    block = first.block if not start else Simulator(model, records[0]).block
+    block = first.block if not start else simulator_of(model, records[0]).block
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
     problem = Problem(model, records, names, budget)

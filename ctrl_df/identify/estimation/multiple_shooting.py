@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...simulate.crew import check
 from ..thresholds import GOOD
 from .initial_states import FREE
 from .noise_model import power
@@ -22,6 +23,7 @@ from .segments import Segments, facts_of
 from .sensed import sensed
 from .sensitivity import OutputSensitivity
 from .simulator import Simulator, feasible
+from .simulators import simulator_of
 from .variables import step_of_sensor, variables_of
 
 Signals = list[np.ndarray]
@@ -48,7 +50,7 @@ class Problem:
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
-        self.block = Simulator(model, records[0]).block
+        self.block = simulator_of(model, records[0]).block
         self.known = [facts_of(self.block, r) for r in records]
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
         self.steps = np.full(len(names), 1e-3)
@@ -75,7 +77,7 @@ class Problem:
 
     def stage(self, segments: list[Segments], thin, starts=None):
         """Set the segments; initial states begin at `starts` (corrections) or at what the data say."""
-        self.simulators = [Simulator(self.model, r, thin=thin, begins=self.begins) for r in self.records]
+        self.simulators = [simulator_of(self.model, r, thin=thin, begins=self.begins) for r in self.records]
         self.segments = segments
         self.measured = [sensed(r).within(w.samples) for r, w in zip(self.records, segments, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
@@ -95,6 +97,7 @@ class Problem:
 
     def simulate(self, theta, nuisance) -> Signals:
         """Return the outputs within the segments."""
+        check()
         self.nfev += 1
         values = self.values(theta)
         return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.segments, nuisance, strict=True)]
@@ -324,7 +327,7 @@ class Problem:
                 continue
             size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
                 self.priors[k][:, j],
-                {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
+                {"x": 0.003 * self.known[k].position, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
             )
             moved = nuisance[k].copy()
             sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))

@@ -13,7 +13,7 @@ from ..data.derivatives import step_of
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .segmented import short_segment
-from .simulator import Simulator
+from .simulators import simulator_of
 from .variables import step_of_sensor
 
 
@@ -74,7 +74,7 @@ class _Beside:
 
 def _with_step(found: FitResult, records, names, whole) -> FitResult:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
-    first = Simulator(found.model, records[0])
+    first = simulator_of(found.model, records[0])
     key = step_of_sensor(first.block)
     if key is None or not (whole or key in names):
         return found

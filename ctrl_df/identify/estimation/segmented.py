@@ -28,10 +28,11 @@ from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
 from .initial_states import CONTINUED, FREE, MEASURED
 from .noise_model import NoiseModel, acceleration_filter
-from .segments import Segments, cut, facts, split
-from .sensed import driving_force, sensed
+from .segments import Segments, cut, facts, load_of, split
+from .sensed import sensed
 from .simulator import Simulator
-from .variables import RecordScales
+from .simulators import simulator_of
+from .variables import RecordScales, typical_mass
 
 
 @dataclass(frozen=True)
@@ -230,7 +231,7 @@ class SegmentedData:
 
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
-        return Simulator(block, record, thin=self.thin, begins=self.begins, **keywords)
+        return simulator_of(block, record, thin=self.thin, begins=self.begins, **keywords)
 
     def carries(self, block) -> bool:
         """Whether the block has hidden states that go on from segment to segment."""
@@ -351,11 +352,11 @@ def _count(record) -> int:
 
 
 def _scales(block, records) -> Scales:
-    force = math.sqrt(np.mean([np.mean(driving_force(block, r, facts(r).velocity) ** 2) for r in records]))
-    position = math.sqrt(np.mean([np.var(facts(r).position) for r in records]))
-    speed = math.sqrt(np.mean([np.mean(facts(r).velocity ** 2) for r in records]))
-    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
-    return Scales(max(force, 1e-300), max(position, 1e-300), max(speed, 1e-300), mass)
+    known = [facts(r) for r in records]
+    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), 1e-300)
+    position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), 1e-300)
+    speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), 1e-300)
+    return Scales(force, position, speed, typical_mass(block, force, position, speed))
 
 
 def short_segment(model, records: Sequence[Measurement]) -> float | None:
@@ -363,7 +364,7 @@ def short_segment(model, records: Sequence[Measurement]) -> float | None:
 
     Not for models of which something is hidden, nor for records too short to tell.
     """
-    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST:
+    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST or any(facts(r).imposed for r in records):
         return None
     data = prepare(model, records, records)
     near, disturbed = (

@@ -10,14 +10,18 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..data import derivatives
+from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
-from ..thresholds import UNPLACED
-from .sensed import POSITION, force_scale, sensed
+from ..thresholds import NOISE_FREE, UNPLACED
+from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Scales of one record: spread of place, speed and force, noise, time between reversals, usable band."""
+    """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band.
+
+    Also what it tells of position and force, whichever of them is the output.
+    """
 
     dt: float
     spread: float
@@ -26,8 +30,12 @@ class Facts:
     noise: float  # of the leading output, in its unit
     swing: float  # time of one to and fro [s]
     half: int  # samples either side of a local polynomial
-    position: np.ndarray  # counted from the first sample where it was not measured
     velocity: np.ndarray
+    position: float  # typical, about its mean
+    place: np.ndarray  # position, counted from the first sample where it was not measured
+    load: np.ndarray  # force
+    units: tuple[str, str]  # of both
+    imposed: bool = False  # motion in, force out
 
 
 _FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
@@ -36,19 +44,22 @@ _FACTS: WeakKeyDictionary[Measurement, Facts] = WeakKeyDictionary()
 def facts(record: Measurement) -> Facts:
     """Return the scales of a record (kept for as long as the record lives)."""
     known = _FACTS.get(record)
+    if known is None and imposes_motion(record):
+        known = _FACTS[record] = _of_imposed(record)
     if known is None:
         _, grid, values = derivatives.uniform(record.t, record.y)
         dt = float(grid[1] - grid[0])
         cutoff = derivatives.automatic_cutoff(values, dt)
         held = sensed(record)
         velocity = derivatives.derivative(record.t, record.y, 1 - held.columns[0], cutoff)
-        position = np.asarray(record.y) if held.columns[0] == POSITION else _integral(record.t, record.y)
+        place = np.asarray(record.y) if held.columns[0] == POSITION else _integral(record.t, record.y)
         speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
         swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
         known = Facts(
-            dt, max(float(np.std(position)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
-            held.noise, swing, half, position, velocity,
+            dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
+            held.noise, swing, half, velocity, max(float(np.std(place)), 1e-300), place, record.u,
+            (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
     return known
@@ -60,8 +71,31 @@ def facts_of(block, record: Measurement) -> Facts:
     return known if scale == 1.0 else replace(known, force=abs(scale) * known.force)
 
 
+def load_of(block, record: Measurement) -> np.ndarray:
+    """Return the force recorded, (n,): of a motor what it makes of voltage or current."""
+    known = facts(record)
+    return known.load if force_scale(block) == 1.0 else driving_force(block, record, known.velocity)
+
+
 def _integral(t, v) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))
+
+
+def _of_imposed(record: Measurement) -> Facts:
+    """Return the scales of a record of a motion that was imposed, and of the force that it took."""
+    motion = imposed_motion(record)
+    dt, _, values = derivatives.uniform(record.t, motion.x)
+    force = max(float(np.std(record.y)), 1e-300)
+    # dry friction makes steps of the force, whose spectrum has no floor
+    noise = min(record.noise_floor(), derivatives.grain(record.y))
+    return Facts(
+        dt, force, max(float(np.sqrt(np.mean(motion.v**2))), 1e-300), force,
+        max(noise, NOISE_FREE * force),
+        min(2 * record.duration / max(_turns(values), 1), record.duration),
+        int(np.clip(0.25 / (motion.cutoff * dt), 4, max(len(record) // 8, 4))), motion.v,
+        max(float(np.std(motion.x)), 1e-300), motion.x, record.y, (record.input_unit, record.output_unit),
+        imposed=True,
+    )  # fmt: skip
 
 
 def _turns(y) -> int:
@@ -211,7 +245,7 @@ def _local(record, i, known) -> tuple[float, float, float, float, float]:
         )
     held, s = sensed(record), record.t[low:high] - record.t[i]
     # a place that was not measured is counted from the first sample, which may lie anywhere
-    x, x_error = float(known.position[i]), UNPLACED * known.spread
+    x, x_error = float(known.place[i]), UNPLACED * known.position
     v, v_error, a = 0.0, math.inf, 0.0
     for column, y, weight in zip(held.columns, held.values, held.weights, strict=True):
         found, errors = _parabola(s, y[low:high], held.noise / weight)

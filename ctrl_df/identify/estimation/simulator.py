@@ -90,13 +90,13 @@ class Simulator:
         """Whether something pulls the model back, so that a free run does not drift."""
         if self.closed or not self.mechanism:
             return True
-        pull, s = 0.0, 2 * self.facts.spread
+        pull, s = 0.0, 2 * self.facts.position
         for term in self.block.core.forces:
             if any(p.per_record for p in term.effect.parameters.values()):
                 continue  # what begins anew in every record holds nothing in one place
             law, p = type(term.effect).law, term.effect.values
             z = np.zeros(max(term.effect.states, 1))
-            centre = float(np.mean(self.facts.position))
+            centre = float(np.mean(self.facts.place))
             forces = [float(law(0.0, centre + d, 0.0, z, p, z.copy())) for d in (-s, s)]  # type: ignore[misc]
             pull += forces[0] - forces[1]
         return pull > 0.1 * self.facts.force

@@ -39,14 +39,20 @@ class RecordScales:
 
 def seen_by(block, records, known: Facts) -> RecordScales:
     """Return what the records show of the effects of a block."""
-    reach = max(float(np.max(np.abs(facts(r).position))) for r in records) - 4 * known.noise
-    placed = all(POSITION in sensed(r).columns for r in records)
+    off = 0.0 if known.imposed else 4 * known.noise
+    reach = max(float(np.max(np.abs(facts(r).place))) for r in records) - off
+    placed = known.imposed or all(POSITION in sensed(r).columns for r in records)
     shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
-    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
+    mass = typical_mass(block, known.force, known.position, known.speed)
     return RecordScales(
-        known.force, known.spread, known.speed, mass, min(r.dt for r in records),
+        known.force, known.position, known.speed, mass, min(r.dt for r in records),
         max(r.duration for r in records), -math.inf if shifted or not placed else reach,
     )  # fmt: skip
+
+
+def typical_mass(block, force: float, position: float, speed: float) -> float:
+    """Return the mass of a block; of one without, that whose inertia the force is [kg]."""
+    return sum(p.value for k, p in block.parameters.items() if "." not in k) or force * position / speed**2
 
 
 def default_free(block) -> tuple[str, ...]:
@@ -130,7 +136,7 @@ def natural_scale(unit: str, known: Facts) -> float:
         return 5 * known.dt  # times are seen from a few samples on
     if powers.keys() <= {"rad"}:
         return 1.0
-    time = known.spread / known.speed
-    mass = known.force * time**2 / known.spread
-    whole = size(unit, {"N": known.force, "m": known.spread, "s": time, "kg": mass})
+    time = known.position / known.speed
+    mass = known.force * time**2 / known.position
+    whole = size(unit, {"N": known.force, "m": known.position, "s": time, "kg": mass})
     return whole if powers == {"kg": 1} else 0.1 * whole

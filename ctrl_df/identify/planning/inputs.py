@@ -33,7 +33,7 @@ def input_that_separates(
     record = diagnosis.train[0]
     given, long, strong = diagnosis.limits, place_unit(record), record.input_unit
     force = float(force or given.get("force") or np.max(np.abs(record.u)))
-    place = facts(record).position
+    place = facts(record).place
     centre = float(place[0])
     reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(place - centre)))
     duration, dt = float(duration or record.duration), float(dt or record.dt)

@@ -17,7 +17,7 @@ from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.segments import facts
-from ..estimation.sensed import POSITION, force_scale, place_unit, sensed
+from ..estimation.sensed import POSITION, force_scale, sensed
 from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
@@ -70,7 +70,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
     segments, record, outputs = sensitivity.pieces, data.train.records[0], tried.train.outputs
-    units = {"x": place_unit(record), "f": record.input_unit}
+    units = dict(zip("xf", facts(record).units, strict=True))
     if data.disturbed:
         # the residual is of forces here, as the fits see it
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=12)
@@ -137,7 +137,8 @@ class _Scene:
             self.motion,
             strict=True,
         ):
-            force = record.u + self.given * shape(motion)
+            force = record.u if not facts(record).imposed else facts(record).load
+            force = force + self.given * shape(motion)
             simulator = self.data.simulator(self.fit.model, record, force=force)
             changes.append((simulator.run(segments, None, start) - y) / self.size)
         return changes
@@ -167,29 +168,31 @@ class _Scene:
         yield "frequency", [[(_wave(line, f), (line, line)) for f in (np.cos, np.sin)]]
 
     def _line(self) -> float:
-        """Return the frequency [Hz] at which the residual's acceleration stands out most."""
+        """Return the frequency [Hz] at which the residual's acceleration (its force) stands out most."""
         from scipy.ndimage import median_filter
 
         i = int(np.argmax([len(e) for e in self.fit.residual]))
         e, t = self.fit.residual[i][self.view.segments[i].blocks[0]], self.motion[i]["t"]
-        order = 2 - sensed(self.view.records[i]).columns[0]
-        dt = float(np.median(np.diff(t)))
+        record = self.view.records[i]
+        dt, count = float(np.median(np.diff(t))), len(e)
         # fine enough that a line between two bins is not lost
-        power = np.abs(np.fft.rfft(np.diff(e, order) * np.hanning(len(e) - order), 4 * len(e))) ** 2
+        e = np.diff(e, 0 if facts(record).imposed else 2 - sensed(record).columns[0])
+        power = np.abs(np.fft.rfft(e * np.hanning(len(e)), 4 * count)) ** 2
         ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
         ratio[:12] = 0.0
-        return float(np.argmax(ratio)) / (4 * len(e) * dt)
+        return float(np.argmax(ratio)) / (4 * count * dt)
 
 
 def _motion(record, segments, y):
-    x = np.array(record.y, dtype=float)
-    x[segments.samples] = y[segments.blocks[0]]
-    if sensed(record).columns[0] == POSITION:
-        v = np.gradient(_smooth(x), record.t)
-    else:
-        x, v = facts(record).position, _smooth(x)
+    known = facts(record)
+    x, load, y = np.array(known.place, float), np.array(known.load, float), y[segments.blocks[0]]
+    moved = sensed(record).columns[0] != POSITION
+    v = np.array(record.y, float) if moved else np.zeros(0)
+    # the output is the model's own: what it errs by is no function of itself
+    (load if known.imposed else v if moved else x)[segments.samples] = y
+    v = _smooth(v) if moved else np.gradient(_smooth(x), record.t)
     a = np.gradient(_smooth(v), record.t)
-    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": np.asarray(record.u)}
+    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": load}
 
 
 def _smooth(x, reach=2):

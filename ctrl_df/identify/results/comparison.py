@@ -12,10 +12,12 @@ import numpy as np
 
 from ...drawing import draw
 from ..data.derivatives import automatic_cutoff, derivative
+from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
-from ..estimation.sensed import place_unit, sensed
+from ..estimation.sensed import sensed
 from ..residuals.comparison_base import ComparisonBase
+from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..residuals.regions import Regions, error_regions
 from ..residuals.residual_tests import (
     InputTest,
@@ -25,7 +27,7 @@ from ..residuals.residual_tests import (
     rmse,
     whiteness,
 )
-from ..smoothing.missing_force import MissingForce, missing_force
+from ..smoothing.missing_force import MissingForce, missing_force, missing_of_imposed
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +75,11 @@ class RecordComparison:
     def missing_force(self) -> MissingForce:
         """The force that would have to be added, at every instant, for the model to follow the record.
 
-        By fixed-interval smoothing over the model; seconds. See
+        By fixed-interval smoothing over the model; seconds. Under an imposed motion it is the residual. See
         `ctrl_df.identify.smoothing.missing_force.missing_force` for what it refuses.
         """
+        if facts(self.record).imposed:
+            return missing_of_imposed(self.model, self.record, self.residual)
         return missing_force(self.model, self.record)
 
     @property
@@ -125,14 +129,15 @@ class RecordComparison:
             return Regions()
         known = facts(self.record)
         velocity = self.record.velocity if self.record.velocity is not None else known.velocity
-        error, kept = (self.residual, slice(None)) if self.white else self._acceleration_error()
+        plain = known.imposed or self.white
+        error, kept = (self.residual, slice(None)) if plain else self._acceleration_error()
         return error_regions(
             self.record.t[kept],
             error,
-            position=known.position[kept],
+            position=known.place[kept],
             velocity=velocity[kept],
-            force=self.record.u[kept],
-            units=(place_unit(self.record), self.record.input_unit),
+            force=known.load[kept],
+            units=known.units,
         )
 
     def _acceleration_error(self) -> tuple[np.ndarray, slice]:
@@ -217,6 +222,14 @@ class Comparison(ComparisonBase):
         """The force that would have to be added for the model to follow the worst record."""
         return self.worst.missing_force
 
+    @cached_property
+    def error_by_horizon(self) -> ErrorByHorizon:
+        """Error of free prediction against its length, up to the whole record; seconds.
+
+        `ErrorByHorizon.plot` draws it, several models in one picture.
+        """
+        return error_by_horizon(self.model, [r.record for r in self.records])
+
     @property
     def windows(self) -> int:
         """Number of windows of all records together."""
@@ -254,8 +267,11 @@ class Comparison(ComparisonBase):
     def __str__(self) -> str:
         """Return it as text."""
         worst = self.worst
+        imposed = next((r.record for r in self.records if facts(r.record).imposed), None)
         how = "free run from fitted initial states"
-        if self.mode == "windows":
+        if imposed is not None:
+            how = f"in force, {imposed_motion(imposed)}"
+        elif self.mode == "windows":
             lengths = [float(np.ptp(r.record.t)) / r.windows for r in self.records]
             how = (
                 f"{self.windows} windows of {np.mean(lengths):.3g} s, each from a fitted initial state "

@@ -62,3 +62,19 @@ def explain(d, words) -> str:
         f"probability {certainty(d.ranking):.1%}.{same}"
         + (f" Before, {where[0].lower() + where[1:]}" if where else "")
     )
+
+
+def explain_so_far(d, words) -> str:
+    """Return what a `Diagnosis` under way knows."""
+    size = f"So far: with its parameters refitted the model errs by {d.nrmse:.2%}{words.of}"
+    if d.verdict == NONE:
+        return f"{size}; nothing is missing, as far as is known."
+    if d.verdict == UNKNOWN:
+        return f"{size}; no effect tried yet explains that."
+    first, *others = d.ranking[:4]
+    behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
+    how = "It is refitted and tried on what is held out" if first.confirmed else "None of them is confirmed"
+    return (
+        f"{size}; {named(first.effect)} explains most of that (it leaves {first.nrmse:.2%}){behind}. {how}; "
+        "the diagnosis is not complete."
+    )

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.segments import facts
-from ..estimation.sensed import place_unit
 from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
@@ -109,8 +108,8 @@ def find_regions(tried, view):
             inside[error_filter.rows(segments)],
             error_filter.filtered(residual, segments) / tried.train.unit,
         )
+    known = facts(record)
     return error_regions(
-        record.t[inside], residual, position=facts(record).position[inside],
-        velocity=facts(record).velocity[inside], force=record.u[inside],
-        units=(place_unit(record), record.input_unit),
+        record.t[inside], residual, position=known.place[inside], velocity=known.velocity[inside],
+        force=known.load[inside], units=known.units,
     )  # fmt: skip

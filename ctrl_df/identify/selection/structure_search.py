@@ -14,12 +14,12 @@ from ...simulate.crew import side_by_side
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
+from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.segments import facts
 from ..estimation.sensed import POSITION, sensed
 from ..estimation.simulator import feasible
-from ..estimation.variables import default_free
-from ..starting.regression import force_regression, motion_of
+from ..starting.regression import force_regression, heavy, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (
     CONFIRMED,
@@ -38,11 +38,11 @@ from ..thresholds import (
     STILL_POSSIBLE,
     STOPPED_EARLY,
 )
-from .attempts import itself, tried
+from .attempts import itself, own_names, tried
 from .equivalence import indistinguishable
 from .evidence import ranked, rounds
 from .remaining import located, remainder
-from .search import Search, Words
+from .search import Remainder, Search, Words
 
 
 class StructureSearch(Search):
@@ -71,9 +71,14 @@ class StructureSearch(Search):
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
         # a disturbance force drowns all else over longer segments
         near = self.segmentations[0].moved(self.base.train)
-        if near.rmse > PROCESS_NOISE * data.noise and not data.noise_free:
+        if self.disturbs(near.rmse, data):
             self._look_at(self.segmentations[0].with_process_noise, 0)
             self.base = CandidateFit("", self.data.fit(near.model, self.free))
+        self.noise = ranked(self.base, ())[1]  # of the best model's residual
+
+    def disturbs(self, error: float, data: SegmentedData) -> bool:
+        """Whether an error over the shortest segments is one that disturbance forces make."""
+        return error > PROCESS_NOISE * data.noise and not data.noise_free
 
     def _look_at(self, data: SegmentedData, which: int):
         self.segmentations = data.segmentations
@@ -84,7 +89,7 @@ class StructureSearch(Search):
         shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
-        w, _ = force_regression(motion_of(data.train, data.thin, block), data.scales)
+        w, _ = force_regression(motion_of(data.train, data.thin, block), data.scales, heavy=heavy(block))
         guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
@@ -118,14 +123,18 @@ class StructureSearch(Search):
         if not self.placed:  # sensors' effects are of the place
             classes = [c for c in classes if c.role != "output"]
         longest = self.segmentations[-1]
-        base, found = self._look(classes, executor, self.data.sampled)
+        self.course.stage(f"{len(classes)} effects tried over short segments")
+        base, found = self._look(classes, executor, self.data.sampled, self.course.known)
+        self.course.known(found)
         there = base.rmse if self.data.disturbed else longest.moved(base).rmse
         if there > GROWTH * base.rmse:
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
+            self.course.stage("the same over long segments")
             moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
                 found = _best_of(base, [*moved, *again])
+                self.course.known(found)
         if found:
             self._rebase(found)
         return found
@@ -143,13 +152,28 @@ class StructureSearch(Search):
         shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
-    def _look(self, classes, executor, data: SegmentedData):
-        """Fit every effect over one set of segments; return baseline and effects there, best first."""
+    def _look(self, classes, executor, data: SegmentedData, screened=None):
+        """Fit every effect over one set of segments; return baseline and effects there, best first.
+
+        `screened` takes the effects before they are fitted.
+        """
+        base, found = self._tried(classes, executor, data, screened)
+        return base, ranked(CandidateFit("", base), found)[0]
+
+    def _tried(self, classes, executor, data: SegmentedData, screened=None, reached: float = math.inf):
         base = data.moved(self.base.train, 3)
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        found = tried(classes, screen, self.segmentations[0].sampled, self.free, nominal, executor)
-        return base, ranked(CandidateFit("", base), found)[0]
+        short = self.segmentations[0].sampled
+        return base, tried(classes, screen, short, self.free, nominal, executor, screened, reached)
+
+    def rivals(self, model, names, classes, executor=None):
+        """Return effects that may do what the model of one effect more does, with evidence over it."""
+        data = self.data.sampled
+        known = data.fit(model, names, iterations=4)
+        _, found = self._tried(classes, executor, data, reached=known.rmse)
+        more = len(names) - len(self.free)
+        return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -167,6 +191,7 @@ class StructureSearch(Search):
 
         The segments are of the length that suits these data (`_longest_coherent`).
         """
+        self.course.stage("the best refitted over segments of every length")
         # Disturbance forces let the first look tell little.
         found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.disturbed else _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
@@ -184,6 +209,7 @@ class StructureSearch(Search):
             at = len(stages) - 1
         self.data = levels[at]
         fine = self.data.fine
+        self.course.stage("the best refitted at the full rate, and tried on what is held out")
         pairs = [(t, f) for t, f in zip((self.base, *found), stages[at], strict=True) if f is not None]
         best = side_by_side(
             lambda pair: fine.validate(replace(pair[0], train=fine.moved(pair[1], 3, 1e-3), confirmed=True)),
@@ -193,6 +219,8 @@ class StructureSearch(Search):
         chosen, self.noise = ranked(self.base, best[1:])
         if not chosen:
             return []
+        self.course.known(chosen)
+        self.course.stage("near ones begun again where the best one ended")
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right minimum.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
@@ -202,7 +230,7 @@ class StructureSearch(Search):
         ended = side_by_side(lambda t: self._ended(t, t in near and len(near) > 1, floor, least), close)
         if any(a is not b for a, b in zip(ended, close, strict=True)):
             chosen = self._again([*ended, *(t for t in chosen if t not in close)], ended)
-        span = max(float(np.ptp(facts(r).position)) for r in self.data.train.records)
+        span = max(float(np.ptp(facts(r).place)) for r in self.data.train.records)
         chosen, self.noise = ranked(self.base, [t for t in chosen if itself(t, span)])
         return chosen
 
@@ -292,6 +320,30 @@ class StructureSearch(Search):
         """Return the standard errors of a fit that came to its end."""
         return judged.train.standard_errors if len(judged.train.covariance) else {}
 
+    def determined(self, judged):
+        """Whether every parameter of the newest effect is known to better than its size, and in its range."""
+        own = set(own_names(judged.block))
+        fit = judged.train
+        if not judged.confirmed or not len(fit.covariance):
+            return False
+        at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
+        return own.isdisjoint(at_bound | blurred(fit))
+
+    def predicted(self, judged):
+        """Return the model and the records held out (angles as these have them), or those fitted."""
+        fitted, held = self.records
+        if held and judged.validation is not None:
+            return judged.validation.model, held
+        return judged.block, held or fitted
+
+    @property
+    def at_first(self):
+        """Noise of the sensor, and what the refitted model errs by beyond it."""
+        noise, error = self.data.noise, self.base.train.rmse
+        if self.data.disturbed:
+            return Remainder(0.0, error, False)
+        return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
+
     def exact(self):
         """Whether the model errs by rounding alone."""
         return self.base.train.nrmse < EXACT and not self.data.disturbed
@@ -318,21 +370,21 @@ class StructureSearch(Search):
         """Return models with their evidence over `base`, best first."""
         return ranked(base, judged)[0]
 
-    def final(self, models, kept):
+    def final(self, models, free):
         """Return the models with their errors at the full rate, over the segments that the last one bears.
 
         Where disturbance forces blur parameters they are fitted over shorter segments first.
         """
         common = self.data.fine
         if common.disturbed:
-            models = [self._sharpened(m, common, kept) for m in models]
+            models = [self._sharpened(m, common, free) for m in models]
         return [(m, *common.errors(m)) for m in models]
 
     @staticmethod
-    def _sharpened(model, data: SegmentedData, kept):
+    def _sharpened(model, data: SegmentedData, free):
         if data.carries(model):
             return model
-        return data.short_segments.fit(model, [k for k in default_free(model) if k not in kept]).model
+        return data.short_segments.fit(model, free(model)).model
 
     def relative(self, noise):
         """Return noise over the rms of the centred output, or of the acceleration."""

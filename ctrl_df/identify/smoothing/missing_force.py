@@ -13,8 +13,9 @@ from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
 from ..estimation.prepared import REFERENCE
-from ..estimation.segments import facts
-from ..estimation.sensed import driving_force
+from ..estimation.segments import facts, load_of, make_segments
+from ..estimation.simulators import simulator_of
+from ..estimation.variables import default_free
 from ..residuals.motion_phases import reversals
 from ..thresholds import FORCE_KNOWN
 from .curves import Curve, curve_over
@@ -35,8 +36,8 @@ class MissingForce:
         The force (a torque, of machines that turn) and its standard deviation [`unit`]. Where the machine
         sticks nothing is known of it, and the standard deviation says so.
     quantities : mapping
-        position, velocity, load (the force recorded) and reversal (distance moved since the last reversal),
-        (n,) each.
+        position, velocity, load (the force recorded; under an imposed motion the model's) and reversal
+        (distance moved since the last reversal), (n,) each.
     units : mapping
         Of the quantities and of the time.
     unit : str
@@ -155,18 +156,50 @@ def missing_force(model, record: Measurement) -> MissingForce:
     found = smooth_record(block, record)
     coordinates, core = block.coordinates, block.core
     at = 2 if core.bodies == 2 and core.measured == 1 else 0
-    position, velocity = found.states[:, at], found.states[:, at + 1]
-    load = np.interp(found.time, record.t, driving_force(block, record, facts(record).velocity))
+    load = np.interp(found.time, record.t, load_of(block, record))
+    return MissingForce(
+        found.time, found.force, found.std,
+        *_quantities(coordinates, found.states[:, at], found.states[:, at + 1], load),
+        found.own, found.noise, found.size, record.name,
+    )  # fmt: skip
+
+
+def missing_of_imposed(model, record: Measurement, residual) -> MissingForce:
+    """Return the force that a model lacks under an imposed motion: what it errs by, at every sample.
+
+    Its standard deviation is that of the load cell's noise, by the record's noise floor.
+    """
+    known = facts(record)
+    simulator = simulator_of(model, record)
+    whole = make_segments(record)
+    start = np.zeros((1, len(simulator.nuisances)))
+    table = simulator.block.parameters
+    free = [k for k in default_free(simulator.block) if table[k].value != 0]
+    steps = {k: 1e-4 * table[k].value for k in free}
+    runs = simulator.run_all(
+        [(whole, None, start), *((whole, {k: table[k].value + d}, start) for k, d in steps.items())]
+    )
+    # over the load that the model gives: the force recorded holds what is missing
+    load = runs[0] if np.ptp(runs[0]) > 0 else known.load
+    own = np.array([(y - runs[0]) / d for y, d in zip(runs[1:], steps.values(), strict=True)])
+    return MissingForce(
+        record.t, residual, np.full(len(record), known.noise),
+        *_quantities(simulator.block.coordinates, known.place, known.velocity, load),
+        own.reshape(len(steps), len(record)).T, known.noise, float(np.std(residual)), record.name,
+    )  # fmt: skip
+
+
+def _quantities(coordinates, position, velocity, load):
+    """Return what forces are drawn against, the units of these and of the time, and that of the force."""
     slow = 0.05 * float(np.sqrt(np.mean(velocity**2)))
     travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(position)))))
     marks = np.maximum.accumulate(np.where(_turned(velocity, slow), travelled, 0.0))
     unit, force = coordinates.unit, coordinates.force_unit
-    return MissingForce(
-        found.time, found.force, found.std,
+    return (
         {"position": position, "velocity": velocity, "load": load, "reversal": travelled - marks},
         {"time": "s", "position": unit, "velocity": f"{unit}/s", "load": force, "reversal": unit},
-        force, found.own, found.noise, found.size, record.name,
-    )  # fmt: skip
+        force,
+    )
 
 
 def _turned(velocity, slow) -> np.ndarray:

@@ -144,7 +144,7 @@ class Steps:
         if self.simulator.sensed.columns[0] == POSITION:
             begun = Begun(slow * one, slow / (known.half * known.dt) * one)
         else:
-            begun = Begun(UNPLACED * known.spread * one, slow * one)
+            begun = Begun(UNPLACED * known.position * one, slow * one)
         names = initial_states.names(self.core)
         reach = initial_states.reach(names, self.core, known, begun)
         square = np.zeros_like(states)
@@ -167,7 +167,7 @@ class Steps:
         measured = self.record.velocity if column == POSITION else None
         v = derivative(t, y, 1 - column, cutoff) if measured is None else measured
         a = derivative(t, y, 2 - column, cutoff)
-        x = y if column == POSITION else known.position
+        x = y if column == POSITION else known.place
         usual = known.force / sum(self.core.masses)
         a = usual * np.tanh(a / usual)
         return x[self.edges], v[self.edges], a[self.edges]

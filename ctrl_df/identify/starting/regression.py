@@ -15,8 +15,7 @@ import numpy as np
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.segmented import Scales
-from ..estimation.segments import facts
-from ..estimation.sensed import driving_force
+from ..estimation.segments import facts, load_of
 
 
 @dataclass(frozen=True)
@@ -34,11 +33,12 @@ def motion_of(view, thin: int, block) -> Motion:
     """Return every `thin`-th sample within the segments; the force as the drive of a block makes it."""
     parts = []
     for record, segments in zip(view.records, view.segments, strict=True):
-        position, velocity = facts(record).position, facts(record).velocity
-        acceleration = np.gradient(velocity, record.t)
+        known = facts(record)
+        acceleration = np.gradient(known.velocity, record.t)
         some = segments.samples[::thin]
-        force = driving_force(block, record, velocity)
-        parts.append([c[some] for c in (force, position, velocity, acceleration)])
+        parts.append(
+            [np.asarray(c)[some] for c in (load_of(block, record), known.place, known.velocity, acceleration)]
+        )
     return Motion(*(np.concatenate(c) for c in zip(*parts, strict=True)), dt=view.records[0].dt)
 
 
@@ -78,7 +78,7 @@ class ForceFit:
 
 def regressed(cls, screen) -> Iterator[Start]:
     """Yield the start values that a class takes from the force; only a single body makes them possible."""
-    if inertia(screen.block) is not None and screen.block.core.bodies == 1:
+    if screen.block.core.bodies == 1:
         for effect, values in cls.regress(screen):
             yield Start(effect, 0.0, tuple(values.items()))
 
@@ -87,7 +87,7 @@ def force_fit(motion: Motion, scales: Scales, block, columns) -> ForceFit:
     """Regress the force on the model's own inertia and friction, and on further columns."""
     dry, viscous = dry_level(block), viscous_slope(block)
     weights, left = force_regression(
-        motion, scales, columns, dry=dry is not None, viscous=viscous is not None
+        motion, scales, columns, heavy=heavy(block), dry=dry is not None, viscous=viscous is not None
     )
     values = own_values(block, weights[:3], scales)
     return ForceFit(
@@ -99,28 +99,33 @@ def force_fit(motion: Motion, scales: Scales, block, columns) -> ForceFit:
 def own_values(block, weights, scales: Scales) -> dict[str, float] | None:
     """Return inertia, dry level and viscous slope as regressed, by name; None where they make no sense."""
     mass, kinetic, slope = weights
-    if mass <= 0:
+    if mass <= 0 and heavy(block):
         return None
     names = (inertia(block), dry_level(block), viscous_slope(block))
     sizes = (mass, max(kinetic, 0.01 * scales.force), max(slope, 1e-3 * scales.force / scales.speed))
     return {k: float(v) for k, v in zip(names, sizes, strict=True) if k is not None}
 
 
-def force_regression(motion: Motion, scales: Scales, extra=(), *, dry=True, viscous=True):
+def heavy(block) -> bool:
+    """Whether a block has a mass."""
+    return any(mass > 0 for mass in block.core.masses)
+
+
+def force_regression(motion: Motion, scales: Scales, extra=(), *, heavy=True, dry=True, viscous=True):
     """Regress the force on acceleration, direction, speed and further columns where the mass moves.
 
     Returns
     -------
     weights : array
-        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for a `dry` level
-        or `viscous` friction that is left out.
+        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for a mass
+        (`heavy`), a `dry` level or `viscous` friction that is left out.
     left : float
         Mean squared force that remains [N^2].
     """
     moving = np.abs(motion.v) > 0.03 * scales.speed
     v, force = motion.v[moving], motion.u[moving]
     matrix = np.column_stack([
-        motion.a[moving],
+        motion.a[moving] * heavy,
         np.sign(v) * dry,
         v * viscous,
         *(column[moving] for column in extra),

@@ -21,7 +21,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     slow = cls.costly
     work = WORK_LOW if slow else WORK_MEDIUM
-    grown, hopeful = best_starts(cls, block, points, slopes, cls.table_starts, work)
+    grown, hopeful = best_starts(cls, block, points, slopes, free, scales, cls.table_starts, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)

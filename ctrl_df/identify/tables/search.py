@@ -42,6 +42,7 @@ from .fit import (
     slopes_of,
     table_scales,
 )
+from .starts import balanced
 from .uncertainty import uncertainty
 
 
@@ -108,7 +109,7 @@ class TableSearch(Search):
         return self._records, self._validation
 
     def _fit_base(self) -> FittedTable:
-        """Fit from the model's values, and from the mass that high frequencies suggest; keep the better."""
+        """Fit from the model's values, the mass at high frequencies, a balance of forces; keep the best."""
         inside = self.inside
         begins = [self.block]
         heavy = inertia(self.block)
@@ -117,6 +118,7 @@ class TableSearch(Search):
             top = moved.omega >= np.quantile(moved.omega, 0.8)
             mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
             begins.append(self.block.with_parameters({heavy: mass}))
+        begins += balanced([self.block], self.free, inside, self.scales)
         fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
@@ -139,11 +141,18 @@ class TableSearch(Search):
                 some = fewer if c.costly else few
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
-        found = [self._trial(*r, work=WORK_MEDIUM) for r in run(try_effect, jobs) if r is not None]
+        found = []
+        self.course.stage(f"{len(jobs)} effects tried on some points")
+        for r in run(try_effect, jobs):
+            self.course.done()
+            if r is not None:
+                found.append(self._trial(*r, work=WORK_MEDIUM))
+                self.course.known(self.ranked(self.base, found))
         return self.ranked(self.base, found)
 
     def confirm(self, found):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
+        self.course.stage("the best fitted to all points")
         best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
@@ -211,6 +220,16 @@ class TableSearch(Search):
     def standard_errors(self, judged):
         """Return the standard errors of a candidate fitted to all points."""
         return uncertainty(judged.fitted)[1] if judged.confirmed else {}
+
+    def determined(self, judged):
+        """Whether every parameter of the newest effect is known to better than its size, and in its range."""
+        if not judged.confirmed:
+            return False
+        own, fitted = judged.block.newest + ".", judged.fitted
+        table = fitted.block.parameters
+        named = [v for v in fitted.variables if v.name.startswith(own)]
+        doubtful = uncertainty(fitted)[2]
+        return not any(v.name in doubtful or table[v.name].value in (v.lower, v.upper) for v in named)
 
     # --- what it comes to -----------------------------------------------------------------------------
 

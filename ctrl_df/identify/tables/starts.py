@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +19,9 @@ import numpy as np
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
 from ..starting.extend import extended
-from ..thresholds import HOPELESS_START, TABLE_SIZES, WORK_MEDIUM
+from ..thresholds import BALANCED_STARTS, HOPELESS_START, TABLE_SIZES, WORK_MEDIUM
 from .fit import Points, Scales, relative_error, simulate_table
+from .force_balance import ForceBalance, can_be_imposed
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,21 @@ def proposals(cls, block, points: Points) -> Iterator:
             yield grown
 
 
-def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=WORK_MEDIUM) -> tuple[list, bool]:
+def balanced(grown: Sequence, names: Sequence[str], points: Points, scales: Scales) -> list:
+    """Return the most promising of some blocks (of one structure) with their forces balanced.
+
+    None of blocks that answer no imposed motion.
+    """
+    if not grown or not can_be_imposed(grown[0]):
+        return []
+    balance = ForceBalance(points)
+    order = np.argsort(balance.error(grown), kind="stable")[:BALANCED_STARTS]
+    return [balance.solved(grown[i], names, scales) for i in order]
+
+
+def best_starts(
+    cls, block, points: Points, slopes, free: Sequence[str], scales: Scales, keep: int = 3, work=WORK_MEDIUM
+) -> tuple[list, bool]:
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 
     A start is judged by what remains of its errors once the model's own parameters have moved along `slopes`
@@ -142,7 +157,11 @@ def best_starts(cls, block, points: Points, slopes, keep: int = 3, work=WORK_MED
     # a single point of another motion must not hide a good start
     common = 0.1 * float(np.mean(size)) + 1e-12
     scored, silent = [], int(np.isnan(before).sum())
-    for grown in proposals(cls, block, points):
+    begins = list(proposals(cls, block, points))
+    own = (
+        [k for k, p in begins[0].parameters.items() if k not in block.parameters and p.free] if begins else []
+    )
+    for grown in [*balanced(begins, (*free, *own), points, scales), *begins]:
         try:
             table = simulate_table(grown, points, work)
         except (ValueError, ArithmeticError):

@@ -8,7 +8,8 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
-from ...df.describing import _amplitudes, describing_function_family, quiet_describing_function
+from ...df.arguments import amplitudes_of
+from ...df.describing import describing_function_family, quiet_describing_function
 from ...df.dispatch import method_for
 from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
@@ -188,7 +189,7 @@ def describing_function_response(
     linear = LinearPart(H)
     if not isinstance(orders, int | np.integer) or isinstance(orders, bool) or orders < 2:
         raise ValueError(f"describing_function_response needs orders as an integer >= 2; got {orders!r}.")
-    amplitudes = np.atleast_1d(_amplitudes(A))
+    amplitudes = np.atleast_1d(amplitudes_of(A))
     if amplitudes.ndim != 1 or not (amplitudes > 0).any():
         raise ValueError(f"A needs at least one amplitude > 0 in a 1-D array; got {A!r}.")
     positive = np.unique(amplitudes[amplitudes > 0])

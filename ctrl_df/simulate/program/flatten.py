@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 from scipy.linalg import block_diag
 
+from ...blocks.massless import Massless
 from ...blocks.mechanism import Mechanism
 from . import layout as L
 from .nodes import Node, core_node, lti_node, primitive_node, sampled_node, user_node
@@ -47,6 +48,11 @@ def _flatten(system, x0: int, values) -> Flat:
         return _interconnection(system, x0, values)
     name = str(getattr(system, "name", ""))
     system = with_values(system, values)
+    if isinstance(system, Massless):
+        raise TypeError(
+            "event_response and loops drive blocks by forces; got a Massless, which motion is imposed on. "
+            "Use imposed_response, or give the block a mass."
+        )
     if isinstance(system, Mechanism):
         return _mechanism(system, x0, name)
     sampled = getattr(system, "sampled", None)

@@ -1,0 +1,32 @@
+"""Records of an imposed motion and the force that it took: judged in force."""
+
+from __future__ import annotations
+
+from ..data.imposed import imposes_motion
+from ..selection.imposed_search import ImposedSearch
+from .over_time import TimeDataset
+
+
+class ImposedDataset(TimeDataset):
+    """Records with motion as input and force as output."""
+
+    def __init__(self, records, validation=()):
+        super().__init__(records, validation)
+        for record in (*self.records, *self.validation):
+            if not imposes_motion(record):
+                raise ValueError(
+                    "records with motion as input and such with force as input are judged apart; got "
+                    f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
+                    "the other."
+                )
+
+    def search(self, block, free):
+        """Return the search in force."""
+        return ImposedSearch(block, self.records, self.validation, free)
+
+    def plan(self, diagnosis, models, names, **limits):
+        """Refuse: inputs are planned as forces."""
+        raise ValueError(
+            "next_experiment plans forces, and motion is imposed here; record other amplitudes and speeds, "
+            "with pauses and small reversals within large ones: they tell laws of friction apart."
+        )

@@ -1,0 +1,90 @@
+"""A model under a recorded motion, judged by the force that it answers with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...blocks.core import Core
+from ...simulate.imposed import imposed_forces
+from ...simulate.imposed_response import imposable
+from ..data.imposed import imposed_motion
+from ..thresholds import HIDDEN_RTOL
+from . import initial_states
+from .segments import Segments
+from .simulator import Simulator
+
+
+class ImposedSimulator(Simulator):
+    """One model on one record of an imposed motion; the interface of `Simulator`.
+
+    The force is a function of the motion and of what effects hide. The latter goes on over the whole record,
+    whatever its segments: its only initial states are those at the record's begin, the corrections that the
+    first segment has. Where noise hides which way it moves, dry friction takes the value, between its two
+    levels, that comes nearest to the force recorded.
+    """
+
+    def __init__(self, model, record, **keywords):
+        super().__init__(model, record, **keywords)
+        imposable(self.block)
+        self.motion = imposed_motion(record)
+        self._extra = self.input - self.facts.load if keywords.get("force") is not None else None
+
+    @property
+    def position_dependent(self) -> bool:
+        """Whether the place matters: outputs are never shifted as positions are."""
+        return True
+
+    @property
+    def restoring(self) -> bool:
+        """Whether a free run does not drift: no force does."""
+        return True
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """Names of the hidden states at the begin of the record."""
+        named = initial_states.fitted_names(self.block.core, initial_states.FREE)
+        return tuple(n for n in named if n not in initial_states.SEEN)
+
+    @property
+    def continued(self) -> bool:
+        """Whether initial states of segments have to be carried on: they are, always, within a run."""
+        return False
+
+    def run_all(self, asked, *, rounded: bool = False) -> list[np.ndarray]:
+        """Return the forces of several (segments, values, start), all in one call."""
+        self.runs += len(asked)
+        cores = [self._core(values) for _, values, _ in asked]
+        z0 = np.array([self._begin(c, w, s) for c, (w, _, s) in zip(cores, asked, strict=True)])
+        forces, back, _ = imposed_forces(cores, self.motion.path, z0, rtol=HIDDEN_RTOL)
+        at = self.motion.path.open
+        # at rest dry friction may be anything between its two levels: no error within
+        between = np.sort([forces[:, at], back], axis=0)
+        forces[:, at] = np.clip(self.record.y[at], *between)
+        if self._extra is not None:
+            forces = forces + self._extra
+        away = float(np.mean(self.record.y)) + 10 * self.facts.spread
+        return [
+            np.where(np.isfinite(f), f, away)[w.samples] for f, (w, _, _) in zip(forces, asked, strict=True)
+        ]
+
+    def _core(self, values) -> Core:
+        model: Any = self.with_values(values)
+        return model.core
+
+    def _begin(self, core, segments: Segments, start) -> np.ndarray:
+        """Return the hidden states at the record's first sample."""
+        m, states = self.motion, np.zeros((1, core.nstates))
+        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start)[0], strict=True))
+        usual = tuple(np.array([signal[0]]) for signal in (m.x, m.v, m.a))
+        initial_states.fill(states, core, given, usual, self.facts.speed)
+        return states[0, 2:]
+
+    def at_rest(self, segments, values):
+        """Return the usual initial states: nothing is known of rest."""
+        return np.zeros((len(segments), len(self.nuisances)))
+
+    def carried_on(self, segments, values, start):
+        """Return that no segment needs to be told where the one before it ended."""
+        return np.full_like(start, np.nan)

@@ -1,0 +1,117 @@
+"""Start values by the balance of forces: what a block would take to follow the measured motions.
+
+A table says how far the mass swings under each force. Near a sine, the force that imposes this swing on a
+block has a first harmonic that is linear in masses, levels, coefficients and stiffnesses: least squares find
+these at once, from anywhere, where errors of N itself have a resonance in between (the equation error of
+Ljung, System Identification, for tables).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...simulate.imposed import imposed_forces, path_of
+from ...simulate.imposed_response import imposable
+from ..estimation.segmented import Scales
+from ..estimation.simulator import feasible
+from .fit import Points
+
+_SAMPLES, _PERIODS = 48, 3  # samples a period; hidden states settle over the first ones
+_ROUNDS = 4  # of Gauss and Newton, for the parameters that are not linear
+
+
+def can_be_imposed(block) -> bool:
+    """Whether a block answers an imposed motion with a force."""
+    try:
+        imposable(block)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+class ForceBalance:
+    """The measured motions as sines, imposed on blocks.
+
+    Parameters
+    ----------
+    points : Points
+        Those that stood still have no say.
+    """
+
+    def __init__(self, points: Points):
+        moved = points.take((points.N != 0) & np.isfinite(points.N) & (points.weight > 0))
+        self.weight = moved.weight
+        self.applied = np.exp(-1j * np.angle(moved.N))  # over A, where the motion is a cosine
+        self.amplitude = moved.A
+        angle = 2 * np.pi * np.arange(_SAMPLES * _PERIODS + 1) / _SAMPLES
+        self.paths = [
+            path_of(angle / w, x * np.cos(angle), -x * w * np.sin(angle))
+            for x, w in zip(moved.A * np.abs(moved.N), moved.omega, strict=True)
+        ]
+        last = slice(-_SAMPLES - 1, -1)
+        self._last, self._wave = last, 2 / _SAMPLES * np.exp(-1j * angle[last])
+
+    def forces(self, blocks: Sequence) -> np.ndarray:
+        """Return first harmonics of the forces over A, (blocks, points)."""
+        cores = [b.core for b in blocks]
+        z0 = np.zeros((len(blocks), cores[0].nstates - 2))
+        found = [
+            imposed_forces(cores, path, z0, rtol=1e-4)[0][:, self._last] @ self._wave for path in self.paths
+        ]
+        return np.stack(found, axis=1) / self.amplitude
+
+    def error(self, blocks: Sequence) -> np.ndarray:
+        """Return the root mean square of what misses in each block's balance, over A."""
+        missing = self.weight * (self.applied - self.forces(blocks))
+        return np.sqrt(np.mean(np.abs(np.nan_to_num(missing, nan=1.0)) ** 2, axis=1))
+
+    def solved(self, block, names, scales: Scales):
+        """Return a block with the named parameters balanced; as it is where that does not help."""
+        best = (float(self.error([block])[0]), block)
+        for _ in range(_ROUNDS):
+            moved = self._step(best[1], names, scales)
+            if moved is None:
+                break
+            size = float(self.error([moved])[0])
+            done = not size < (1 - 1e-3) * best[0]
+            best = min(best, (size, moved), key=lambda pair: pair[0])
+            if done:
+                break
+        return best[1]
+
+    def _step(self, block, names, scales):
+        """Return the block after a step of Gauss and Newton, inside its bounds."""
+        table, moved, steps = block.parameters, [], []
+        for name in names:
+            p = table[name]
+            step = 1e-3 * (abs(p.value) or scales.of(p.line_unit))
+            if p.value + step > p.upper:
+                step = -step
+            moved.append(block.with_parameters(feasible(block, {name: p.value + step})))
+            steps.append(step)
+        rows = self.forces([block, *moved])
+        missing = self.weight * (self.applied - rows[0])
+        slopes = self.weight * (rows[1:] - rows[0]) / np.array(steps)[:, None]
+        known = np.isfinite(missing) & np.isfinite(slopes).all(axis=0)
+        if np.count_nonzero(known) < len(names):
+            return None
+        usual = np.median(np.abs(missing[known]))
+        trust = 1 / np.sqrt(1 + (np.abs(missing[known]) / (3 * usual + 1e-12)) ** 2)  # a few err grossly
+        size = np.linalg.norm(slopes[:, known], axis=1)
+        size[size == 0] = 1.0
+        left = (trust * slopes[:, known] / size[:, None]).T
+        right = trust * missing[known]
+        change, *_ = np.linalg.lstsq(
+            np.concatenate([left.real, left.imag]), np.concatenate([right.real, right.imag]), rcond=1e-6
+        )
+        values = {}
+        for name, delta in zip(names, change / size, strict=True):
+            p = table[name]
+            low = p.lower if p.lower > 0 or not p.strict else 1e-2 * abs(p.value)
+            values[name] = float(np.clip(p.value + delta, low, p.upper))
+        try:
+            return block.with_parameters(feasible(block, values))
+        except ValueError:
+            return None

@@ -1,0 +1,259 @@
+"""Motion in, force out: the simulation against an independent integrator, and the flow judged in force."""
+
+import pickle
+
+import control as ct
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import ctrl_df as cdf
+from ctrl_df.simulate.imposed import path_of
+
+BASE = cdf.Massless().with_effect(cdf.Coulomb(50.0)).with_effect(cdf.Viscous(100.0))
+GUESS = BASE.with_parameters({"coulomb.level": 40.0, "viscous.coefficient": 130.0})
+TIMES = np.arange(0.0, 8.0, 0.004)
+
+
+def waves(seed, size=0.02, t=TIMES):
+    """Return a motion of four sines."""
+    rng = np.random.default_rng(seed)
+    parts = zip(
+        (1.0, 0.5, 0.3, 0.15), (0.4 + 0.1 * rng.random(), 0.9, 1.7, 3.1), rng.uniform(0, 6, 4), strict=True
+    )
+    return size * sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in parts)
+
+
+def forces(block, t, x, **keywords):
+    return np.asarray(cdf.imposed_response(block, t, x, **keywords).outputs).ravel()
+
+
+def record(block, seed, *, place=1e-6, force=0.5, units=("m", "N"), size=0.02, **keywords):
+    """Return a record of a block with noise in both signals."""
+    rng, x = np.random.default_rng(100 + seed), waves(seed, size)
+    y = forces(block, TIMES, x)
+    return cdf.Measurement(
+        TIMES, x + place * rng.standard_normal(len(x)), y + force * rng.standard_normal(len(x)),
+        input_unit=units[0], output_unit=units[1], name=f"run {seed}", **keywords,
+    )  # fmt: skip
+
+
+# --- the block --------------------------------------------------------------------------------------
+
+
+def test_it_is_a_value_and_a_system():
+    block = BASE.with_effect(cdf.Bristle(1e5, 200.0))
+    assert isinstance(block, ct.NonlinearIOSystem) and block.nstates == 1
+    assert (block.input_labels, block.output_labels) == (["x", "v"], ["F"])
+    assert pickle.loads(pickle.dumps(block)) == block
+    assert repr(block).startswith("Massless().with_effect(Coulomb(level=50.0))")
+    assert block.without_effect("bristle") == BASE
+    # at full slip the bristles carry the Coulomb level
+    assert block.output(0.0, [50.0 / 1e5], [0.0, 0.3])[0] == pytest.approx(50.0 + 30.0)
+
+
+def test_one_that_turns_has_units_of_rotation():
+    block = cdf.Massless(rotary=True).with_effect(cdf.Gravity(2.0))
+    assert dict(block.signals) == {"angle": "rad", "speed": "rad/s", "torque": "N m"}
+    assert pickle.loads(pickle.dumps(block)) == block
+    assert block.with_parameters({"gravity.torque": 3.0}).rotary
+    assert repr(block).startswith("Massless(rotary=True)")
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        cdf.Backlash(0.01), cdf.Compliance(1e4), cdf.HardStop(0.1), cdf.InputLag(0.01),
+        cdf.SensorDelay(0.01), cdf.LoadFriction(3.0),
+    ],
+)  # fmt: skip
+def test_what_needs_a_free_mass_is_refused(effect):
+    with pytest.raises(ValueError, match="needs effects that answer a motion with a force"):
+        BASE.with_effect(effect)
+    if effect.side != "load":
+        with pytest.raises(ValueError, match="imposed motion needs a block"):
+            forces(cdf.Mass(2.0).with_effect(effect), TIMES, waves(0))
+
+
+def test_forces_do_not_drive_it():
+    with pytest.raises(TypeError, match="imposed_response"):
+        cdf.event_response(BASE, [0.0, 1.0], np.zeros((2, 2)))
+    with pytest.raises(ValueError, match="times that rise"):
+        cdf.imposed_response(BASE, [0.0, 1.0], [0.0, 1.0])
+
+
+# --- the motion between samples ---------------------------------------------------------------------
+
+
+def test_reversals_between_samples_are_found():
+    t = np.linspace(0.0, 3.0, 61)
+    path = path_of(t, np.sin(2.0 * t))
+    turns = path.nodes[path.samples < 0, 0]
+    np.testing.assert_allclose(turns, (np.pi / 4, 3 * np.pi / 4), atol=2e-5)  # a spline's error: 1.2e-5
+    assert set(path.nodes[:, 4]) == {1.0, -1.0}
+
+
+def test_at_rest_friction_keeps_the_direction_of_the_last_motion():
+    t = np.linspace(0.0, 3.0, 301)
+    x = 0.01 * np.clip(t, 0.0, 1.0) - 0.01 * np.clip(t - 2.0, 0.0, 1.0)
+    v = 0.01 * ((t < 1.0) * 1.0 - (t > 2.0) * 1.0)
+    F = forces(cdf.Massless().with_effect(cdf.Coulomb(5.0)), t, x, velocity=v)
+    assert F[50] == 5.0 and F[150] == 5.0 and F[250] == -5.0
+
+
+def test_noise_is_no_reversal():
+    t = np.linspace(0.0, 2.0, 401)
+    x = np.minimum(t, 1.0) + 1e-4 * np.random.default_rng(0).standard_normal(len(t))
+    way = path_of(t, x, still=1e-3).nodes[:, 4]
+    assert np.all(way == 1.0)
+
+
+# --- the force --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        cdf.Bristle(2e5, 500.0), cdf.Hysteresis(30.0, 0.003), cdf.LooseLinkage(2e5, 0.004, 300.0),
+        cdf.MaxwellSlip(2e5, 30.0, 300.0), cdf.CubicSpring(1e6),
+    ],
+)  # fmt: skip
+def test_forces_are_those_of_an_independent_integrator(effect):
+    block = cdf.Massless().with_effect(cdf.Viscous(100.0)).with_effect(cdf.Coulomb(50.0)).with_effect(effect)
+    block = block if effect.states and effect.role == "presliding" else block.without_effect("coulomb")
+    t = np.linspace(0.0, 2.0, 2001)
+    w = 2 * np.pi
+
+    def motion(s):
+        return (
+            0.02 * np.sin(w * s) + 0.004 * np.sin(3.3 * w * s),
+            0.02 * w * np.cos(w * s) + 0.004 * 3.3 * w * np.cos(3.3 * w * s),
+        )
+
+    found = cdf.imposed_response(block, t, *motion(t))
+    n = block.nstates
+    states = np.zeros((0, len(t)))
+    if n:
+        states = solve_ivp(
+            lambda s, z: block.dynamics(s, z, motion(s)), (0.0, 2.0), np.zeros(n), method="Radau", rtol=1e-8,
+            atol=1e-12, t_eval=t, max_step=2e-3,
+        ).y  # fmt: skip
+    wanted = [block.output(s, z, motion(s))[0] for s, z in zip(t, states.T, strict=True)]
+    # differences measured: 4e-5 N at most, of 60 to 130 N
+    np.testing.assert_allclose(np.asarray(found.outputs).ravel(), wanted, atol=3e-4)
+
+
+def test_a_mass_adds_its_inertia_and_friction_its_load():
+    t = np.linspace(0.0, 2.0, 2001)
+    x, v, a = np.sin(t), np.cos(t), -np.sin(t)
+    F = forces(cdf.Mass(3.0).with_effect(cdf.LinearSpring(7.0)), t, x, velocity=v)
+    np.testing.assert_allclose(F, 3.0 * a + 7.0 * x, atol=1e-5)
+    carried = cdf.Massless().with_effect(cdf.LinearSpring(7.0)).with_effect(cdf.LoadDependentFriction(0.2))
+    F = forces(carried, t, x, velocity=v)
+    spring, way = 7.0 * x, np.where(t < np.pi / 2, 1.0, -1.0)
+    np.testing.assert_allclose(F, spring / (1.0 - 0.2 * way * np.sign(spring)), atol=1e-9)
+
+
+def test_the_same_wherever_a_mass_is_moved_by_that_force():
+    axis = (
+        cdf.Mass(2.0)
+        .with_effect(cdf.Coulomb(3.0))
+        .with_effect(cdf.Viscous(6.0))
+        .with_effect(cdf.Bristle(2e4, 50.0))
+    )
+    t = np.arange(0.0, 4.0, 0.001)
+    u = 9.0 * np.sin(3 * t) + 5.0 * np.sin(8 * t)
+    run = cdf.event_response(axis, t, u)
+    x, v = np.asarray(run.outputs)
+    F = forces(axis, t, x, velocity=v)
+    assert np.sqrt(np.mean((F - u)[5:-5] ** 2)) < 0.02  # measured 0.006, of the acceleration between samples
+
+
+# --- the flow ---------------------------------------------------------------------------------------
+
+
+def test_a_refit_finds_the_truth_and_the_missing_force_is_the_residual():
+    truth = BASE.with_effect(cdf.LinearSpring(800.0))
+    run = record(truth, 1)
+    fit = cdf.refit(truth.with_parameters({"linear_spring.stiffness": 500.0, "coulomb.level": 30.0}), run)
+    for name, p in truth.parameters.items():
+        if name in fit.parameters:
+            found = fit.parameters[name]
+            assert abs(found.value - p.value) < 4 * found.standard_error + 1e-3 * abs(p.value)
+    assert fit.comparison.rmse == pytest.approx(0.5, rel=0.1)
+    beside = cdf.compare(BASE, run)
+    assert "low-passed at" in str(beside) and "in force" in str(beside)
+    missing = beside.missing_force
+    np.testing.assert_array_equal(missing.force, beside.residual)
+    assert missing.unit == "N" and np.median(missing.std) == pytest.approx(0.5, rel=0.2)
+    assert next(iter(missing.shares)) == "position"
+    for against in ("time", "position", "velocity", "load", "reversal"):
+        missing.plot(against=against)
+
+
+@pytest.mark.parametrize(
+    "effect, rivals",
+    [
+        (cdf.LinearSpring(800.0), ["hysteresis", "cubic_spring"]),
+        (cdf.Hysteresis(20.0, 0.003), ["bristle", "linear_spring"]),
+        (cdf.LooseLinkage(5e4, 0.004), ["bristle", "hysteresis"]),
+    ],
+)  # fmt: skip
+def test_what_is_hidden_is_named(effect, rivals):
+    truth = BASE.with_effect(effect)
+    found = cdf.diagnose(GUESS, record(truth, 1), holdout=record(truth, 2), candidates=[effect.id, *rivals])
+    assert (found.verdict, found.best.id, found.measure) == ("effect", effect.id, "force")
+    first = next(iter(effect.parameters))
+    assert found.best.parameters[first] == pytest.approx(effect.values[0], rel=0.03)
+
+
+def test_nothing_is_found_where_nothing_is_hidden():
+    found = cdf.diagnose(
+        GUESS,
+        record(BASE, 1),
+        holdout=record(BASE, 2),
+        candidates=["linear_spring", "stribeck", "hysteresis"],
+    )
+    assert found.verdict == "none"
+
+
+def test_a_machine_that_turns_and_one_with_inertia():
+    base = cdf.Inertia(0.05).with_effect(cdf.Coulomb(0.5)).with_effect(cdf.Viscous(0.1))
+    truth = base.with_effect(cdf.Gravity(1.2, 0.3))
+    run = record(truth, 1, place=1e-5, force=0.01, units=("rad", "N m"), size=1.0)
+    study = cdf.improve(base, run, candidates=["gravity", "linear_spring"])
+    assert study.effects == ("gravity",)
+    assert study.model.parameters["gravity.torque"].value == pytest.approx(1.2, rel=0.01)
+    assert study.model.parameters["inertia"].value == pytest.approx(0.05, rel=0.02)
+
+
+def test_a_measured_velocity_is_used():
+    x = waves(1)
+    v = np.gradient(x, TIMES)
+    run = cdf.Measurement(
+        TIMES,
+        x,
+        forces(BASE, TIMES, x),
+        input_unit="m",
+        output_unit="N",
+        velocity=1.5 * v,
+        velocity_unit="m/s",
+    )
+    beside = cdf.compare(BASE, run)
+    assert "measured velocity" in str(beside)
+    extra = np.asarray(beside.simulated) - forces(BASE, TIMES, x)
+    moving = np.abs(v) > 0.05
+    np.testing.assert_allclose(extra[moving], 50.0 * v[moving], atol=0.5)
+
+
+def test_records_of_other_quantities_are_refused():
+    run = record(BASE, 1)
+    driven = cdf.Measurement(TIMES, run.y, run.u)
+    with pytest.raises(ValueError, match="under an imposed motion this model takes a position"):
+        cdf.compare(BASE, driven)
+    with pytest.raises(ValueError, match="give the block a mass|State"):
+        cdf.compare(cdf.Massless(rotary=True).with_effect(cdf.Coulomb(1.0)), run)
+    with pytest.raises(ValueError, match="judged apart"):
+        cdf.compare(cdf.Mass(2.0), [run, driven])
+    with pytest.raises(ValueError, match="answers it with a force"):
+        cdf.compare(cdf.backlash_masses(1.0, 2.0, 0.01), run)
