@@ -211,3 +211,46 @@ def test_records_of_different_outputs_are_studied_apart():
     held = records(TRUE)
     with pytest.raises(ValueError, match="need the same outputs"):
         cdf.compare(TRUE, [held["position"], held["velocity"]])
+
+
+# --- records as they come --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at", [700, 1503, 2700])
+def test_an_encoder_that_was_reset_is_refused(at):
+    x = records(TRUE)["position"].y.copy()
+    x[at:] -= 0.25
+    with pytest.raises(ValueError, match="leaps; it has 1.*encoder reset"):
+        cdf.Measurement(TIME, FORCE, x)
+    angle = np.angle(np.exp(1j * 40 * records(TRUE)["position"].y))  # wraps
+    with pytest.raises(ValueError, match="unwrap"):
+        cdf.Measurement(TIME, FORCE, angle, output="angle")
+
+
+def test_what_only_looks_like_a_leap_is_taken():
+    x = records(TRUE)["position"].y
+    coarse = np.round(x / 0.02) * 0.02
+    rested = np.where(TIME < 3.0, x[1500], x)  # at rest, then moving
+    spike = x.copy()
+    spike[900] += 0.3
+    for y in (coarse, rested, spike):
+        cdf.Measurement(TIME, FORCE, y)
+
+
+@pytest.mark.parametrize(("dt", "count"), [(0.01, 600), (2e-3, 500), (5e-5, 120_000)])
+def test_low_rates_short_and_long_records_are_fitted(dt, count):
+    t = dt * np.arange(count)
+    force = 9 * np.sin(2 * np.pi * 0.5 * t) + 5 * np.sin(2 * np.pi * 1.7 * t)
+    x = np.asarray(cdf.event_response(TRUE, t, force, input_hold="zoh").outputs)[0]
+    x = x + 1e-4 * np.random.default_rng(5).standard_normal(count)
+    fit = cdf.refit(START, cdf.Measurement(t, force, x))
+    assert fit.parameters["mass"].value == pytest.approx(2.2, rel=2e-3)
+    assert fit.comparison.rmse == pytest.approx(1e-4, rel=0.1)
+
+
+def test_a_pause_of_the_drive_does_no_harm():
+    force = np.where((TIME > 2.0) & (TIME < 4.0), 0.0, FORCE)
+    x = np.asarray(cdf.event_response(TRUE, TIME, force, input_hold="zoh").outputs)[0]
+    x = x + 1e-4 * np.random.default_rng(5).standard_normal(x.size)
+    fit = cdf.refit(START, cdf.Measurement(TIME, force, x))
+    assert fit.parameters["coulomb.level"].value == pytest.approx(3.0, rel=2e-3)
