@@ -114,3 +114,143 @@ def test_a_record_of_voltage_is_judged_with_its_motor():
         cdf.compare(MOTOR.without_effect("torque_constant"), record)
     with pytest.raises(ValueError, match="takes a voltage .V.*is in A"):
         cdf.compare(MOTOR, cdf.Measurement(T, U, X, input_unit="A", output_unit="rad"))
+
+
+# --- velocity, and position beside it --------------------------------------------------------------
+
+TIME = 2e-3 * np.arange(3000)
+FORCE = 9 * np.sin(2 * np.pi * 0.5 * TIME) + 5 * np.sin(2 * np.pi * 1.7 * TIME)
+TRUE = cdf.friction_mass(2.2, 3.0, 6.0)
+START = cdf.friction_mass(2.0, 2.5, 5.0)
+
+
+def records(machine, seed=3):
+    """Return records of position, of velocity and of both."""
+    rng = np.random.default_rng(seed)
+    x, v = np.asarray(cdf.event_response(machine, TIME, FORCE, input_hold="zoh").outputs)
+    x, v = x + 1e-4 * rng.standard_normal(x.size), v + 1e-3 * rng.standard_normal(v.size)
+    return {
+        "position": cdf.Measurement(TIME, FORCE, x),
+        "velocity": cdf.Measurement(TIME, FORCE, v, output="velocity"),
+        "both": cdf.Measurement(TIME, FORCE, outputs={"x": x, "v": v}),
+    }
+
+
+def test_the_true_model_errs_by_the_noise_of_each_output():
+    found = {name: cdf.compare(TRUE, record) for name, record in records(TRUE).items()}
+    assert found["velocity"].rmse == pytest.approx(1e-3, rel=0.05)
+    assert "m/s" in str(found["velocity"]) and found["velocity"].white.p_value > 1e-4
+    both = found["both"].records[0].by_output
+    assert both["position"].rmse == pytest.approx(1e-4, rel=0.05)
+    assert both["velocity"].rmse == pytest.approx(1e-3, rel=0.05)
+    assert " m and " in str(found["both"]) and found["both"].rmse == both["position"].rmse
+    errors = [both[q].nrmse for q in ("position", "velocity")]
+    assert found["both"].nrmse == pytest.approx(np.sqrt(np.mean(np.square(errors))))
+
+
+@pytest.mark.parametrize("kind", ["velocity", "both"])
+def test_parameters_are_found_within_their_errors(kind):
+    fit = cdf.refit(START, records(TRUE)[kind])
+    for name, true in (("mass", 2.2), ("coulomb.level", 3.0), ("viscous.coefficient", 6.0)):
+        p = fit.parameters[name]
+        assert abs(p.value - true) < 4 * p.standard_error < 0.01 * true, name
+
+
+@pytest.mark.parametrize(
+    ("effect", "id"), [(cdf.QuadraticDrag(3.0), "quadratic_drag"), (cdf.LinearSpring(20.0), "linear_spring")]
+)
+def test_a_tachometer_shows_what_is_missing(effect, id):
+    record = records(TRUE.with_effect(effect))["velocity"]
+    found = cdf.diagnose(START, record, candidates=["quadratic_drag", "linear_spring", "sensor_delay"])
+    assert found.verdict == "effect" and found.best.id == id
+    assert all(c.id != "sensor_delay" for c in found.ranking)  # of a sensor that was not there
+    value = next(iter(effect.parameters.values())).value
+    assert next(iter(found.best.parameters.values())) == pytest.approx(value, rel=0.03)
+
+
+@pytest.mark.parametrize("cls", [cdf.InputDelay, cdf.SensorDelay])
+def test_velocity_beside_position_tells_whose_delay_it_is(cls):
+    held = records(TRUE.with_effect(cls(0.01)))
+    names = ["input_delay", "sensor_delay"]
+    assert cdf.diagnose(START, held["position"], candidates=names).best.equivalents
+    found = cdf.diagnose(START, held["both"], candidates=names)
+    assert found.verdict == "effect" and found.best.id == cls.id and not found.best.equivalents
+    assert found.best.parameters["delay"] == pytest.approx(0.01, rel=0.02)
+
+
+def test_the_place_of_a_velocity_record_is_found_where_a_law_knows_it():
+    machine = TRUE.with_effect(cdf.LinearSpring(20.0))
+    x, v = np.asarray(
+        cdf.event_response(machine, TIME, FORCE, [0.1, 0.0], input_hold="zoh").outputs
+    )  # begins 0.1 m off the spring's rest
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(v.size)
+    record = cdf.Measurement(TIME, FORCE, v + noise, output="velocity")
+    assert cdf.compare(machine, record).rmse == pytest.approx(1e-3, rel=0.05)
+
+
+def test_the_missing_force_is_seen_through_a_tachometer():
+    machine = TRUE.with_effect(cdf.ConstantForce(0.5))
+    for kind in ("velocity", "both"):
+        missing = cdf.compare(TRUE, records(machine)[kind]).missing_force
+        assert np.median(missing.force) == pytest.approx(0.5, abs=0.05)
+        assert missing.units["position"] == "m"
+
+
+def test_pictures_name_the_output():
+    import matplotlib.pyplot as plt
+
+    comparison = cdf.compare(TRUE, records(TRUE)["both"])
+    assert comparison.plot().axes.flat[0].get_ylabel() == "position [mm]"
+    assert comparison.plot(output="velocity").axes.flat[0].get_ylabel() == "velocity [m/s]"
+    with pytest.raises(ValueError, match="position, velocity"):
+        comparison.plot(output="force")
+    plt.close("all")
+
+
+def test_records_of_different_outputs_are_studied_apart():
+    held = records(TRUE)
+    with pytest.raises(ValueError, match="need the same outputs"):
+        cdf.compare(TRUE, [held["position"], held["velocity"]])
+
+
+# --- records as they come --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("at", [700, 1503, 2700])
+def test_an_encoder_that_was_reset_is_refused(at):
+    x = records(TRUE)["position"].y.copy()
+    x[at:] -= 0.25
+    with pytest.raises(ValueError, match="leaps; it has 1.*encoder reset"):
+        cdf.Measurement(TIME, FORCE, x)
+    angle = np.angle(np.exp(1j * 40 * records(TRUE)["position"].y))  # wraps
+    with pytest.raises(ValueError, match="unwrap"):
+        cdf.Measurement(TIME, FORCE, angle, output="angle")
+
+
+def test_what_only_looks_like_a_leap_is_taken():
+    x = records(TRUE)["position"].y
+    coarse = np.round(x / 0.02) * 0.02
+    rested = np.where(TIME < 3.0, x[1500], x)  # at rest, then moving
+    spike = x.copy()
+    spike[900] += 0.3
+    for y in (coarse, rested, spike):
+        cdf.Measurement(TIME, FORCE, y)
+
+
+@pytest.mark.parametrize(("dt", "count"), [(0.01, 600), (2e-3, 500), (5e-5, 120_000)])
+def test_low_rates_short_and_long_records_are_fitted(dt, count):
+    t = dt * np.arange(count)
+    force = 9 * np.sin(2 * np.pi * 0.5 * t) + 5 * np.sin(2 * np.pi * 1.7 * t)
+    x = np.asarray(cdf.event_response(TRUE, t, force, input_hold="zoh").outputs)[0]
+    x = x + 1e-4 * np.random.default_rng(5).standard_normal(count)
+    fit = cdf.refit(START, cdf.Measurement(t, force, x))
+    assert fit.parameters["mass"].value == pytest.approx(2.2, rel=2e-3)
+    assert fit.comparison.rmse == pytest.approx(1e-4, rel=0.1)
+
+
+def test_a_pause_of_the_drive_does_no_harm():
+    force = np.where((TIME > 2.0) & (TIME < 4.0), 0.0, FORCE)
+    x = np.asarray(cdf.event_response(TRUE, TIME, force, input_hold="zoh").outputs)[0]
+    x = x + 1e-4 * np.random.default_rng(5).standard_normal(x.size)
+    fit = cdf.refit(START, cdf.Measurement(TIME, force, x))
+    assert fit.parameters["coulomb.level"].value == pytest.approx(3.0, rel=2e-3)

@@ -18,7 +18,8 @@ def record(**units):
 
 
 WRONG = [
-    (LINE, dict(output_unit="m/s"), ["gives a position [m]", "run 7", "m/s", "channels="]),
+    (LINE, dict(output_unit="m/s^2"), ["gives a position [m]", "run 7", "m/s^2", "channels="]),
+    (LINE, dict(output_unit="rad/s"), ["and a velocity [m/s]", "rad/s"]),
     (LINE, dict(output_unit="deg"), ["gives a position [m]", "rad"]),
     (LINE, dict(input_unit="V"), ["takes a force [N]", "run 7", "is in V", "input_unit="]),
     (LINE, dict(input_unit="N m"), ["takes a force [N]", "N m"]),

@@ -129,6 +129,10 @@ STRAY = 1e-3
 NOISE_FREE = 1e-7
 """Noise over the spread of the output that no sensor is below: such a record was simulated."""
 
+UNPLACED = 0.2
+"""Error of a place that is an integral of the velocity, over the spread of places: where a record began is
+told by laws that know the place alone, and fits let a place be five of its errors off."""
+
 EXACT = 10 * NOISE_FREE
 """Error over the spread of the output that is no error."""
 

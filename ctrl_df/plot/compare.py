@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
+from ..checks import known_name
 from .page import ERROR, MEASURED, MODEL, legend_above, page
 
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
@@ -18,7 +19,7 @@ _KINDS = {"low_speed": "speed"}  # the region may as well be one of high speed
 
 
 def comparison_plot(
-    comparison, record=None, *, beside=(), labels=(), title=None, rows=8, width=None, **keywords
+    comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None, **keywords
 ) -> ct.ControlPlot:
     """Draw a `Comparison`; see `ctrl_df.identify.compare.Comparison.plot`.
 
@@ -27,6 +28,8 @@ def comparison_plot(
     comparison : Comparison
     record : int or None
         Which record; None: the one with the largest error.
+    output : str or None
+        Which of several outputs, by quantity; None: the one that leads.
     beside : Comparison or sequence of them
         Of other models with the same records, drawn in the same picture.
     labels : sequence of str
@@ -40,7 +43,9 @@ def comparison_plot(
     """
     others = [beside] if hasattr(beside, "records") else list(beside)
     index = comparison.records.index(comparison.worst) if record is None else record
-    models = [c.records[index] for c in (comparison, *others)]
+    choices = comparison.records[index].by_output
+    quantity = known_name("plot", "output", output or next(iter(choices)), choices)
+    models = [c.records[index].by_output[quantity] for c in (comparison, *others)]
     chosen, data = models[0], models[0].record
     if any(len(m.residual) != len(chosen.residual) for m in models):
         raise ValueError("comparisons in one picture need the same records; these differ in length.")
@@ -97,7 +102,7 @@ def _said(comparison) -> str:
 def _readable(values, unit):
     """Return factor and unit that make numbers of order one to a thousand: micrometres rather than 1e-6 m."""
     largest = float(np.max(np.abs(values), initial=0.0))
-    if unit not in ("m", "rad", "N", "m/s") or largest == 0 or largest >= 0.5:
+    if unit not in ("m", "rad", "N", "m/s", "rad/s") or largest == 0 or largest >= 0.5:
         return 1.0, unit
     for factor, prefix in ((1e3, "m"), (1e6, "µ"), (1e9, "n")):
         if factor * largest >= 0.5:

@@ -7,8 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...checks import is_number, shown
+from .derivatives import grain, step_of
 
 MINIMUM = 10
+
+_BESIDE, _LEAP, _FAST = 5, 20.0, 5.0
+"""Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -109,4 +113,26 @@ def check_output(owner: str, y: np.ndarray) -> None:
         raise ValueError(
             f"{owner} needs an output that varies; y is {y[0]:g} throughout. "
             "Check the column and the sensor, or apply a larger force."
+        )
+
+
+def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
+    """Check that a measured place does not leap, as it does where an encoder is reset or an angle wraps.
+
+    A leap is a step between two samples that is far larger than those around it, than any other in the
+    record, and than noise and rounding: no machine is that fast for one sample alone.
+    """
+    steps = np.abs(np.diff(x))
+    around = np.zeros(len(steps))
+    for lag in range(1, _BESIDE + 1):
+        around[lag:] = np.maximum(around[lag:], steps[:-lag])
+        around[:-lag] = np.maximum(around[:-lag], steps[lag:])
+    alone = steps > _LEAP * np.maximum(around, max(step_of(x), grain(x)))
+    leaps = np.flatnonzero(alone & (steps > _FAST * np.max(steps[~alone], initial=0.0)))
+    if len(leaps):
+        i = int(leaps[0])
+        raise ValueError(
+            f"{owner} needs a position without leaps; it has {len(leaps)}, the first from {x[i]:.6g} to "
+            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Was the encoder reset? Give the parts as "
+            "separate records (an angle that wraps: np.unwrap first)."
         )

@@ -100,7 +100,7 @@ def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -
     d = sosfiltfilt(sos, rest, padtype="odd", padlen=pad)
     for _ in range(order):
         d = np.gradient(d, dt, edge_order=2)
-    d = d + (values[0] + slope * (grid - grid[0]) if order == 0 else slope if order == 1 else 0.0)
+    d = d + (values[0] + slope * (grid - grid[0]), slope, 0.0)[order]
     return d if grid is t else np.interp(t, grid, d)
 
 

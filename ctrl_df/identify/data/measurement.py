@@ -13,7 +13,7 @@ import numpy as np
 from ...checks import choice, count, mapping, number, shown, unknown_keywords
 from ...units import si_unit, to_si
 from . import derivatives, quantities, readers
-from .checks import as_channel, check_input, check_output, check_times
+from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
@@ -67,8 +67,9 @@ class Measurement:
     Raises
     ------
     ValueError
-        NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a constant
-        input or output, fewer than 10 samples, an unknown unit; the message gives rule, value, remedy.
+        NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a position
+        that leaps (an encoder that was reset), a constant input or output, fewer than 10 samples, an unknown
+        unit; the message gives rule, value, remedy.
 
     Examples
     --------
@@ -109,8 +110,10 @@ class Measurement:
         t = to_si(t, self._seconds())[0]
         check_times(owner, t)
         check_input(owner, u)
-        for array, _, _ in measured.values():
+        for quantity, (array, _, _) in measured.items():
             check_output(owner, array)
+            if quantity == "position":
+                check_jumps(owner, t, array)
         outputs = {quantity: values * scale for quantity, (values, scale, _) in measured.items()}
         units = {quantity: unit for quantity, (_, _, unit) in measured.items()}
         output = quantities.leading(outputs)
@@ -430,8 +433,8 @@ class Measurement:
         output = quantities.leading(outputs)
         return {
             "outputs": MappingProxyType({k: _frozen(v) for k, v in outputs.items()}),
-            "units": MappingProxyType({k: self.units[k] for k in outputs}),
-            "output": output, "y": outputs[output], "output_unit": self.units[output],
+            "units": MappingProxyType({k: self.units.get(k, "") for k in outputs}),
+            "output": output, "y": outputs[output], "output_unit": self.units.get(output, ""),
         }  # fmt: skip
 
     def __getstate__(self):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 
 from ..arguments import check_window
@@ -10,6 +12,7 @@ from ..estimation.multiple_shooting import Problem
 from ..estimation.prepared import REFERENCE
 from ..estimation.refit_records import blurred, doubts, refit_records
 from ..estimation.segments import make_segments
+from ..estimation.sensed import sensed
 from ..estimation.simulators import simulator_of
 from ..planning.inputs import input_that_separates
 from ..results.comparison import Comparison, RecordComparison
@@ -46,8 +49,14 @@ class TimeDataset(Dataset):
         """Return the comparison of a model whose initial states in each segment are known already."""
         rows = []
         for record, w, start in zip(self.records, segments, starts, strict=True):
-            simulated = simulator_of(model, record).run(w, None, start, rounded=True)
-            rows.append(RecordComparison(record, simulated, record.y - simulated, w.edges, fitted, model))
+            run = simulator_of(model, record).run(w, None, start, rounded=True)
+            simulated = sensed(record).apart(run)
+            beside = simulated[record.output]
+            rows.append(
+                RecordComparison(
+                    record, beside, record.y - beside, w.edges, fitted, model, MappingProxyType(simulated)
+                )
+            )
         return Comparison(model, tuple(rows))
 
     def fit(self, model, names, start, *, whole, mode, window, robust, budget):

@@ -47,22 +47,27 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     for k, e in enumerate(residual):
         e, columns = problem.weighed(k, e), sensitivity.parameters[k]
         if problem.error_filter is None and len(problem.segments[k]) >= MANY_SEGMENTS:
-            scores = np.array([columns[w].T @ e[w] for w in problem.segments[k].slices])
+            scores = np.array([columns[w].T @ e[w] for w in problem.segments[k].places])
             middle += _long_run(scores)
             continue
         n = len(e)
         lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.segments[k])
-        length = 1 << (n - 1).bit_length()
-        transform = np.fft.rfft(columns, length, axis=0)
-        omega = np.linspace(0, math.pi, transform.shape[0])
         floor = problem.noise**2 if problem.error_filter is None else float(np.mean(e * e))
-        density = noise_model(e).spectrum(omega) + 1e-6 * floor
-        double = np.full(len(omega), 2.0)
-        double[0] = double[-1] = 1.0
-        middle += n / max(n - lost, 0.1 * n) * np.real(
-            (transform.conj() * (density * double / length)[:, None]).T @ transform
-        )  # fmt: skip
+        blocks = problem.segments[k].blocks if problem.error_filter is None else [slice(0, n)]
+        for block in blocks:
+            middle += n / max(n - lost, 0.1 * n) * _coloured(columns[block], e[block], floor)
     return inverse @ middle @ inverse, null
+
+
+def _coloured(columns, e, floor) -> np.ndarray:
+    """Return J' Omega J, (p, p), for the colour of a stationary residual."""
+    length = 1 << (len(e) - 1).bit_length()
+    transform = np.fft.rfft(columns, length, axis=0)
+    omega = np.linspace(0, math.pi, transform.shape[0])
+    density = noise_model(e).spectrum(omega) + 1e-6 * floor
+    double = np.full(len(omega), 2.0)
+    double[0] = double[-1] = 1.0
+    return np.real((transform.conj() * (density * double / length)[:, None]).T @ transform)
 
 
 def _long_run(scores) -> np.ndarray:

@@ -93,13 +93,23 @@ class FitResult:
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
-        """The residual as evidence takes it: of every record, or every segment where errors are of forces."""
-        return self.by_segment(self.residual) if self.error_filter is not None else list(self.residual)
+        """The residual as evidence takes it: of each output of a record, or, of forces, each segment."""
+        return self._pieces(self.residual)
 
     @property
     def simulated_pieces(self) -> list[np.ndarray]:
         """The simulated output, as `residual_pieces`."""
-        return self.by_segment(self.simulated) if self.error_filter is not None else list(self.simulated)
+        return self._pieces(self.simulated)
+
+    @property
+    def outputs(self) -> int:
+        """How many outputs the records hold."""
+        return self.segments[0].outputs
+
+    def _pieces(self, signals) -> list[np.ndarray]:
+        if self.error_filter is not None:
+            return self.by_segment(signals)
+        return [x[b] for w, x in zip(self.segments, signals, strict=True) for b in w.blocks]
 
     def by_segment(self, signals) -> list[np.ndarray]:
         """Return signals, one a record, segment by segment."""
@@ -241,7 +251,7 @@ def fit_segments(
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
     error_filter : NoiseModel or None
-        The `second_difference_filter` whose squares are made least, where disturbance forces make the error.
+        The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
         How segments begin: `initial_states.FITTED`, `CONTINUED` or `MEASURED`.
     hopeless : float
@@ -310,7 +320,7 @@ def _outcome(problem: Problem, theta, covariance, null) -> FitResult:
     values = problem.values(theta) or {}
     residual = problem.last
     total, count = problem.power(residual)
-    spread, _ = problem.power([y - y.mean() for y in problem.measured])
+    spread, _ = problem.power([w.centred(y) for w, y in zip(problem.segments, problem.measured, strict=True)])
     return FitResult(
         model=problem.simulators[0].with_values(values),
         names=problem.names,

@@ -60,7 +60,7 @@ def reach(which, core, known, segments) -> np.ndarray:
     """
     one = np.ones(len(segments))
     table = {
-        "x": 5 * segments.x_error + 0.02 * known.spread,
+        "x": 5 * segments.x_error + 0.02 * known.position,
         "v": 2 * segments.v_error + 0.01 * known.speed,
         "slack": one,
         "slack_rate": 0.7 * known.speed * one,

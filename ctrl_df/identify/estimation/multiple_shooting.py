@@ -19,7 +19,8 @@ from ..thresholds import GOOD
 from .initial_states import FREE
 from .noise_model import power
 from .restarts import restart_segments, scan_gap_state
-from .segments import Segments, facts
+from .segments import Segments, facts_of
+from .sensed import sensed
 from .sensitivity import OutputSensitivity
 from .simulator import Simulator, feasible
 from .simulators import simulator_of
@@ -49,8 +50,8 @@ class Problem:
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
-        self.known = [facts(r) for r in records]
         self.block = simulator_of(model, records[0]).block
+        self.known = [facts_of(self.block, r) for r in records]
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
         self.steps = np.full(len(names), 1e-3)
         self.nfev = 0
@@ -78,7 +79,7 @@ class Problem:
         """Set the segments; initial states begin at `starts` (corrections) or at what the data say."""
         self.simulators = [simulator_of(self.model, r, thin=thin, begins=self.begins) for r in self.records]
         self.segments = segments
-        self.measured = [r.y[w.samples] for r, w in zip(self.records, segments, strict=True)]
+        self.measured = [sensed(r).within(w.samples) for r, w in zip(self.records, segments, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
         if starts is not None:
             # those of a fit of more states: the first of them are the same
@@ -137,7 +138,9 @@ class Problem:
     @property
     def unit(self) -> float:
         """Unit of what the cost sees: accelerations make second differences of their step squared."""
-        return 1.0 if self.error_filter is None else (self.error_filter.step * self.known[0].dt) ** 2
+        if self.error_filter is None:
+            return 1.0
+        return (self.error_filter.step * self.known[0].dt) ** self.error_filter.order
 
     def means(self):
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
@@ -206,12 +209,7 @@ class Problem:
         for segments, e in zip(self.segments, self.last, strict=True):
             power = segments.means(e**2)
             usual = max(float(np.median(power)), self.noise**2)
-            trusts.append(
-                np.repeat(
-                    np.minimum(1.0, (2 * usual / np.maximum(power, usual)) ** 2),
-                    segments.ends - segments.begins,
-                )
-            )
+            trusts.append(segments.spread(np.minimum(1.0, (2 * usual / np.maximum(power, usual)) ** 2)))
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):
@@ -329,22 +327,26 @@ class Problem:
                 continue
             size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
                 self.priors[k][:, j],
-                {"x": 0.003 * self.known[k].spread, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
+                {"x": 0.003 * self.known[k].position, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
             )
             moved = nuisance[k].copy()
             sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             moved[:, j] += sign * size
             starts.append(moved)
-            widths.append(np.repeat(sign * size, segments.ends - segments.begins))
+            widths.append(segments.spread(sign * size))
         return starts, widths
 
     def _by_start(self, k, starts, widths, signals, base) -> np.ndarray:
         """Return derivatives (n, ns) of one record's output by its initial states, all segments at once."""
         rows, moved = [], iter(signals)
         for start, width in zip(starts, widths, strict=True):
-            rows.append(np.ones(len(base)) if start is None else (next(moved) - base) / width)
+            rows.append(self._by_place(k) if start is None else (next(moved) - base) / width)
         self.nfev += len(rows) / len(self.simulators)
         return np.array(rows).T.reshape(len(self.measured[k]), len(rows))
+
+    def _by_place(self, k) -> np.ndarray:
+        """Return the derivatives by the place where no law knows it."""
+        return sensed(self.records[k]).of_place(len(self.segments[k].samples))
 
     def normal(self, jp, js, residual, weights, nuisance, damping=0.0):
         """Eliminate the initial states; return (H, g, back) with ``back(step)`` their own step."""
@@ -431,9 +433,8 @@ def _by_segment(states, parameters, residual, weights, segments: Segments) -> np
     """Return Z' W Z of every segment, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
     z = np.column_stack((states, parameters, residual))
     weighted = z * weights[:, None]
-    begins = np.concatenate(([0], np.cumsum(segments.ends - segments.begins)[:-1]))
     products = np.empty((len(segments), z.shape[1], z.shape[1]))
     for i in range(z.shape[1]):
-        column = np.add.reduceat(weighted[:, i:] * z[:, i : i + 1], begins, axis=0)
+        column = segments.sums(weighted[:, i:] * z[:, i : i + 1])
         products[:, i, i:] = products[:, i:, i] = column
     return products

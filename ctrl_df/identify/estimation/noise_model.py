@@ -49,6 +49,10 @@ class NoiseModel:
         age = np.arange(len(blocks)) - np.repeat(begins, np.diff([*begins, len(blocks)]))
         return self.whiten(blocks)[age >= self.order]
 
+    def weighed(self, x, piece: int) -> np.ndarray:
+        """Return what counts of one piece of several."""
+        return self.filtered(x, [slice(0, len(x))])
+
     def rows(self, segments) -> np.ndarray:
         """Return the sample in the middle of each value that `seen` returns of signals within `windows`."""
         found = []
@@ -79,6 +83,37 @@ class NoiseModel:
             if n >= 1 << 18 or np.max(np.abs(h[-n // 8 :])) < 1e-6 * np.max(np.abs(h)):
                 return h
             n *= 4
+
+
+@dataclass(frozen=True)
+class OutputNoise(NoiseModel):
+    """Noise of records of several outputs, whose pieces follow in turn: a model of each, beside the first.
+
+    What it filters is over the noise of its own output, times that of the first: one sum of squares serves.
+    """
+
+    others: tuple[NoiseModel, ...] = ()
+
+    def of(self, piece: int) -> NoiseModel:
+        """Return the model of one piece of several."""
+        at = piece % (1 + len(self.others))
+        return NoiseModel(self.a, self.sigma, self.step) if at == 0 else self.others[at - 1]
+
+    def filtered(self, x, segments) -> np.ndarray:
+        """Return what counts of signals, as for one output; `segments` are those of each output in turn."""
+        x = np.asarray(x, dtype=float)
+        return np.concatenate([self.weighed(x[w], i) for i, w in enumerate(segments)])
+
+    def weighed(self, x, piece: int) -> np.ndarray:
+        """Return what counts of one piece of several."""
+        model = self.of(piece)
+        return model.filtered(x, [slice(0, len(x))]) * (self.sigma / max(model.sigma, 1e-300))
+
+
+def noise_of_outputs(pieces: Pieces, outputs: int, max_order: int = 30) -> NoiseModel:
+    """Fit a noise model to pieces of records of one output, or of several in turn."""
+    first, *others = [noise_model(pieces[i::outputs], max_order) for i in range(outputs)]
+    return OutputNoise(first.a, first.sigma, first.step, tuple(others)) if others else first
 
 
 def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseModel:
@@ -136,23 +171,25 @@ def averaged(x, segments, step: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(means), begins
 
 
-def second_difference_filter(step: int) -> NoiseModel:
-    """Return the filter that makes accelerations of residuals in position: their second differences.
+def acceleration_filter(step: int, column: int = 0) -> NoiseModel:
+    """Return the filter that makes accelerations of residuals: second differences of those in position.
 
     Where disturbance forces, integrated twice, make the residuals, their slow parts are the largest and tell
     the least; the forces themselves are level over the frequencies at which machines move. `step`: samples a
-    value; what is faster than twice that does not count.
+    value; what is faster than twice that does not count. `column`: 1 for residuals in velocity, of which
+    first differences do.
     """
-    return NoiseModel(np.array([2.0, -1.0]), 1.0, step)
+    return NoiseModel(np.array([2.0, -1.0] if column == 0 else [1.0]), 1.0, step)
 
 
-def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None) -> NoiseModel:
+def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None, outputs: int = 1) -> NoiseModel:
     """Return the noise model that evidence is judged by.
 
-    Of the longest record; `plain`: the `second_difference_filter` of fits, then of these in all segments.
+    Of the longest record; `plain`: the `acceleration_filter` of fits, then of these in all segments.
     """
     if plain is None:
-        return noise_model(max(pieces, key=len), max_order=12)
+        longest = int(np.argmax([len(r) for r in pieces])) // outputs * outputs
+        return noise_of_outputs(pieces[longest : longest + outputs], outputs, max_order=12)
     left = noise_model([plain.filtered(r, [slice(0, len(r))]) for r in pieces], max_order=4)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
     return NoiseModel(-both[1:], left.sigma, plain.step)
@@ -160,7 +197,7 @@ def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None) -> 
 
 def whitened_power(pieces: Pieces, noise: NoiseModel) -> tuple[float, int]:
     """Return the sum of squares of the whitened residuals, and their number."""
-    white = [noise.filtered(r, [slice(0, len(r))]) for r in pieces]
+    white = [noise.weighed(r, i) for i, r in enumerate(pieces)]
     return power(white), sum(map(len, white))
 
 

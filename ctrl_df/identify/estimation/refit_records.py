@@ -78,7 +78,7 @@ def _with_step(found: FitResult, records, names, whole) -> FitResult:
     key = step_of_sensor(first.block)
     if key is None or not (whole or key in names):
         return found
-    steps = [step_of(r.y) for r in records]
+    steps = [step_of((r.outputs or {}).get("position", np.zeros(0))) for r in records]
     if min(steps) == 0:
         return found
     return replace(found, model=first.with_values({key: float(np.median(steps))}))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..thresholds import GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS
+from .sensed import sensed
 
 
 def restart_segments(problem, theta) -> bool:
@@ -29,7 +30,8 @@ def restart_segments(problem, theta) -> bool:
         if not bad.any():
             continue
         some = segments.only(bad)
-        measured, least = problem.records[k].y[some.samples], 0.7 * rms[bad] ** 2
+        held = sensed(problem.records[k])
+        measured, least = held.within(some.samples), 0.7 * rms[bad] ** 2
         problem.priors[k][bad, column] = problem.widest[k][bad, column]
         reach, chosen = problem.priors[k][bad, column], starts[bad].copy()
         before = simulator.carried_on(segments, values, starts)[bad]
@@ -47,8 +49,8 @@ def restart_segments(problem, theta) -> bool:
             trial[:, which] = value
         for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
             e = measured - y
-            shift = np.zeros(len(some)) if simulator.position_dependent else some.means(e)
-            powers = some.means(e**2) - shift**2
+            shift, gain = _shift(held, some, e, simulator.position_dependent)
+            powers = some.means(e**2) - gain
             better = powers < least
             trial[:, 0] += shift
             chosen[better], least = trial[better], np.minimum(least, powers)
@@ -71,11 +73,24 @@ def scan_gap_state(problem, theta):
             trial[:, at : at + 2] = slack
         for trial, y in zip(trials, simulator.run_all([(segments, values, t) for t in trials]), strict=True):
             e = problem.measured[k] - y
-            errors = segments.means(e**2) - segments.means(e) ** 2
+            errors = segments.means(e**2) - _shift(sensed(problem.records[k]), segments, e)[1]
             better = errors < least
             chosen[better], least = trial[better], np.minimum(least, errors)
         problem.nuisance[k] = chosen
         problem.count(len(tries) / len(problem.simulators))
+
+
+def _shift(held, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
+    """Return the place (nw,) that explains most of a residual, and what its mean square loses by it.
+
+    None where the place is `placed`: known to a law.
+    """
+    seen = held.of_place(len(segments.samples))
+    if placed or not np.any(seen):
+        return np.zeros(len(segments)), np.zeros(len(segments))
+    count = segments.sums(seen)
+    shift = segments.sums(e * seen) / count
+    return shift, shift**2 * (count / (segments.outputs * (segments.ends - segments.begins)))
 
 
 def _slacks(problem, k) -> list[tuple[float, float]]:

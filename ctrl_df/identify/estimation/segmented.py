@@ -27,8 +27,9 @@ from ..thresholds import (
 from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
 from .initial_states import CONTINUED, FREE, MEASURED
-from .noise_model import NoiseModel, second_difference_filter
-from .segments import Segments, cut, facts, split
+from .noise_model import NoiseModel, acceleration_filter
+from .segments import Segments, cut, facts, load_of, split
+from .sensed import sensed
 from .simulator import Simulator
 from .simulators import simulator_of
 from .variables import RecordScales, typical_mass
@@ -69,8 +70,14 @@ class SegmentedRecords:
 
     @property
     def outputs(self) -> list[np.ndarray]:
-        """Measured outputs within the segments."""
-        return [r.y[w.samples] for r, w in zip(self.records, self.segments, strict=True)]
+        """Measured outputs within the segments, as fits see them."""
+        return [sensed(r).within(w.samples) for r, w in zip(self.records, self.segments, strict=True)]
+
+    def only(self, quantity: str) -> SegmentedRecords:
+        """Return the same with one output alone, by quantity."""
+        return SegmentedRecords(
+            tuple(r.only(quantity) for r in self.records), tuple(replace(w, outputs=1) for w in self.segments)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +158,8 @@ class SegmentedData:
     @property
     def noise_free(self) -> bool:
         """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
-        return all(derivatives.grain(r.y) < NOISE_FREE * facts(r).spread for r in self.train.records)
+        outputs = [y for r in self.train.records for y in sensed(r).values]
+        return all(derivatives.grain(y) < NOISE_FREE * max(float(np.std(y)), 1e-300) for y in outputs)
 
     @property
     def disturbed(self) -> bool:
@@ -162,16 +170,38 @@ class SegmentedData:
     def with_process_noise(self) -> SegmentedData:
         """The same for a machine with disturbance forces.
 
-        The slow error that such forces leave would drown all else: what counts are the forces, averaged.
+        The slow error that such forces leave would drown all else: what counts are the forces, averaged. Of
+        several outputs that one counts whose accelerations have less noise.
         """
         length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.segments])))
         thin = max(self.thin // 2, 1)
+        step = max(thin, round(length / FILTERED), 2)
+        record = self.train.records[0]
+        held, span = sensed(record), step * facts(record).dt
+        order = [2 - column for column in held.columns]
+        noise = [
+            math.sqrt(math.comb(2 * k, k)) / w / span**k for k, w in zip(order, held.weights, strict=True)
+        ]
+        best = int(np.argmin(noise))
         return replace(
-            self,
-            error_filter=second_difference_filter(max(thin, round(length / FILTERED), 2)),
+            self._only(held.quantities[best]),
+            error_filter=acceleration_filter(step, held.columns[best]),
             thin=thin,
             begins=MEASURED,
         )
+
+    def _only(self, quantity: str) -> SegmentedData:
+        """Return the same with one output alone, by quantity."""
+        if len(sensed(self.train.records[0]).quantities) == 1:
+            return self
+        pairs = []
+        for train, validation in ((self.train, self.validation), *([self.whole] if self.whole else [])):
+            one, other = train.only(quantity), validation.only(quantity)
+            if validation.records is train.records:
+                other = replace(other, records=one.records)
+            pairs.append((one, other))
+        (train, validation), *whole = pairs
+        return replace(self, train=train, validation=validation, whole=whole[0] if whole else None)
 
     @property
     def short_segments(self) -> SegmentedData:
@@ -323,7 +353,7 @@ def _count(record) -> int:
 
 def _scales(block, records) -> Scales:
     known = [facts(r) for r in records]
-    force = max(math.sqrt(np.mean([np.mean(k.load**2) for k in known])), 1e-300)
+    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), 1e-300)
     position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), 1e-300)
     speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), 1e-300)
     return Scales(force, position, speed, typical_mass(block, force, position, speed))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -11,7 +12,8 @@ import numpy as np
 from ..data import derivatives
 from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
-from ..thresholds import NOISE_FREE
+from ..thresholds import NOISE_FREE, UNPLACED
+from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
 
 
 @dataclass(frozen=True)
@@ -25,12 +27,12 @@ class Facts:
     spread: float
     speed: float
     force: float
-    noise: float
+    noise: float  # of the leading output, in its unit
     swing: float  # time of one to and fro [s]
     half: int  # samples either side of a local polynomial
     velocity: np.ndarray
     position: float  # typical, about its mean
-    place: np.ndarray  # position
+    place: np.ndarray  # position, counted from the first sample where it was not measured
     load: np.ndarray  # force
     units: tuple[str, str]  # of both
     imposed: bool = False  # motion in, force out
@@ -48,17 +50,35 @@ def facts(record: Measurement) -> Facts:
         _, grid, values = derivatives.uniform(record.t, record.y)
         dt = float(grid[1] - grid[0])
         cutoff = derivatives.automatic_cutoff(values, dt)
-        velocity = derivatives.derivative(record.t, record.y, 1, cutoff)
+        held = sensed(record)
+        velocity = derivatives.derivative(record.t, record.y, 1 - held.columns[0], cutoff)
+        place = np.asarray(record.y) if held.columns[0] == POSITION else _integral(record.t, record.y)
         speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
         swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
         known = Facts(
             dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
-            max(record.noise_floor(), NOISE_FREE * float(np.std(record.y))), swing, half, velocity,
-            max(float(np.std(record.y)), 1e-300), record.y, record.u, (record.output_unit, record.input_unit),
+            held.noise, swing, half, velocity, max(float(np.std(place)), 1e-300), place, record.u,
+            (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
     return known
+
+
+def facts_of(block, record: Measurement) -> Facts:
+    """Return the scales of a record as a model sees them: what drives it is a force, never a voltage."""
+    known, scale = facts(record), force_scale(block)
+    return known if scale == 1.0 else replace(known, force=abs(scale) * known.force)
+
+
+def load_of(block, record: Measurement) -> np.ndarray:
+    """Return the force recorded, (n,): of a motor what it makes of voltage or current."""
+    known = facts(record)
+    return known.load if force_scale(block) == 1.0 else driving_force(block, record, known.velocity)
+
+
+def _integral(t, v) -> np.ndarray:
+    return np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))
 
 
 def _of_imposed(record: Measurement) -> Facts:
@@ -104,6 +124,8 @@ class Segments:
         Reported position [m], velocity [m/s], acceleration [m/s^2] at the first sample of each.
     x_error, v_error : (nw,) arrays
         How far they may be off.
+    outputs : int
+        How many outputs the record holds: signals have them one after the other.
     """
 
     begins: np.ndarray
@@ -113,6 +135,7 @@ class Segments:
     a: np.ndarray
     x_error: np.ndarray
     v_error: np.ndarray
+    outputs: int = 1
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -132,18 +155,46 @@ class Segments:
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Each segment as a slice of the samples within the segments."""
-        at = np.concatenate(([0], np.cumsum(self.ends - self.begins)))
+        """Each segment as a slice of a signal: those of the first output, then those of the next."""
+        at = np.concatenate(([0], np.cumsum(np.tile(self.ends - self.begins, self.outputs))))
         return [slice(int(i), int(j)) for i, j in zip(at[:-1], at[1:], strict=True)]
 
+    @cached_property
+    def places(self) -> list:
+        """Where in a signal each segment is, all outputs together: slices, or numbers of samples."""
+        if self.outputs == 1:
+            return self.slices
+        parts = [np.arange(w.start, w.stop) for w in self.slices]
+        return [np.concatenate(parts[i :: len(self)]) for i in range(len(self))]
+
+    @cached_property
+    def blocks(self) -> list[slice]:
+        """Each output as a slice of a signal."""
+        n = int(np.sum(self.ends - self.begins))
+        return [slice(i * n, (i + 1) * n) for i in range(self.outputs)]
+
+    def sums(self, x) -> np.ndarray:
+        """Return the sum over each segment, all outputs together, of a signal (n,) or of several (n, m)."""
+        lengths = np.tile(self.ends - self.begins, self.outputs)
+        sums = np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1])), axis=0)
+        return sums if self.outputs == 1 else sums.reshape(self.outputs, len(self), *x.shape[1:]).sum(axis=0)
+
     def means(self, x) -> np.ndarray:
-        """Return the mean over each segment of a signal (n,) at the samples within the segments."""
-        lengths = self.ends - self.begins
-        return np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1]))) / lengths
+        """Return the mean over each segment, all outputs together, of a signal (n,)."""
+        return self.sums(x) / (self.outputs * (self.ends - self.begins))
+
+    def centred(self, x) -> np.ndarray:
+        """Return a signal (n,) less the mean of each output."""
+        return np.concatenate([x[b] - x[b].mean() for b in self.blocks])
+
+    def spread(self, values) -> np.ndarray:
+        """Return the signal (n,) that has one of the values (nw,) throughout each segment."""
+        return np.tile(np.repeat(values, self.ends - self.begins), self.outputs)
 
     def only(self, which) -> Segments:
         """Return some of the segments; `which` a boolean array (nw,)."""
-        return Segments(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        arrays = (n for n in self.__dataclass_fields__ if n != "outputs")
+        return Segments(*(getattr(self, name)[which] for name in arrays), outputs=self.outputs)
 
 
 def usual_segment(record: Measurement) -> float:
@@ -180,11 +231,11 @@ def split(record: Measurement, segments: Segments, factor: int, least: int) -> S
 def _between(record, begins, ends) -> Segments:
     known = facts(record)
     rows = np.array([_local(record, int(i), known) for i in begins])
-    return Segments(begins, ends, *rows.T)
+    return Segments(begins, ends, *rows.T, outputs=len(sensed(record).columns))
 
 
 def _local(record, i, known) -> tuple[float, float, float, float, float]:
-    """Return (x, v, a, error of x, error of v) at sample i, by a parabola through its neighbours."""
+    """Return (x, v, a, error of x, error of v) at sample i, by parabolas through its neighbours."""
     low, high = max(i - known.half, 0), min(i + known.half + 1, len(record))
     if high - low < 2 * known.half:  # at an end: as many samples, to one side
         low, high = (
@@ -192,12 +243,25 @@ def _local(record, i, known) -> tuple[float, float, float, float, float]:
             if i < known.half
             else (max(len(record) - 2 * known.half, 0), high)
         )
-    s, y = record.t[low:high] - record.t[i], record.y[low:high]
+    held, s = sensed(record), record.t[low:high] - record.t[i]
+    # a place that was not measured is counted from the first sample, which may lie anywhere
+    x, x_error = float(known.place[i]), UNPLACED * known.position
+    v, v_error, a = 0.0, math.inf, 0.0
+    for column, y, weight in zip(held.columns, held.values, held.weights, strict=True):
+        found, errors = _parabola(s, y[low:high], held.noise / weight)
+        if column == POSITION:
+            x, x_error = found[0], errors[0]
+        if errors[1 - column] < v_error:
+            v, v_error, a = found[1 - column], errors[1 - column], found[2 - column]
+    return x, v, a, x_error, v_error
+
+
+def _parabola(s, y, noise) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return value, slope and curvature of y at s = 0, and how far each may be off."""
     reach = max(float(np.max(np.abs(s))), 1e-300)
     basis = np.vander(s / reach, 3, increasing=True)
     solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
     rest = y - basis @ solution
-    sigma = max(float(np.sqrt(np.sum(rest**2) / max(len(y) - 3, 1))), known.noise)
+    sigma = max(float(np.sqrt(np.sum(rest**2) / max(len(y) - 3, 1))), noise)
     errors = sigma * np.sqrt(np.diag(np.linalg.pinv(basis.T @ basis)))
-    x, v, a = solution[0], solution[1] / reach, 2 * solution[2] / reach**2
-    return float(x), float(v), float(a), float(errors[0]), float(errors[1] / reach)
+    return tuple((float(c[0]), float(c[1] / reach), float(2 * c[2] / reach**2)) for c in (solution, errors))  # type: ignore[return-value]

@@ -35,7 +35,7 @@ class OutputSensitivity:
         out = np.array(columns, dtype=float)
         if self.error_filter is not None:
             return self.error_filter.filtered(out, self.segments[k].slices)
-        for w, where in enumerate(self.segments[k].slices):
+        for w, where in enumerate(self.segments[k].places):
             s = self.states[k][where]
             if s.shape[1]:
                 normal = s.T @ s + np.diag(self.ridge[k][w])
@@ -48,7 +48,11 @@ class OutputSensitivity:
     def pieces(self) -> list[slice]:
         """What `project` returns as evidence takes it: whole, or by segments where errors are of forces."""
         if self.error_filter is None:
-            return [slice(0, sum(map(len, self.states)))]
+            if all(w.outputs == 1 for w in self.segments):
+                return [slice(0, sum(map(len, self.states)))]
+            lengths = [b.stop - b.start for w in self.segments for b in w.blocks]
+            ends = np.cumsum([0, *lengths])
+            return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
         lengths = [
             (w.stop - w.start) // self.error_filter.step - self.error_filter.order
             for segments in self.segments

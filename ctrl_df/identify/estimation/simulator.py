@@ -19,7 +19,8 @@ from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
-from .segments import Segments, facts
+from .segments import Segments, facts_of
+from .sensed import POSITION, sensed
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
@@ -75,7 +76,7 @@ class Simulator:
             )
         self.mechanism = isinstance(self.block, Mechanism)
         self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
-        self.facts = facts(record)
+        self.facts, self.sensed = facts_of(self.block, record), sensed(record)
         self.runs = 0
         self._prepared: dict[Any, PreparedModel] = {}
 
@@ -89,13 +90,13 @@ class Simulator:
         """Whether something pulls the model back, so that a free run does not drift."""
         if self.closed or not self.mechanism:
             return True
-        pull, s = 0.0, 2 * self.facts.spread
+        pull, s = 0.0, 2 * self.facts.position
         for term in self.block.core.forces:
             if any(p.per_record for p in term.effect.parameters.values()):
                 continue  # what begins anew in every record holds nothing in one place
             law, p = type(term.effect).law, term.effect.values
             z = np.zeros(max(term.effect.states, 1))
-            centre = float(np.mean(self.record.y))
+            centre = float(np.mean(self.facts.place))
             forces = [float(law(0.0, centre + d, 0.0, z, p, z.copy())) for d in (-s, s)]  # type: ignore[misc]
             pull += forces[0] - forces[1]
         return pull > 0.1 * self.facts.force
@@ -131,7 +132,9 @@ class Simulator:
         *,
         rounded: bool = False,
     ) -> np.ndarray:
-        """Simulate and return the output at the samples within the segments, shape (n,).
+        """Simulate and return the outputs at the samples within the segments, shape (n,).
+
+        As `sensed.Sensed` has them: one after the other, each over its own noise.
 
         Parameters
         ----------
@@ -176,21 +179,26 @@ class Simulator:
     def _one_by_one(self, part, segments: Segments, start) -> np.ndarray:
         """Run the segments one after the other: hidden states go on from each into the next."""
         record, inside = self.record, segments.samples
-        out = np.empty(len(inside))
+        out = np.empty((len(self.sensed.columns), len(inside)))
         drive, hidden = self._drive(part), {}
         carried = initial_states.carried_names(part.core, self.begins)
         on = self._followed(segments)
-        for w, where in enumerate(segments.slices):
+        for w, where in enumerate(segments.slices[: len(segments)]):
             t, follows = record.t[inside[where]], w in on
             if follows:
                 t = np.append(t, record.t[segments.begins[w + 1]])
-            run = self._window(part, drive, segments, w, start, t, hidden)
-            out[where] = run.outputs[: where.stop - where.start, 0]
-            if not run.status.ok:
-                out[where.start + run.recorded : where.stop] = np.nan
-            came = self._arrival(part, segments, w + 1, run) if follows and run.status.ok else {}
+            came = {}
+            for columns, (delay,) in self._readings([part]):
+                run = self._window(part, drive, segments, w, start, t - delay, hidden)
+                for row, column in zip(out, self.sensed.columns, strict=True):
+                    if column in columns:
+                        row[where] = run.outputs[: where.stop - where.start, column]
+                        if not run.status.ok:
+                            row[where.start + run.recorded : where.stop] = np.nan
+                if follows and run.status.ok and delay == self._late(part):
+                    came = self._arrival(part, segments, w + 1, run)
             hidden = {k: came[k] for k in carried if k in came}
-        return out
+        return out.reshape(-1)
 
     def _together(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
         """Run all segments of all that is asked for at once, except where systems differ in their states."""
@@ -207,32 +215,58 @@ class Simulator:
         counts = [len(segments) for segments, _, _ in asked]
         edges = np.concatenate(([0], np.cumsum(counts)))
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
-        x0, times, lengths, drive = [], [], [], []
+        x0, begins, lengths, drive = [], [], [], []
         drives: dict[int, int] = {}  # parts have one each, shared by all segments
         for part, (segments, _, start) in zip(parts, asked, strict=True):
             x0.append(self._starts(part, segments, start))
-            times.append(self.record.t[segments.samples] - part.delay)
+            begins.append(self.record.t[segments.begins] - self._late(part))
             lengths.append(segments.ends - segments.begins)
             drive.append(np.full(len(segments), drives.setdefault(id(part), len(drives))))
         length = np.concatenate(lengths)
         first = np.concatenate(([0], np.cumsum(length)[:-1]))
-        every = np.concatenate(times)
         known = {id(p): p for p in parts}
         shared = [known[i] for i in drives]
-        result = run_many(
-            grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)]),
-            np.concatenate(x0), every[first], every[first + length - 1], every,
-            sampled_drives(
-                np.array([p.drive_time for p in shared]), np.array([p.drive_value for p in shared])[:, None],
-                parts[0].hold or self.record.input_hold,
-            ),
-            drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
-            max_steps=60 * length + 20_000,
+        groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
+        sampled = sampled_drives(
+            np.array([p.drive_time for p in shared]), np.array([p.drive_value for p in shared])[:, None],
+            parts[0].hold or self.record.input_hold,
         )  # fmt: skip
-        for error in result.errors.values():
-            raise error
-        column, ends = result.outputs[:, 0], np.concatenate((first, [len(every)]))
-        return [column[ends[i] : ends[j]] for i, j in zip(edges[:-1], edges[1:], strict=True)]
+        ends, outputs = np.concatenate((first, [int(np.sum(length))])), {}
+        for columns, delays in self._readings(parts):
+            every = np.concatenate(
+                [self.record.t[w.samples] - d for (w, _, _), d in zip(asked, delays, strict=True)]
+            )
+            result = run_many(
+                groups, np.concatenate(x0), np.concatenate(begins), every[first + length - 1], every, sampled,
+                drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
+                max_steps=60 * length + 20_000,
+            )  # fmt: skip
+            for error in result.errors.values():
+                raise error
+            outputs |= {column: result.outputs[:, column] for column in columns}
+        return [
+            self._joined([outputs[c][ends[i] : ends[j]] for c in self.sensed.columns])
+            for i, j in zip(edges[:-1], edges[1:], strict=True)
+        ]
+
+    def _late(self, part) -> float:
+        """Return by how much what is seen first of a segment lies before its first sample [s]."""
+        return part.delay if POSITION in self.sensed.columns else 0.0
+
+    def _readings(self, parts) -> list[tuple[tuple[int, ...], list[float]]]:
+        """Return outputs that are read at the same instants, and how long after these they are seen [s].
+
+        Sensors that delay are of the position.
+        """
+        delays, columns = [p.delay for p in parts], self.sensed.columns
+        none = [0.0] * len(parts)
+        if not any(delays):
+            return [(columns, none)]
+        return [((c,), delays if c == POSITION else none) for c in columns]
+
+    @staticmethod
+    def _joined(outputs) -> np.ndarray:
+        return outputs[0] if len(outputs) == 1 else np.concatenate(outputs)
 
     def _starts(self, part, segments: Segments, start) -> np.ndarray:
         """Return the states (nw, nx) in which segments begin."""
@@ -249,19 +283,24 @@ class Simulator:
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
         """Return what the sensors make of outputs; what ran away is set aside."""
-        record, inside = self.record, segments.samples
-        for primitive, later in part.output:
-            if isinstance(primitive, Ramp):
-                out += primitive.offset + primitive.rate * (record.t[inside] - later)
-            elif rounded:
-                out = primitive.value(out)
-        limit = 10 * self.facts.spread
-        centre = float(np.mean(record.y))
-        with np.errstate(invalid="ignore"):
-            out = np.where(
-                np.isfinite(out), np.clip(out, centre - 100 * limit, centre + 100 * limit), centre + limit
-            )
-        return out
+        record, inside, held = self.record, segments.samples, self.sensed
+        seen = []
+        for block, column, y, weight in zip(
+            segments.blocks, held.columns, held.values, held.weights, strict=True
+        ):
+            x = out[block]
+            for primitive, later in part.output if column == POSITION else ():
+                if isinstance(primitive, Ramp):
+                    x += primitive.offset + primitive.rate * (record.t[inside] - later)
+                elif rounded:
+                    x = primitive.value(x)
+            limit, centre = 10 * max(float(np.std(y)), 1e-300), float(np.mean(y))
+            with np.errstate(invalid="ignore"):
+                x = np.where(
+                    np.isfinite(x), np.clip(x, centre - 100 * limit, centre + 100 * limit), centre + limit
+                )
+            seen.append(x if len(held.columns) == 1 else weight * x)
+        return self._joined(seen)
 
     def _followed(self, segments: Segments) -> set[int]:
         """Return the segments that another one follows, after a pause no longer than two of them."""
@@ -294,7 +333,7 @@ class Simulator:
         if part.core is None or not follows.size:
             return found
         some = segments.only(follows)
-        times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - part.delay
+        times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - self._late(part)
         engine, runs = part.engine, np.arange(len(follows))
         result = run_many(
             grouped([(engine, runs)]), self._starts(part, some, start[follows]), times[:, 0], times[:, 1],
@@ -319,11 +358,11 @@ class Simulator:
     def _drive(self, part):
         return sampled_drive(part.drive_time, part.drive_value, part.hold or self.record.input_hold)
 
-    def _window(self, part, drive, segments, w, start, t, hidden=None):
-        """Run one segment, recording at the record's times `t`."""
-        times = t - part.delay
-        state = self._start(part, segments, w, None if start is None else start[w], times[0], hidden or {})
-        state.segment = max(int(np.searchsorted(part.drive_time, times[0], "right")) - 1, 0)
+    def _window(self, part, drive, segments, w, start, times, hidden=None):
+        """Run one segment, recording at these times."""
+        begin = float(self.record.t[segments.begins[w]] - self._late(part))
+        state = self._start(part, segments, w, None if start is None else start[w], begin, hidden or {})
+        state.segment = max(int(np.searchsorted(part.drive_time, begin, "right")) - 1, 0)
         steps = 60 * int(segments.ends[w] - segments.begins[w]) + 20_000
         return part.engine.run(
             state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
@@ -372,6 +411,8 @@ class Simulator:
         ]
         shift, drift = sum(p.offset + p.rate * t for p, t in ramps), sum(p.rate for p, _ in ramps)
         usual = self.facts.force / sum(part.core.masses)
+        if POSITION not in self.sensed.columns:
+            shift, drift = 0.0, 0.0  # these are of a sensor that was not there
         return segments.x[w] - shift, segments.v[w] - drift, usual * np.tanh(segments.a[w] / usual)
 
 

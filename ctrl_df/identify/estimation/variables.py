@@ -11,6 +11,7 @@ from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...units import dimension, size
 from .segments import Facts, facts
+from .sensed import POSITION, sensed
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,12 @@ def seen_by(block, records, known: Facts) -> RecordScales:
     """Return what the records show of the effects of a block."""
     off = 0.0 if known.imposed else 4 * known.noise
     reach = max(float(np.max(np.abs(facts(r).place))) for r in records) - off
+    placed = known.imposed or all(POSITION in sensed(r).columns for r in records)
     shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
     mass = typical_mass(block, known.force, known.position, known.speed)
     return RecordScales(
         known.force, known.position, known.speed, mass, min(r.dt for r in records),
-        max(r.duration for r in records), -math.inf if shifted else reach,
+        max(r.duration for r in records), -math.inf if shifted or not placed else reach,
     )  # fmt: skip
 
 

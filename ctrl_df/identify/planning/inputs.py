@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..estimation.segments import facts
+from ..estimation.sensed import POSITION, place_unit, sensed
 from ..estimation.simulator import free_run
 from ..results.experiment import Experiment, separated
 from ..thresholds import PLAN_MARGIN, PLAN_SIZES
@@ -30,10 +31,11 @@ def input_that_separates(
         As for `next_experiment`.
     """
     record = diagnosis.train[0]
-    given, long, strong = diagnosis.limits, record.output_unit, record.input_unit
+    given, long, strong = diagnosis.limits, place_unit(record), record.input_unit
     force = float(force or given.get("force") or np.max(np.abs(record.u)))
-    centre = float(record.y[0])
-    reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(record.y - centre)))
+    place = facts(record).place
+    centre = float(place[0])
+    reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(place - centre)))
     duration, dt = float(duration or record.duration), float(dt or record.dt)
     if not (force > 0 and reach > 0 and duration > 20 * dt):
         raise ValueError(
@@ -87,10 +89,10 @@ class _Free:
         self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
 
     def __call__(self, u):
-        played = self.record.replaced(t=self.t, u=u, y=self.scale, velocity=None, channels={})
         thin = max(1, len(self.t) // 2500)
+        played = _played(self.record, self.t, u, self.scale)
         ys = [free_run(m, played, position=self.centre, thin=thin) for m in self.models]
-        gaps = [_rms(a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
+        gaps = [_apart(self.record, self.t, a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
         return ys, float(np.max(np.abs(u))), gaps
 
 
@@ -140,12 +142,20 @@ class _Loop:
             forces.append(outputs[self.moves.name("F")])
         gaps = []
         for i, force in enumerate(forces):
-            played = self.record.replaced(
-                t=self.t, u=force, y=ys[i], velocity=None, channels={}, input_hold="linear"
-            )
+            played = _played(self.record, self.t, force, ys[i]).replaced(input_hold="linear")
             runs = [free_run(m, played, position=self.centre) for m in self.models]
-            gaps += [_rms(y - runs[i]) for k, y in enumerate(runs) if k != i]
+            gaps += [_apart(self.record, self.t, y - runs[i]) for k, y in enumerate(runs) if k != i]
         return ys, max(float(np.max(np.abs(f))) for f in forces) + self.tremor, gaps
+
+
+def _played(record, t, u, place):
+    """Return a record of the place that an input is to make."""
+    return record.replaced(t=t, u=u, outputs={"position": place}, velocity=None, channels={})
+
+
+def _apart(record, t, difference) -> float:
+    """Return the rms difference of what the record's leading output would be, of two places."""
+    return _rms(difference if sensed(record).columns[0] == POSITION else np.gradient(difference, t))
 
 
 def _fastest_gain(controller, dt: float) -> float:

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from ..estimation.noise_model import NoiseModel, noise_model
+from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.segments import facts
+from ..estimation.sensed import POSITION, force_scale, sensed
 from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 
@@ -68,17 +69,17 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
             ]
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
-    segments, record = sensitivity.pieces, data.train.records[0]
+    segments, record, outputs = sensitivity.pieces, data.train.records[0], tried.train.outputs
     units = dict(zip("xf", facts(record).units, strict=True))
     if data.disturbed:
         # the residual is of forces here, as the fits see it
-        noise = noise_model([residual[w] for w in segments], max_order=12)
+        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=12)
     found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = noise_model([left[w] for w in segments], max_order=12)
+        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=12)
         found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
@@ -119,6 +120,7 @@ class _Scene:
         self.fit = tried.train
         self.scale = data.scales.position
         self.size = TEST_FORCE * data.scales.force
+        self.given = self.size / force_scale(tried.block)  # what makes a force of that size
         self.motion = [
             _motion(r, w, y)
             for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
@@ -135,7 +137,8 @@ class _Scene:
             self.motion,
             strict=True,
         ):
-            force = facts(record).load + self.size * shape(motion)
+            force = record.u if not facts(record).imposed else facts(record).load
+            force = force + self.given * shape(motion)
             simulator = self.data.simulator(self.fit.model, record, force=force)
             changes.append((simulator.run(segments, None, start) - y) / self.size)
         return changes
@@ -169,10 +172,11 @@ class _Scene:
         from scipy.ndimage import median_filter
 
         i = int(np.argmax([len(e) for e in self.fit.residual]))
-        e, t = self.fit.residual[i], self.motion[i]["t"]
+        e, t = self.fit.residual[i][self.view.segments[i].blocks[0]], self.motion[i]["t"]
+        record = self.view.records[i]
         dt, count = float(np.median(np.diff(t))), len(e)
         # fine enough that a line between two bins is not lost
-        e = e if facts(self.view.records[i]).imposed else np.diff(e, 2)
+        e = np.diff(e, 0 if facts(record).imposed else 2 - sensed(record).columns[0])
         power = np.abs(np.fft.rfft(e * np.hanning(len(e)), 4 * count)) ** 2
         ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
         ratio[:12] = 0.0
@@ -181,10 +185,12 @@ class _Scene:
 
 def _motion(record, segments, y):
     known = facts(record)
-    x, load = np.array(known.place, dtype=float), np.array(known.load, dtype=float)
+    x, load, y = np.array(known.place, float), np.array(known.load, float), y[segments.blocks[0]]
+    moved = sensed(record).columns[0] != POSITION
+    v = np.array(record.y, float) if moved else np.zeros(0)
     # the output is the model's own: what it errs by is no function of itself
-    (load if known.imposed else x)[segments.samples] = y
-    v = np.gradient(_smooth(x), record.t)
+    (load if known.imposed else v if moved else x)[segments.samples] = y
+    v = _smooth(v) if moved else np.gradient(_smooth(x), record.t)
     a = np.gradient(_smooth(v), record.t)
     return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": load}
 

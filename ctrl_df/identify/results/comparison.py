@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -14,13 +15,13 @@ from ..data.derivatives import automatic_cutoff, derivative
 from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
+from ..estimation.sensed import sensed
 from ..residuals.comparison_base import ComparisonBase
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..residuals.regions import Regions, error_regions
 from ..residuals.residual_tests import (
     InputTest,
     Whiteness,
-    fit_percent,
     input_residual_test,
     nrmse,
     rmse,
@@ -44,6 +45,9 @@ class RecordComparison:
         Parameters fitted to these data.
     model : block or loop
         What was compared.
+    outputs : mapping
+        Simulated outputs by quantity, where the record holds several; `simulated` and `residual` are of the
+        one that leads, `record.output`.
     """
 
     record: Measurement
@@ -52,6 +56,20 @@ class RecordComparison:
     edges: np.ndarray
     fitted: int = 0
     model: Any = None
+    outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @cached_property
+    def by_output(self) -> dict[str, RecordComparison]:
+        """The comparison of each output by itself, by quantity, that which leads first."""
+        if len(self.outputs) < 2:
+            return {self.record.output or "": self}
+        rows = {}
+        for quantity, simulated in self.outputs.items():
+            record = self.record.only(quantity)
+            rows[quantity] = RecordComparison(
+                record, simulated, record.y - simulated, self.edges, self.fitted, self.model
+            )
+        return rows
 
     @cached_property
     def missing_force(self) -> MissingForce:
@@ -66,18 +84,20 @@ class RecordComparison:
 
     @property
     def rmse(self) -> float:
-        """Rms of the residual [output unit]."""
+        """Rms of the residual [output unit], of the output that leads."""
         return rmse(self.residual)
 
     @property
     def nrmse(self) -> float:
-        """Rms of the residual over that of the centred output."""
+        """Rms of the residual over that of the centred output; of several outputs the rms of theirs."""
+        if len(self.by_output) > 1:
+            return float(np.sqrt(np.mean([r.nrmse**2 for r in self.by_output.values()])))
         return nrmse(self.record.y, self.simulated)
 
     @property
     def fit_percent(self) -> float:
         """``100 (1 - nrmse)``."""
-        return fit_percent(self.record.y, self.simulated)
+        return 100.0 * (1.0 - self.nrmse)
 
     @property
     def windows(self) -> int:
@@ -86,7 +106,9 @@ class RecordComparison:
 
     @cached_property
     def white(self) -> Whiteness:
-        """Test of the residual for whiteness."""
+        """Test of the residual for whiteness; of several outputs that which passes least."""
+        if len(self.by_output) > 1:
+            return min((r.white for r in self.by_output.values()), key=lambda w: w.p_value)
         return whiteness(self.residual)
 
     @cached_property
@@ -105,8 +127,8 @@ class RecordComparison:
         """
         if len(self.residual) < 50:
             return Regions()
-        velocity = self.record.velocity if self.record.velocity is not None else facts(self.record).velocity
         known = facts(self.record)
+        velocity = self.record.velocity if self.record.velocity is not None else known.velocity
         plain = known.imposed or self.white
         error, kept = (self.residual, slice(None)) if plain else self._acceleration_error()
         return error_regions(
@@ -119,15 +141,18 @@ class RecordComparison:
         )
 
     def _acceleration_error(self) -> tuple[np.ndarray, slice]:
-        """Return the low-passed second derivative of the residual, and the samples at which it holds.
+        """Return the error of the acceleration, low-passed, and the samples at which it holds.
+
+        The second derivative of a residual in position, the first of one in velocity.
 
         Derivatives fail at the ends of a window: a line bridges them inside; the record's ends are left out.
         """
         t, dt = self.record.t, facts(self.record).dt
+        order = 2 - sensed(self.record).columns[0]
         cutoff = automatic_cutoff(self.residual - self.residual.mean(), dt)
         out, margin = np.empty(len(t)), int(0.6 / (cutoff * dt)) + 1
         for a, b in zip(self.edges[:-1], self.edges[1:], strict=True):
-            out[a:b] = derivative(t[a:b], self.residual[a:b], 2, cutoff)
+            out[a:b] = derivative(t[a:b], self.residual[a:b], order, cutoff)
         good = np.ones(len(t), bool)
         for edge in self.edges:
             good[max(edge - margin, 0) : edge + margin] = False
@@ -169,11 +194,13 @@ class Comparison(ComparisonBase):
 
     @property
     def nrmse(self) -> float:
-        """Rms of the residual over that of the outputs, each centred."""
-        error = sum(float(r.residual @ r.residual) for r in self.records)
-        return math.sqrt(
-            error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in self.records)
-        )
+        """Rms of the residual over that of the outputs, each centred; of several quantities the rms of it."""
+        squares = []
+        for quantity in self.worst.by_output:
+            rows = [r.by_output[quantity] for r in self.records]
+            error = sum(float(r.residual @ r.residual) for r in rows)
+            squares.append(error / sum(float(np.sum((r.record.y - r.record.y.mean()) ** 2)) for r in rows))
+        return math.sqrt(sum(squares) / len(squares)) if len(squares) > 1 else math.sqrt(squares[0])
 
     @property
     def white(self) -> Whiteness:
@@ -257,17 +284,28 @@ class Comparison(ComparisonBase):
             )
         count = f"{len(self.records)} records" if len(self.records) > 1 else f"record {worst.record.name!r}"
         return (
-            f"{count}: nrmse {self.nrmse:.4g}, fit {self.fit_percent:.2f} %, rmse {self.rmse:.4g} "
-            f"{worst.record.output_unit}, residual {'white' if self.white else 'not white'} "
+            f"{count}: nrmse {self.nrmse:.4g}, fit {self.fit_percent:.2f} %, rmse {self._sizes()}, "
+            f"residual {'white' if self.white else 'not white'} "
             f"(p = {self.white.p_value:.2g}); {how}."
         )
 
-    def plot(self, record=None, **keywords):
+    def _sizes(self) -> str:
+        """Return the rms of the residual of each output, with its unit."""
+        sizes = []
+        for quantity, worst in self.worst.by_output.items():
+            rows = [r.by_output[quantity].residual for r in self.records]
+            size = math.sqrt(sum(float(e @ e) for e in rows) / sum(map(len, rows)))
+            sizes.append(f"{size:.4g} {worst.record.output_unit}")
+        return " and ".join(sizes)
+
+    def plot(self, record=None, output=None, **keywords):
         """Draw outputs, residual, and where the error lies; returns a ct.ControlPlot.
 
         Parameters
         ----------
         record : int or None
             Which record; None: the worst.
+        output : str or None
+            Which of several outputs, by quantity; None: the one that leads.
         """
-        return draw("comparison", self, record=record, **keywords)
+        return draw("comparison", self, record=record, output=output, **keywords)

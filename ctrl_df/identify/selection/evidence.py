@@ -22,7 +22,7 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     the best one, a sensor that rounds left aside.
     """
     best = min([base, *(t for t in trials if not rounds(t))], key=lambda t: t.size)
-    noise = prediction_error_filter(best.residuals, base.train.error_filter)
+    noise = prediction_error_filter(best.residuals, base.train.error_filter, base.train.outputs)
     before = _powers(base, noise)
     judged = []
     for t in trials:
@@ -61,7 +61,7 @@ def _gains(before, after) -> tuple[float, float]:
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
     step = _step(tried)
-    noise = prediction_error_filter(base.residuals)
+    noise = prediction_error_filter(base.residuals, None, base.train.outputs)
     gains = []
     for fit, power in zip((base.train, base.validation), _powers(base, noise), strict=True):
         if fit is None:

@@ -97,7 +97,8 @@ def _sentences(left: Remainder, missed: list[MissingForce], where, measure: str)
 def find_regions(tried, view):
     """Return the regions of error of a fitted candidate on its longest record."""
     i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
-    record, inside, residual = view.records[i], view.segments[i].samples, np.asarray(tried.train.residual[i])
+    record, inside = view.records[i], view.segments[i].samples
+    residual = np.asarray(tried.train.residual[i])[view.segments[i].blocks[0]]
     if not np.all(np.isfinite(residual)):
         return None
     error_filter = tried.train.error_filter

@@ -17,6 +17,7 @@ from ..estimation.multistart import all_restarted, beyond, cross_started, own, r
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.segments import facts
+from ..estimation.sensed import POSITION, sensed
 from ..estimation.simulator import feasible
 from ..starting.regression import force_regression, heavy, motion_of
 from ..starting.screen import Screen
@@ -88,7 +89,7 @@ class StructureSearch(Search):
         shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
-        w, _ = force_regression(motion_of(data.train, data.thin), data.scales, heavy=heavy(block))
+        w, _ = force_regression(motion_of(data.train, data.thin, block), data.scales, heavy=heavy(block))
         guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
@@ -106,6 +107,11 @@ class StructureSearch(Search):
         return self.data.train.records, validation
 
     @property
+    def placed(self) -> bool:
+        """Whether a sensor told the place."""
+        return all(POSITION in sensed(r).columns for r in self.data.train.records)
+
+    @property
     def measure(self) -> str:
         """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
         return "acceleration" if self.data.disturbed else "output"
@@ -114,6 +120,8 @@ class StructureSearch(Search):
 
     def candidates(self, classes, executor=None) -> list[CandidateFit]:
         """Return every effect that can be added, fitted, the one with most evidence first."""
+        if not self.placed:  # sensors' effects are of the place
+            classes = [c for c in classes if c.role != "output"]
         self.course.stage(f"{len(classes)} effects tried over short segments")
         base, found = self._look(classes, executor, self.data.sampled, self.course.known)
         self.course.known(found)

@@ -13,7 +13,7 @@ from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
 from ..estimation.prepared import REFERENCE
-from ..estimation.segments import facts, make_segments
+from ..estimation.segments import facts, load_of, make_segments
 from ..estimation.simulators import simulator_of
 from ..estimation.variables import default_free
 from ..residuals.motion_phases import reversals
@@ -131,7 +131,7 @@ def missing_force(model, record: Measurement) -> MissingForce:
     model : block of masses or inertias and effects, or loop of `ctrl_df.closed_loop` round one
         Of a loop the block is taken, driven by the force that was recorded.
     record : Measurement
-        Its output is the position.
+        Of position, velocity or both.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def missing_force(model, record: Measurement) -> MissingForce:
     found = smooth_record(block, record)
     coordinates, core = block.coordinates, block.core
     at = 2 if core.bodies == 2 and core.measured == 1 else 0
-    load = np.interp(found.time, record.t, record.u)
+    load = np.interp(found.time, record.t, load_of(block, record))
     return MissingForce(
         found.time, found.force, found.std,
         *_quantities(coordinates, found.states[:, at], found.states[:, at + 1], load),

@@ -18,7 +18,8 @@ from scipy.optimize import minimize
 
 from ...blocks.mechanism import Mechanism
 from ..data.measurement import Measurement
-from ..estimation.segments import facts
+from ..estimation.segments import facts_of
+from ..estimation.sensed import POSITION
 from ..thresholds import (
     SMOOTHER_ESTIMATED,
     SMOOTHER_LEAK,
@@ -61,7 +62,7 @@ class Smoothed:
 
 def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     """Smooth the force that is missing of a block beside one record."""
-    known = facts(record)
+    known = facts_of(block, record)
     steps = Steps(block, record, math.ceil(len(record) / SMOOTHER_STEPS))
     mean, std = steps.guess()
     scale = np.median(std, axis=0)
@@ -91,10 +92,11 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
 def _leak(steps: Steps, known, scale) -> np.ndarray:
     """Return variances that keep the covariances of the states regular, and change nothing else."""
     n = len(steps.free)
+    place = known.noise if steps.simulator.sensed.columns[0] == POSITION else known.noise * known.swing
     q = (1e-4 * scale[:-1]) ** 2
     for body in range(steps.core.bodies):
         dt = float(np.median(np.diff(steps.times)))
-        q[2 * body] = (SMOOTHER_LEAK * known.noise) ** 2 / len(steps)
+        q[2 * body] = (SMOOTHER_LEAK * place) ** 2 / len(steps)
         q[2 * body + 1] = (1e-3 * known.force * dt / sum(steps.core.masses)) ** 2
     return q[:n] / scale[:-1] ** 2
 
@@ -126,10 +128,9 @@ class _Told:
         self.q[:, :-1, :-1] = lin.q
         inner = np.arange(n - 1)
         self.q[:, inner, inner] += leak
-        most = lin.e.shape[1]
-        at = steps.edges[:-1, None] + np.arange(most)
-        self.has = at < steps.edges[1:, None]
-        y = steps.y[np.minimum(at, len(steps.y) - 1)]
+        at = steps.edges[:-1, None] + np.arange(lin.e.shape[1] // len(steps.values))
+        self.has = np.hstack([at < steps.edges[1:, None]] * len(steps.values))
+        y = np.hstack([y[np.minimum(at, len(y) - 1)] for y in steps.values])
         self.off = np.where(self.has, y - lin.e, 0.0)
         self.c = np.where(self.has[:, :, None], lin.c, 0.0)
         self.r = np.where(self.has, lin.r, 0.0)

@@ -15,8 +15,10 @@ from ...simulate.groups import groups_of
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..estimation import initial_states
-from ..estimation.segments import facts
+from ..estimation.segments import facts_of
+from ..estimation.sensed import POSITION
 from ..estimation.simulator import Simulator
+from ..thresholds import UNPLACED
 
 RTOL = 1e-6  # of the runs: the noise of a record is larger
 NUDGE = 1e-3  # of parameters and forces, relative to their size
@@ -83,7 +85,8 @@ class Steps:
         self.part = self.simulator._prepare(None)
         self.record = record
         self.edges = np.append(np.arange(0, len(record) - 1, every), len(record) - 1)
-        self.y = self._sensed(record.y)
+        self.known = facts_of(block, record)
+        self.values = self._sensed()
         states = self.part.engine.nstates
         known = [state for state, _ in self.part.lags]
         self.free = np.array([i for i in range(states) if i not in known])
@@ -100,17 +103,30 @@ class Steps:
         """Times at which steps begin and the last ends [s], (N + 1,)."""
         return self.record.t[self.edges]
 
-    def _sensed(self, y):
-        """Return the output without what a drifting sensor adds to it."""
-        y = np.array(y, float)
-        for primitive, later in self.part.output:
-            if isinstance(primitive, Ramp):
-                y -= primitive.offset + primitive.rate * (self.record.t - later)
-        return y
+    def _sensed(self) -> list[np.ndarray]:
+        """Return the outputs, each over its own noise, without what sensors of the place add to it.
+
+        A velocity is that of the instants at which a late sensor saw the place.
+        """
+        t, held, late, found = self.record.t, self.simulator.sensed, self.late, []
+        for column, y, weight in zip(held.columns, held.values, held.weights, strict=True):
+            y = np.array(y, float)
+            for primitive, later in self.part.output if column == POSITION else ():
+                if isinstance(primitive, Ramp):
+                    y -= primitive.offset + primitive.rate * (t - later)
+            if column != POSITION and late:
+                y = np.interp(t - late, t, y)
+            found.append(weight * y)
+        return found
+
+    @property
+    def late(self) -> float:
+        """How long after it was so a sensor sees the place [s]; 0 where there was none."""
+        return self.simulator._late(self.part)
 
     def guess(self) -> tuple[np.ndarray, np.ndarray]:
         """Return states and their standard deviations as the record alone has them, (N + 1, n) each."""
-        known = facts(self.record)
+        known = self.known
         x, v, a = self._motion(known)
         states = np.zeros((len(self.edges), self.part.engine.nstates))
         initial_states.fill(states, self.core, {}, (x, v, a), known.speed)
@@ -125,7 +141,10 @@ class Steps:
         """Return how far states may be from the guess: what changes with each correction of it."""
         one = np.ones(len(states))
         slow = known.noise / math.sqrt(2 * known.half + 1)
-        begun = Begun(slow * one, slow / (known.half * known.dt) * one)
+        if self.simulator.sensed.columns[0] == POSITION:
+            begun = Begun(slow * one, slow / (known.half * known.dt) * one)
+        else:
+            begun = Begun(UNPLACED * known.position * one, slow * one)
         names = initial_states.names(self.core)
         reach = initial_states.reach(names, self.core, known, begun)
         square = np.zeros_like(states)
@@ -143,13 +162,15 @@ class Steps:
     def _motion(self, known):
         from ..data.derivatives import automatic_cutoff, derivative
 
-        t = self.record.t
-        cutoff = automatic_cutoff(self.y - np.mean(self.y), known.dt)
-        v = derivative(t, self.y, 1, cutoff) if self.record.velocity is None else self.record.velocity
-        a = derivative(t, self.y, 2, cutoff)
+        t, y, column = self.record.t, self.values[0], self.simulator.sensed.columns[0]
+        cutoff = automatic_cutoff(y - np.mean(y), known.dt)
+        measured = self.record.velocity if column == POSITION else None
+        v = derivative(t, y, 1 - column, cutoff) if measured is None else measured
+        a = derivative(t, y, 2 - column, cutoff)
+        x = y if column == POSITION else known.place
         usual = known.force / sum(self.core.masses)
         a = usual * np.tanh(a / usual)
-        return self.y[self.edges], v[self.edges], a[self.edges]
+        return x[self.edges], v[self.edges], a[self.edges]
 
     def own(self, mean: np.ndarray) -> np.ndarray:
         """Return what each of the block's parameters would do as a force, per change of it, (N + 1, p).
@@ -160,7 +181,7 @@ class Steps:
         speed = int(np.flatnonzero(self.free == 2 * self.core.driven + 1)[0])
         parameters = self.simulator.block.parameters
         mine = [k for k, p in parameters.items() if p.free and k != self._name]
-        pushed = NUDGE * facts(self.record).force
+        pushed = NUDGE * self.known.force
         base = self.run(mean[:-1], every)[0][:, speed]
         up = mean[:-1].copy()
         up[:, -1] += pushed
@@ -183,7 +204,8 @@ class Steps:
         Returns
         -------
         (m, n - 1), (m, most) arrays
-            States at the end, and outputs at the samples of the steps, NaN where one has fewer.
+            States at the end, and outputs at the samples of the steps, one after the other, each over its
+            own noise; NaN where a step has fewer samples.
         """
         part, record = self.part, self.record
         runs = len(step)
@@ -196,7 +218,7 @@ class Steps:
         count = end - begin + 1
         first = np.concatenate(([0], np.cumsum(count)[:-1]))
         inside = np.arange(int(count.sum())) - np.repeat(first, count) + np.repeat(begin, count)
-        every = record.t[inside] - part.delay
+        every = record.t[inside] - self.late
         values = {self._name: s[:, -1].copy()} | {k: np.array([v]) for k, v in (values or {}).items()}
         groups = groups_of("a smoother", part.engine.system, values, runs)
         result = run_many(
@@ -207,11 +229,13 @@ class Steps:
         for error in result.errors.values():
             raise error
         most = int(count.max()) - 1
-        outputs = np.full((runs, most), np.nan)
+        held = self.simulator.sensed
+        outputs = np.full((len(held.columns), runs, most), np.nan)
         for i in range(most):
             has = count - 1 > i
-            outputs[has, i] = result.outputs[first[has] + i, 0]
-        return result.x[:, self.free], outputs
+            for table, column, weight in zip(outputs, held.columns, held.weights, strict=True):
+                table[has, i] = weight * result.outputs[first[has] + i, column]
+        return result.x[:, self.free], np.hstack(list(outputs))
 
     def _admit(self, x):
         """Move states outside a gap or a stop to their border."""

@@ -15,12 +15,12 @@ import numpy as np
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.segmented import Scales
-from ..estimation.segments import facts
+from ..estimation.segments import facts, load_of
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of all records: force u [N], reported x [m], smoothed v [m/s] and a [m/s^2]."""
+    """Samples of all records: force u [N], place x [m], smoothed v [m/s] and a [m/s^2]."""
 
     u: np.ndarray
     x: np.ndarray
@@ -29,14 +29,16 @@ class Motion:
     dt: float  # between samples of the records [s]
 
 
-def motion_of(view, thin: int) -> Motion:
-    """Return every `thin`-th sample within the segments."""
+def motion_of(view, thin: int, block) -> Motion:
+    """Return every `thin`-th sample within the segments; the force as the drive of a block makes it."""
     parts = []
     for record, segments in zip(view.records, view.segments, strict=True):
         known = facts(record)
         acceleration = np.gradient(known.velocity, record.t)
         some = segments.samples[::thin]
-        parts.append([np.asarray(c)[some] for c in (known.load, known.place, known.velocity, acceleration)])
+        parts.append(
+            [np.asarray(c)[some] for c in (load_of(block, record), known.place, known.velocity, acceleration)]
+        )
     return Motion(*(np.concatenate(c) for c in zip(*parts, strict=True)), dt=view.records[0].dt)
 
 

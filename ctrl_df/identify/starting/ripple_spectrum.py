@@ -71,7 +71,7 @@ class RippleSpectrum:
             base += [[np.real(p) for p in pair], [np.imag(p) for p in pair]]
         given = [_integral(_held(r), r.t) for r in records]
         self._base = [self._parts(given), *base]
-        self._y = self._parts([np.asarray(r.y) for r in records])
+        self._y = self._parts([facts(r).place for r in records])
         self._weights = [np.ones(_length(y) // 2 + 1) for y in self._y]
         for _ in range(3):
             w = self._regressed(self._base)
@@ -197,13 +197,13 @@ def _integral(f, t) -> np.ndarray:
 def _smoothed(record) -> np.ndarray:
     """Return the position without the noise above the band of the motion."""
     x = _integral(facts(record).velocity, record.t)
-    return x - np.mean(x) + np.mean(record.y)
+    return x - np.mean(x) + np.mean(facts(record).place)
 
 
 def _blur(record) -> float:
     """Return the error of the smoothed position [m]."""
     known = facts(record)
-    return max(known.noise / math.sqrt(2 * known.half), 1e-9 * known.spread)
+    return max(known.noise / math.sqrt(2 * known.half), 1e-9 * known.position)
 
 
 def _runs(segments, size) -> list[tuple[int, int]]:

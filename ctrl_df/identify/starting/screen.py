@@ -42,7 +42,7 @@ class Screen:
     def __init__(self, base: FitResult, data: SegmentedData):
         self.base, self.data = base, data
         self.view = data.train
-        self.motion = motion_of(data.train, data.thin)
+        self.motion = motion_of(data.train, data.thin, base.model)
         self.sensitivity = base.sensitivity
         self.residual = self.project(base.residual)
         self.simulators = [data.simulator(base.model, r) for r in self.view.records]
