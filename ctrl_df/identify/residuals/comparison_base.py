@@ -45,13 +45,13 @@ class ComparisonBase:
     @property
     def places(self) -> tuple[str, ...]:
         """Where the error is, in sentences; of a model that misses the motion itself, that it does."""
-        worst = self.worst
-        if not worst.where.significant and worst.nrmse > UNMOVED:
+        where, error = self.where, self.worst.nrmse
+        if not where.significant and error > UNMOVED:
             return (
-                f"The model misses the motion as a whole: it errs by {worst.nrmse:.0%} of the measured, in "
+                f"The model misses the motion as a whole: it errs by {error:.0%} of the measured, in "
                 "no region more than in others.",
             )
-        return self.where.sentences
+        return where.sentences
 
     def report(self) -> str:
         """Return the comparison as text."""
