@@ -169,6 +169,16 @@ def test_the_same_wherever_a_mass_is_moved_by_that_force():
     assert np.sqrt(np.mean((F - u)[5:-5] ** 2)) < 0.02  # measured 0.006, of the acceleration between samples
 
 
+def test_describing_function_of_an_imposed_motion():
+    plain = cdf.Massless().with_effect(cdf.Coulomb(5.0)).with_effect(cdf.Viscous(2.0))
+    plain = plain.with_effect(cdf.LinearSpring(10.0))
+    found = cdf.describing_function(plain, 0.5, 3.0)
+    assert found == pytest.approx(10.0 + 1j * (4 * 5.0 / (np.pi * 0.5) + 2.0 * 3.0), rel=2e-6)
+    loose = cdf.Massless().with_effect(cdf.Coulomb(5.0)).with_effect(cdf.LooseLinkage(1e3, 0.05))
+    assert cdf.describing_function(loose, 0.012, 3.0) == 0.0  # within the gap there is no force
+    assert cdf.describing_function(loose, 0.5, 3.0) == pytest.approx(3.4517 + 11.9794j, rel=1e-4)
+
+
 # --- the flow ---------------------------------------------------------------------------------------
 
 

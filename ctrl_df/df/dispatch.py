@@ -10,6 +10,7 @@ from control import descfcn
 
 from ..blocks.element import Element
 from ..blocks.hysteresis import play, relay_with_hysteresis
+from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
 from ..blocks.memoryless import saturation
 from .methods import (
@@ -19,6 +20,7 @@ from .methods import (
     FrictionClosedForm,
     Guarded,
     ImpactMap,
+    ImposedForce,
     Method,
     Quadrature,
     RateLimiterForm,
@@ -60,6 +62,8 @@ def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, opt
     if isinstance(F, Element):
         _output_name(F, output)
         return RateLimiterForm(F) if F.kind == "rate_limiter" else ElementIntegrals(F)
+    if isinstance(F, Massless):
+        return ImposedForce(F, _named_output(F, output))
     if isinstance(F, Mechanism):
         return _for_mechanism(F, _output_name(F, output), options)
     if isinstance(F, ct.StateSpace | ct.TransferFunction):
@@ -115,6 +119,10 @@ def _output_name(system, output) -> str:
             f"a describing function needs one input; {system.name} has {system.ninputs}. Fix the others "
             f"inside the block."
         )
+    return _named_output(system, output)
+
+
+def _named_output(system, output) -> str:
     labels = list(system.output_labels)
     if output is None:
         return labels[0]

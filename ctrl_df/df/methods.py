@@ -383,6 +383,23 @@ class ForcedOrbit(Method):
         return (*super().identity(), self.options)
 
 
+@dataclass(frozen=True)
+class ImposedForce(Method):
+    """A block without mass: the force along an imposed ``A cos(omega t)``, once what it hides has settled."""
+
+    dynamic = True
+
+    def harmonics(self, A, omega, orders):
+        """See `Method.harmonics`."""
+        from .forced_orbit.imposed import force_harmonics
+
+        y = np.empty((A.size, omega.size, orders + 1), complex)
+        residual = np.empty((A.size, omega.size))
+        for i, k in np.ndindex(residual.shape):
+            y[i, k], residual[i, k] = force_harmonics(self.subject.core, A[i], omega[k], orders)
+        return y, np.where(np.isfinite(residual), "slip", "aperiodic"), residual
+
+
 # --- what they share ----------------------------------------------------------------------------------------
 
 

@@ -68,6 +68,11 @@ def grain(y: np.ndarray) -> float:
     """
     if step_of(y) > 0:
         return step_of(y) / math.sqrt(12)
+    return usual_noise(y)
+
+
+def usual_noise(y: np.ndarray) -> float:
+    """Return the rms of white noise that explains the usual fourth difference: steps are left aside."""
     return float(np.median(np.abs(np.diff(y, 4)))) / (0.6745 * math.sqrt(70))
 
 

@@ -134,6 +134,7 @@ class SegmentedData:
     step: int = 0  # samples a step of the input before this was made fine
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
     begins: str = FREE  # how segments begin
+    robust: bool = False  # whether errors far beyond the usual one count linearly only
 
     def level(self, factor: int) -> SegmentedData:
         """Return the same data in segments `factor` times as many as the longest."""
@@ -255,6 +256,7 @@ class SegmentedData:
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
             error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
+            robust=self.robust,
         )  # fmt: skip
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:

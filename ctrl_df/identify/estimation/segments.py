@@ -87,7 +87,7 @@ def _of_imposed(record: Measurement) -> Facts:
     dt, _, values = derivatives.uniform(record.t, motion.x)
     force = max(float(np.std(record.y)), 1e-300)
     # dry friction makes steps of the force, whose spectrum has no floor
-    noise = min(record.noise_floor(), derivatives.grain(record.y))
+    noise = min(record.noise_floor(), max(derivatives.usual_noise(record.y), derivatives.grain(record.y)))
     return Facts(
         dt, force, max(float(np.sqrt(np.mean(motion.v**2))), 1e-300), force,
         max(noise, NOISE_FREE * force),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ...blocks.massless import without_answer
 from .structure_search import StructureSearch
 
@@ -12,6 +14,9 @@ class ImposedSearch(StructureSearch):
     Whatever force is missing stands in the residual as it is: nothing integrates it, so that disturbance
     forces are noise like any other.
     """
+
+    def _look_at(self, data, which):
+        super()._look_at(replace(data, robust=True), which)
 
     def disturbs(self, error, data):
         """Whether disturbance forces make an error of the output that hides all else: none does here."""
