@@ -42,6 +42,7 @@ def table(rows):
     small = [r for r in singles if 0 < shown(r) < EDGE]
     large = [r for r in singles if shown(r) >= EDGE or not answered(r)]
     line("one hidden, all: first", "95 %", singles, lambda r: r.get("first"))
+    line("the same, by one name and no other", "", singles, lambda r: r.get("strict"))
     line("one hidden, over 5 times the noise: first", "95 %", large, lambda r: r.get("first"))
     line(
         "the same: among the first three, or in the ambiguous class", "99 %", large, lambda r: r.get("three")

@@ -13,6 +13,7 @@ PICTURES = {
     "family": "family.plot_family",
     "harmonics": "harmonics.plot_harmonics",
     "analysis": "describing.describing_function_plot",
+    "event response": "response.event_response_plot",
     "orbit": "orbit.orbit_plot",
     "comparison": "compare.comparison_plot",
     "table comparison": "table.table_comparison_plot",

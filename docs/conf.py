@@ -58,7 +58,7 @@ html_theme_options = {
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
-    "filename_pattern": r"/(?!_|emps|cluster|xl330)[^/]*$",  # one asks for data, one for a cluster: not run here
+    "filename_pattern": r"/(?!_|emps|cluster|xl330)[^/]*$",  # they ask for data or a cluster: not run
     "ignore_pattern": r"/_",
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,

@@ -56,7 +56,8 @@ class Given(Search):
         return Fit(block, self.data.level(block), block.newest if block.effects else "", len(names))
 
     def candidates(self, classes, executor=None):
-        blocks = [extended(self.block, MADE[c.id]) for c in classes if applicable(c, self.block)]
+        made = [self.data.made(c.id, self.block) for c in classes if applicable(c, self.block)]
+        blocks = [extended(self.block, effect) for effect in made]
         found = [self.fitted(b, (), 0) for b in blocks if b is not None]
         return self.ranked(self.base, [replace(t, extra=1) for t in found])
 
@@ -104,6 +105,9 @@ class Data:
 
     def added(self, block):
         return tuple(e.id for e in block.effects[len(self.start.effects) :])
+
+    def made(self, id, block):
+        return MADE[id]
 
     def level(self, block):
         if block.effects[: len(self.start.effects)] != self.start.effects:
@@ -194,6 +198,23 @@ def test_where_something_remains_the_ladder_begins_again_from_what_was_not_follo
     back = next(s for s in study.steps if not s.effect and s.changes)
     assert back.dropped == ("hysteresis",) and back.instead == ("linear_spring",)
     assert "The ladder went back" in study.summary()
+
+
+def test_what_an_earlier_step_has_seen_is_tried_again():
+    # beside dry friction the search for ripples ends at the wrong length; before, it had the right one
+    class Blind(Data):
+        def made(self, id, block):
+            wrong = id == "position_ripple" and "coulomb" in self.added(block)
+            return cdf.PositionRipple(1.0, 5.0) if wrong else MADE[id]
+
+        def level(self, block):
+            wrong = any(getattr(e, "wavelength", 0.0) == 5.0 for e in block.effects)
+            return super().level(block.without_effect("position_ripple") if wrong else block)
+
+    levels = {"": 0, "coulomb": 900, "position_ripple": 300, "coulomb position_ripple": 1500}
+    study = climb(Blind(levels))
+    assert set(study.effects) == {"coulomb", "position_ripple"} and study.verdict == "effect"
+    assert [s.effect for s in study.steps] == ["", "coulomb", "position_ripple"]
 
 
 def test_of_two_that_hide_each_other_neither_need_be_significant():

@@ -90,6 +90,13 @@ EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 LEFT = 0.2
 """Share of the structure (rms) that the best candidate may leave: 4 % of its power (rigs)."""
 
+SIZE_KNOWN = 0.5
+"""Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
+
+UNMOVED = 0.5
+"""Error over the shortest segments, of the output's rms, beyond which a model explains no motion: one that
+stands still at a fitted place and speed errs by as much over half a turn of a sine."""
+
 NOISIER = 1.4
 """Error on held-out segments over that on fitted ones that may be chance (rigs)."""
 
@@ -187,6 +194,10 @@ SPECTRUM_SAMPLES = 25_000
 
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
+
+OUTLASTING = 2
+"""Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
+comparison at eight lengths."""
 
 CONFIRMED_FORCED = 10
 """The same where disturbance forces let the first look tell little."""

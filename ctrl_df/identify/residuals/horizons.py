@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from ...drawing import draw
+from ..data.imposed import imposes_motion
 from ..data.measurement import Measurement
 from ..estimation.fit import FitResult, fit_segments
 from ..estimation.initial_states import CONTINUED, FREE
 from ..estimation.segmented import same_begins
 from ..estimation.segments import cut, facts
-from ..estimation.simulator import Simulator
+from ..estimation.simulators import simulator_of
 from ..thresholds import FULL_SAMPLES, HORIZONS, SHORTEST_HORIZON
 
 
@@ -72,8 +73,8 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
     Parameters
     ----------
     model : block or loop
-        Of a loop, and of a system of which nothing is known, the whole record alone is a horizon: what hides
-        in its controller cannot begin anew.
+        Of a loop, and of a system of which nothing is known, the whole record alone is a horizon, as what
+        hides in them cannot begin anew; and so it is under an imposed motion.
     records : sequence of Measurement
     most : int
         Lengths at most, each half of the one before.
@@ -94,8 +95,8 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
 def _ladder(model, records, most) -> list[FitResult]:
     """Return the initial states fitted over stretches of every length, the shortest first."""
     thin = max(1, round(max(map(len, records)) / FULL_SAMPLES))
-    first, found = Simulator(model, records[0]), []
-    if not first.closed and first.mechanism:
+    first, found = simulator_of(model, records[0]), []
+    if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
         least = [max(SHORTEST_HORIZON * facts(r).swing, 50 * facts(r).dt) for r in records]
         halvings = min(int(math.log2(max(r.duration / s, 1.0))) for r, s in zip(records, least, strict=True))
         for k in range(min(halvings, most - 1), 0, -1):
@@ -104,8 +105,13 @@ def _ladder(model, records, most) -> list[FitResult]:
 
 
 def _fitted(model, records, parts, thin, begins, shorter) -> FitResult:
+    """Fit where stretches begin: roughly from those of shorter ones, then once at the full rate."""
     segments = [cut(r, parts) for r in records]
     near: Any = same_begins(shorter[-1], segments) if shorter else None
-    return fit_segments(
-        model, records, segments, (), thin=thin, starts=near, iterations=4, tolerance=1e-2, begins=begins
-    )
+    for rate, iterations in ((4 * thin, 3 if shorter else 8), (thin, 2)):
+        found = fit_segments(
+            model, records, segments, (), thin=rate, starts=near, iterations=iterations, tolerance=1e-2,
+            begins=begins,
+        )  # fmt: skip
+        near = found.starts
+    return found

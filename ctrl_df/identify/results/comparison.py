@@ -240,6 +240,11 @@ class Comparison(ComparisonBase):
         """``free`` or ``windows``."""
         return "windows" if any(r.windows > 1 for r in self.records) else "free"
 
+    @property
+    def over(self) -> str:
+        """What the model was judged over, in words."""
+        return "a free run" if self.mode == "free" else f"{self.windows} windows"
+
     def report(self) -> str:
         """Return the comparison as text: each record, the tests, the regions."""
         lines = [str(self)]
@@ -261,7 +266,7 @@ class Comparison(ComparisonBase):
                 )
             )
         if self.where:
-            lines += ["", *self.where.sentences[:6], "", self.where.table(8)]
+            lines += ["", *self.places[:6], "", self.where.table(8)]
         return "\n".join(lines)
 
     def __str__(self) -> str:

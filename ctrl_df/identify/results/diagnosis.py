@@ -96,9 +96,9 @@ class CandidateEffect(Predicting):
         Whether it was refitted at the full rate and tried on held-out data (the best few are).
     errors : dict
         Standard errors of `parameters`, for residuals of any colour; only of confirmed candidates.
-    determined : bool
-        Whether the data determine the parameters of the effect: known to better than their size, and inside
-        their range. False of what is not confirmed.
+    undetermined : tuple of str
+        Parameters of the effect that the data do not determine: at a bound of their range, or less certain
+        than they are large.
 
     Examples
     --------
@@ -124,7 +124,12 @@ class CandidateEffect(Predicting):
     confirmed: bool = False
     errors: Mapping[str, float] = field(default_factory=dict)
     evidence_holdout: float = 0.0
-    determined: bool = False
+    undetermined: tuple[str, ...] = ()
+
+    @property
+    def determined(self) -> bool:
+        """Whether it is confirmed, and the data determine all parameters of the effect."""
+        return self.confirmed and not self.undetermined
 
     @property
     def evidence_fitted(self) -> float:
@@ -167,6 +172,8 @@ class Diagnosis:
     status : {'complete', 'under way', 'budget spent', 'interrupted'}
         How far the diagnosis came. Before it is complete the verdict is of what is known: at most 'ambiguous'
         as long as nothing is confirmed.
+    doubts : tuple of str
+        Why the first of the ranking is not called the effect although the evidence is for it, in sentences.
 
     Examples
     --------
@@ -199,6 +206,7 @@ class Diagnosis:
     measure: str = "output"
     remains: str = ""
     status: str = COMPLETE
+    doubts: tuple[str, ...] = ()
 
     @property
     def calibrated(self) -> str:

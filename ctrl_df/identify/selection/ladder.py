@@ -16,11 +16,12 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
+from ...blocks.effect import Effect
 from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
-from ..results.neighbours import Neighbour, Neighbours
-from ..thresholds import BRANCHES, SHOWS_HARDLY
+from ..results.neighbours import ADD, Neighbour, Neighbours
+from ..thresholds import BRANCHES, CONFIRMED, SHOWS_HARDLY
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .search import Search
@@ -159,12 +160,15 @@ class Climb:
 
     def _settled(self, end: Rung) -> tuple[Rung, Neighbours]:
         """Go on to better neighbours until there are none."""
+        refound: set[tuple[str, ...]] = set()
         for _ in range(self.max_effects):
             around, table = self._around(end)
-            better = around.better(self.rungs)
+            better = around.better(self.rungs, end.structure.key not in refound)
             if better is None:
                 return end, table
             structure, how = better
+            if structure.key == end.structure.key:
+                refound.add(structure.key)
             end = self._up(structure, end.steps, _exchanged(how))
         return end, self._around(end)[1]
 
@@ -175,6 +179,8 @@ class Climb:
         around = Around(end.structure, end.search, self.free)
         around.add(end.found.ranking)
         around.drop_each()
+        if end.found.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
+            around.add_again(self._seen(end))
         errors = end.search.errors(around.own)
         for place in reversed(range(len(end.structure.added))):
             self._known(end.steps, end.search, Neighbours(around.rows(), *errors, complete=False))
@@ -194,6 +200,17 @@ class Climb:
         search = self.dataset.search(less.block, self.free(less.block))
         model = end.structure.block
         return Look(less, search.rivals(model, self.free(model), self.classes, self.executor), search.errors)
+
+    def _seen(self, end: Rung) -> list[Effect]:
+        """Return effects that left less error at an earlier step, with the values they had there."""
+        found: dict[str, CandidateEffect] = {}
+        for rung in self.rungs.values():
+            for c in rung.found.ranking if rung is not end else ():
+                if c.confirmed and c.nrmse < min(
+                    rung.found.nrmse, found[c.id].nrmse if c.id in found else math.inf
+                ):
+                    found[c.id] = c
+        return [c.effect for c in sorted(found.values(), key=lambda c: c.nrmse)[:CONFIRMED]]
 
     # --- again from below -----------------------------------------------------------------------------
 
@@ -274,6 +291,10 @@ def _added(effect: CandidateEffect) -> dict:
 
 
 def _exchanged(n: Neighbour) -> dict:
+    if n.dropped == (n.added,):  # the same in a better minimum
+        return {"evidence": n.evidence}
+    if n.change == ADD:
+        return {"effect": n.added, "evidence": n.evidence}
     return {"dropped": n.dropped, "instead": (n.added,) if n.added else (), "evidence": n.evidence}
 
 

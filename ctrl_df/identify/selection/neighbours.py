@@ -9,7 +9,7 @@ from typing import Any
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..thresholds import RIVALS, RULED_OUT
 from .search import Search
-from .structure import Structure, parameters_of, plainness
+from .structure import Structure, exchanged, parameters_of, plainness
 from .verdict import worth
 
 
@@ -58,7 +58,7 @@ class Around:
 
     def __init__(self, structure: Structure, search: Search, free: Callable):
         self.structure, self.search, self.free = structure, search, free
-        self.own = self._fitted(structure.block, 4)
+        self.own = self._fitted(structure.block, 8)
         self.near: list[tuple[Trial, Any]] = []
         self.far: list[Neighbour] = []
 
@@ -125,6 +125,13 @@ class Around:
             errors = c.nrmse, c.nrmse_holdout
             self.far.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
 
+    def add_again(self, effects) -> None:
+        """Begin effects besides with values that they had at earlier steps."""
+        for effect in effects:
+            block = exchanged(self.structure.block, effect)
+            if block is not None:
+                self.fit(Trial(ADD, (), effect.id, self.structure.plus(block)))
+
     # --- what they come to ----------------------------------------------------------------------------
 
     def _judged(self) -> list[tuple[Trial, Any]]:
@@ -134,7 +141,8 @@ class Around:
 
     def rows(self) -> tuple[Neighbour, ...]:
         """Return all of them, those that were fitted first, by evidence."""
-        near = [self._told(trial, t) for trial, t in self._judged()]
+        others = [(trial, t) for trial, t in self._judged() if trial.structure.key != self.structure.key]
+        near = [self._told(trial, t) for trial, t in others]
         return tuple(sorted([*near, *self.far], key=lambda n: (not n.refitted, -n.evidence)))
 
     def _told(self, trial: Trial, t) -> Neighbour:
@@ -147,20 +155,23 @@ class Around:
     def _verdict(self, trial: Trial, t) -> str:
         """Return how a neighbour does: what has an effect more needs the evidence of any effect."""
         fewer = len(trial.dropped) > bool(trial.added)
-        if t.evidence > self.search.significant:
+        more = len(trial.dropped) < bool(trial.added)
+        alone = t.evidence_validation > self.search.significant_validation
+        if t.evidence > self.search.significant and (alone or not more):
             return BETTER
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
 
-    def better(self, known) -> tuple[Structure, Neighbour] | None:
+    def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:
         """Return the neighbour to go to: the best of those that do better, else the plainest of the equals.
 
-        `known`: keys of structures that the ladder has been at.
+        `known`: keys of structures that the ladder has been at; `again`: whether the model itself with other
+        values, in a better minimum, may be one.
         """
         found = []
         for trial, t in self._judged():
             verdict = self._verdict(trial, t)
-            again = trial.dropped == (trial.added,)
-            if trial.given or verdict == WORSE or (trial.structure.key in known and not again):
+            same = trial.structure.key == self.structure.key
+            if trial.given or verdict == WORSE or not (again if same else trial.structure.key not in known):
                 continue
             structure = trial.structure.at(t.block)
             if verdict == EQUAL and _plain(structure) >= _plain(self.structure):

@@ -140,9 +140,9 @@ class Search(ABC):
     def standard_errors(self, judged) -> dict[str, float]:
         """Return the standard errors of the parameters fitted, as far as they are known."""
 
-    def determined(self, judged) -> bool:
-        """Whether the data determine the parameters of the newest effect of a confirmed candidate."""
-        return False
+    def undetermined(self, judged) -> tuple[str, ...]:
+        """Return the parameters of the newest effect of a confirmed candidate that data do not determine."""
+        return ()
 
     def predicted(self, judged) -> tuple[Any, tuple] | None:
         """Return a model and the records that it is to predict; None where there is nothing to predict."""

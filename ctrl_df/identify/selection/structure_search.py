@@ -29,14 +29,17 @@ from ..thresholds import (
     FLOOR,
     GROWTH,
     HOPELESS,
+    LEFT,
     PASSED,
     PROCESS_NOISE,
     PROMISING,
     SHOWS_HARDLY,
     SIGNIFICANT,
     SIGNIFICANT_HELD,
+    SIZE_KNOWN,
     STILL_POSSIBLE,
     STOPPED_EARLY,
+    UNMOVED,
 )
 from .attempts import itself, own_names, tried
 from .equivalence import indistinguishable
@@ -69,11 +72,8 @@ class StructureSearch(Search):
         self._look_at(data, 1)
         self.base = self._baseline(block)
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
-        # a disturbance force drowns all else over longer segments
-        near = self.segmentations[0].moved(self.base.train)
-        if self.disturbs(near.rmse, data):
-            self._look_at(self.segmentations[0].with_process_noise, 0)
-            self.base = CandidateFit("", self.data.fit(near.model, self.free))
+        # over the shortest segments nearly every model follows, unless forces disturb it
+        self.nearest = self.segmentations[0].moved(self.base.train)
         self.noise = ranked(self.base, ())[1]  # of the best model's residual
 
     def disturbs(self, error: float, data: SegmentedData) -> bool:
@@ -122,10 +122,18 @@ class StructureSearch(Search):
         """Return every effect that can be added, fitted, the one with most evidence first."""
         if not self.placed:  # sensors' effects are of the place
             classes = [c for c in classes if c.role != "output"]
-        longest = self.segmentations[-1]
         self.course.stage(f"{len(classes)} effects tried over short segments")
         base, found = self._look(classes, executor, self.data.sampled, self.course.known)
         self.course.known(found)
+        if self._disturbed(found):
+            # a disturbance force drowns all else over longer segments
+            self._look_at(self.segmentations[0].with_process_noise, 0)
+            self.base = CandidateFit("", self.data.fit(self.nearest.model, self.free))
+            self.noise = ranked(self.base, ())[1]
+            self.course.stage("the same by accelerations: forces that wander outweigh the noise")
+            base, found = self._look(classes, executor, self.data.sampled)
+            self.course.known(found)
+        longest = self.segmentations[-1]
         there = base.rmse if self.data.disturbed else longest.moved(base).rmse
         if there > GROWTH * base.rmse:
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
@@ -138,6 +146,19 @@ class StructureSearch(Search):
         if found:
             self._rebase(found)
         return found
+
+    def _disturbed(self, found) -> bool:
+        """Whether forces disturb the machine that no effect accounts for.
+
+        The baseline then errs over the shortest segments by far more than the sensor's noise, and so does the
+        best candidate; an effect that is missing would take most of that away.
+        """
+        least, shortest = self.nearest.rmse, self.segmentations[0]
+        if not self.disturbs(least, self.data):
+            return False
+        best = sorted(found, key=lambda t: t.train.rmse)[:2]
+        moved = side_by_side(lambda t: shortest.moved(t.train, hopeless=least), best)
+        return all(self.disturbs(f.rmse, self.data) and f.rmse > LEFT * least for f in moved)
 
     def _over_long_windows(self, here, there, found) -> list[CandidateFit] | None:
         """Return the best by error moved to the longest segments; None where they explain enough there.
@@ -162,6 +183,8 @@ class StructureSearch(Search):
 
     def _tried(self, classes, executor, data: SegmentedData, screened=None, reached: float = math.inf):
         base = data.moved(self.base.train, 3)
+        if not classes:
+            return base, []
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
         short = self.segmentations[0].sampled
@@ -320,14 +343,22 @@ class StructureSearch(Search):
         """Return the standard errors of a fit that came to its end."""
         return judged.train.standard_errors if len(judged.train.covariance) else {}
 
-    def determined(self, judged):
-        """Whether every parameter of the newest effect is known to better than its size, and in its range."""
-        own = set(own_names(judged.block))
+    def undetermined(self, judged):
+        """Return the parameters of the newest effect at a bound, or known to worse than their size."""
         fit = judged.train
         if not judged.confirmed or not len(fit.covariance):
-            return False
+            return ()
+        # a bound that the records prove, where a body has been, is what they tell of the parameter
+        proved = {f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.data.filtered)}
         at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
-        return own.isdisjoint(at_bound | blurred(fit))
+        doubtful = (at_bound - proved) | blurred(fit)
+        # a static level is found by trying, as single samples pass it: slopes know nothing of it
+        table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
+        own = [k for k in own_names(judged.block) if not table[k].threshold]
+        # the size of an effect, its first parameter, is measured by itself
+        size = set(own_names(judged.block)[:1]).intersection(own)
+        doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
+        return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
     def predicted(self, judged):
         """Return the model and the records held out (angles as these have them), or those fitted."""
@@ -350,7 +381,11 @@ class StructureSearch(Search):
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
-        return remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+        left = remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+        if self.data.disturbed and not significant and self.nearest.nrmse > UNMOVED:
+            # accelerations that are mostly noise do not speak for a model that does not even move
+            return replace(left, unexplained=True)
+        return left
 
     def located(self, best, remainder, unknown):
         """Return where the error is."""

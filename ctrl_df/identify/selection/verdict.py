@@ -19,7 +19,8 @@ from ..results.diagnosis import (
     Diagnosis,
     rivals,
 )
-from ..results.explain import explain, explain_so_far
+from ..results.explain import explain, explain_so_far, falls_behind, undetermined
+from .lasting import lasting
 from .search import Remainder, Search
 
 
@@ -56,16 +57,14 @@ class _Asked:
     def so_far(self, found: Sequence) -> Diagnosis:
         """Return the diagnosis as it stands with these candidates, best first."""
         chosen = [t for t in found if t.confirmed]
-        if chosen:
-            answer = self.answer(chosen, found)
-            verdict = AMBIGUOUS if answer.verdict == EFFECT else answer.verdict
-            answer = replace(answer, verdict=verdict, status=UNDER_WAY)
-        else:
-            answer = self._screened(found)
+        answer = self.answer(chosen, found, UNDER_WAY) if chosen else self._screened(found)
         return replace(answer, explanation=explain_so_far(answer, self.search.words))
 
-    def answer(self, chosen: Sequence, found: Sequence) -> Diagnosis:
-        """Return what confirmed candidates amount to, `found` beside them."""
+    def answer(self, chosen: Sequence, found: Sequence, status: str = COMPLETE) -> Diagnosis:
+        """Return what confirmed candidates amount to, `found` beside them.
+
+        Only a complete answer looks at long stretches; any other names no effect.
+        """
         search = self.search
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
@@ -85,8 +84,19 @@ class _Asked:
         else:
             open_ones = rivals(ranking)
             verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
-        result, note = self._made(verdict, ranking, remainder, best, COMPLETE)
+        base, doubts = self._base(), ()
+        if verdict == EFFECT and status != COMPLETE:
+            verdict = AMBIGUOUS
+        elif verdict == EFFECT:
+            search.course.stage("free prediction over long stretches")
+            verdict, ranking, doubts = doubted(ranking, base, search.significant)
+        result, note = self._made(verdict, ranking, remainder, best, base, status, doubts)
         return replace(result, explanation=explain(result, search.words) + note)
+
+    def _base(self) -> Baseline:
+        search = self.search
+        errors, predicted = search.errors(search.base), search.predicted(search.base)
+        return Baseline(search.base.block, *errors, predicted=predicted)
 
     def _screened(self, found: Sequence) -> Diagnosis:
         """Return what candidates amount to of which none is confirmed."""
@@ -97,22 +107,47 @@ class _Asked:
         else:
             told = bool(ranking) and ranking[0].evidence > search.significant
             verdict = AMBIGUOUS if told else UNKNOWN
-        return self._made(verdict, ranking, search.at_first, search.base, UNDER_WAY)[0]
+        return self._made(verdict, ranking, search.at_first, search.base, self._base(), UNDER_WAY)[0]
 
-    def _made(self, verdict, ranking, remainder: Remainder, best, status) -> tuple[Diagnosis, str]:
+    def _made(
+        self, verdict, ranking, remainder: Remainder, best, base: Baseline, status, doubts=()
+    ) -> tuple[Diagnosis, str]:
         search = self.search
         located = search.located(best, remainder, verdict == UNKNOWN and status == COMPLETE)
         fitted, validation = search.records
-        base = Baseline(
-            search.base.block, *search.errors(search.base), predicted=search.predicted(search.base)
-        )
         result = search.kind(
             verdict, tuple(ranking), base.model, base, base.nrmse, base.nrmse_holdout, remainder.noise,
             remainder.structure, "", located.kinds, located.where, fitted, validation,
             time.perf_counter() - self.began, self.limits, search.measure, located.remains, status,
-            **search.answer(best),
+            doubts, **search.answer(best),
         )  # fmt: skip
         return result, located.note
+
+
+def doubted(ranking, base: Baseline, significant: float):
+    """Return what becomes of the verdict that the first of a ranking is the effect, and why.
+
+    It stands where the first predicts the motion over long stretches as well as any rival, and better than
+    the model without it, and where the data determine the effect's size, its first parameter.
+
+    Returns
+    -------
+    verdict : str
+    ranking : list of CandidateEffect
+        Those that predict better share the probability with the first: one judgement is against the other.
+    doubts : tuple of str
+    """
+    long, first = lasting(ranking, base, significant), ranking[0]
+    if long is not None and not long.ahead:
+        doubts, named = (falls_behind(first, long),), [c for c in ranking if c.id in long.better]
+        if not named:
+            return UNKNOWN, ranking, doubts
+        share = first.probability / (1 + len(named))
+        shared = [replace(c, probability=share) if c is first or c in named else c for c in ranking]
+        return AMBIGUOUS, shared, doubts
+    if next(iter(first.parameters), None) in first.undetermined:
+        return AMBIGUOUS, ranking, (undetermined(first),)
+    return EFFECT, ranking, ()
 
 
 def worth(first: CandidateEffect, search: Search) -> bool:
@@ -145,5 +180,5 @@ def _entry(judged, search: Search, probability: float, same) -> CandidateEffect:
         nrmse_holdout=held, evidence=judged.evidence, probability=probability, parameters=values,
         equivalents=same, confirmed=judged.confirmed,
         errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
-        evidence_holdout=judged.evidence_validation, determined=search.determined(judged),
+        evidence_holdout=judged.evidence_validation, undetermined=search.undetermined(judged),
     )  # fmt: skip

@@ -130,6 +130,8 @@ class TableSearch(Search):
 
     def candidates(self, classes, executor=None):
         """Return every effect that can be added, fitted roughly to some points, the best first."""
+        if not classes:
+            return []
         size = np.abs(self.inside.weight * self.base.error[self.train])
         few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
@@ -221,15 +223,18 @@ class TableSearch(Search):
         """Return the standard errors of a candidate fitted to all points."""
         return uncertainty(judged.fitted)[1] if judged.confirmed else {}
 
-    def determined(self, judged):
-        """Whether every parameter of the newest effect is known to better than its size, and in its range."""
+    def undetermined(self, judged):
+        """Return the parameters of the newest effect at a bound, or known to worse than their size."""
         if not judged.confirmed:
-            return False
+            return ()
         own, fitted = judged.block.newest + ".", judged.fitted
-        table = fitted.block.parameters
+        table, doubtful = fitted.block.parameters, uncertainty(fitted)[2]
         named = [v for v in fitted.variables if v.name.startswith(own)]
-        doubtful = uncertainty(fitted)[2]
-        return not any(v.name in doubtful or table[v.name].value in (v.lower, v.upper) for v in named)
+        return tuple(
+            v.name.rpartition(".")[2]
+            for v in named
+            if v.name in doubtful or table[v.name].value in (v.lower, v.upper)
+        )
 
     # --- what it comes to -----------------------------------------------------------------------------
 
