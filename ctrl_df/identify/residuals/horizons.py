@@ -16,6 +16,7 @@ from ..estimation.fit import FitResult, fit_segments
 from ..estimation.initial_states import CONTINUED, FREE
 from ..estimation.segmented import same_begins
 from ..estimation.segments import cut, facts
+from ..estimation.sensed import sensed
 from ..estimation.simulators import simulator_of
 from ..thresholds import FULL_SAMPLES, HORIZONS, SHORTEST_HORIZON
 
@@ -81,8 +82,10 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
     """
     records = list(records)
     found = _ladder(model, records, most)
-    power = sum(float(np.sum((r.y - r.y.mean()) ** 2)) for r in records)
-    count = sum(map(len, records))
+    # of several outputs each counts over its own noise
+    outputs = [(w, y) for r in records for w, y in zip(sensed(r).weights, sensed(r).values, strict=True)]
+    power = sum(w**2 * float(np.sum((y - y.mean()) ** 2)) for w, y in outputs)
+    count = sum(len(y) for _, y in outputs)
     squares = np.array([sum(float(e @ e) for e in f.residual) for f in found])
     longest = max(r.duration for r in records)
     horizon = longest / 2.0 ** np.arange(len(found) - 1, -1, -1)
