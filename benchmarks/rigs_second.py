@@ -684,6 +684,8 @@ def _draw(kind, number, rng):
         low, high = SMALL if small else (LARGE if kind == "single" else (10.0, 300.0))
         target = math.exp(rng.uniform(math.log(low), math.log(high)))
         others = {k: v for k, v in values.items() if k not in base}
+        if set(law(1.0)) & (set(values) - {"motor", "load"}):
+            raise Unsuited("the machine has that already")
         s, shown = _sized(law, target, base, others, setting, seed, sigma, known)
         if shown > 3 * high or (not small and shown < low):
             raise Unsuited("what is hidden shows too much or too little")
@@ -702,6 +704,8 @@ def _draw(kind, number, rng):
     scale = _scales(rng, setting, motion, turns, "gravity" in names)
     velocity = rng.uniform(20, 60) if rng.random() < 0.2 and "sensor_quantization" not in names else None
     skip = float(rng.choice([0.0, rng.uniform(0.0, 2.0)]))
+    if "drift" in names:  # it runs from the first sample on
+        skip = 0.0
     label = f"{kind} {number}"
     train = _record(label, motion, measured, setting, scale, turns, velocity, rng, skip)
     holdout = _record(f"{label} held out", second, held, other, scale, turns, velocity, rng, 0.0)

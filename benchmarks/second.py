@@ -4,16 +4,17 @@
         [--triple 0:6] [--limit 600] [--peers] [--table]
 
 Each rig is one line of FILE; a second run goes on from there, ``--table`` only prints. One process works; a
-rig that takes longer than the limit [s] is stopped and counts as a miss. A miss is told with its cause: ``not
-screened`` (the right effect is not among the candidates confirmed), ``bad optimum`` (its fit errs more than
-the true structure fitted from the truth does), ``lost on evidence``, ``refused`` (it comes first, the verdict
-denies it), ``stopped``.
+rig that takes more processor time than the limit [s] is stopped and counts as a miss. A miss is told with its
+cause: ``not screened`` (the right effect is not among the candidates confirmed), ``bad optimum`` (its fit
+errs more than the true structure fitted from the truth does), ``lost on evidence``, ``refused`` (it comes
+first, the verdict denies it), ``stopped``.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import multiprocessing
 import os
 import sys
@@ -86,6 +87,11 @@ def _one(rig):
     return row, found.model if best is None else best.model
 
 
+def _apart(a, b, turns):
+    """Return how far two values lie apart; angles of a wave by the shorter way round."""
+    return abs(math.remainder(a - b, 2 * math.pi)) if turns else abs(a - b)
+
+
 def _held_values(rig, found):
     """Return for each parameter of the effect found how many standard errors it is off."""
     truth = rig.truth.named_effects[rig.truth.newest]
@@ -93,7 +99,8 @@ def _held_values(rig, found):
     for name, error in found.errors.items():
         value = getattr(truth, name, None)
         if value is not None and np.isfinite(error) and error > 0:
-            off.append(abs(found.parameters[name] - value) / error)
+            turns = truth.parameters[name].unit == "rad" or name == "angle0"
+            off.append(_apart(found.parameters[name], value, turns) / error)
     return off
 
 
@@ -118,7 +125,7 @@ def _beside_truth(rig, model, right):
     true_values = {k: p.value for k, p in rig.truth.parameters.items()}
     row: dict = dict(
         off=[
-            abs(p.value - true_values[k]) / p.standard_error
+            _apart(p.value, true_values[k], k.endswith((".phase", ".angle0"))) / p.standard_error
             for k, p in truth.parameters.items()
             if p.identifiable and not p.at_bound and np.isfinite(p.standard_error) and p.standard_error > 0
         ]
@@ -154,17 +161,9 @@ def _cause(row):
 
 
 def _peers(rig):
-    from second_peers import PEERS
+    from second_peers import PEERS, told
 
-    right = rig.accepted[rig.hidden[0]] if rig.hidden else set()
-    said = {}
-    for name, peer in PEERS.items():
-        try:
-            named = set(peer(rig))
-        except (ValueError, ArithmeticError, IndexError):
-            named = {"failed"}
-        said[name] = bool(named & right) if right else not named
-    return said
+    return {name: told(peer, rig) for name, peer in PEERS.items()}
 
 
 # --- one process that can be stopped -----------------------------------------------------------------------
@@ -187,6 +186,15 @@ def _plain(value):
     return value.item() if hasattr(value, "item") else str(value)
 
 
+def _work(pid):
+    """Return the processor time of a process [s]; the clock where that is not to be had."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return time.perf_counter()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 class Worker:
     """A process that judges one rig after the other."""
 
@@ -201,9 +209,11 @@ class Worker:
             self.process = context.Process(target=_worker, args=(theirs, self.peers), daemon=True)
             self.process.start()
         self.pipe.send(job)
+        before = _work(self.process.pid)
         try:
-            if self.pipe.poll(limit):
-                return json.loads(self.pipe.recv())
+            while _work(self.process.pid) - before < limit:
+                if self.pipe.poll(1.0):
+                    return json.loads(self.pipe.recv())
         except EOFError:
             pass
         self.close()

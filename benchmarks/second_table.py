@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import binomtest
 
+EDGE = 5.5  # times the noise: what is hidden shows little below, clearly above
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0)
 
 
@@ -21,6 +22,11 @@ def answered(row):
     return "verdict" in row
 
 
+def shown(row):
+    """Return how much of what is hidden shows, in times the noise; nan where nothing is known of the rig."""
+    return row.get("facts", {}).get("shows", [float("nan")])[0]
+
+
 def table(rows):
     """Return the results as markdown."""
     of = {
@@ -33,17 +39,17 @@ def table(rows):
             lines.append(f"| {name} | {demanded} | {share(sum(map(bool, map(key, part))), len(part))} |")
 
     singles = of["single"]
-    small = [r for r in singles if r.get("facts", {}).get("small")]
-    large = [r for r in singles if not r.get("facts", {}).get("small")]
+    small = [r for r in singles if 0 < shown(r) < EDGE]
+    large = [r for r in singles if shown(r) >= EDGE or not answered(r)]
     line("one hidden, all: first", "95 %", singles, lambda r: r.get("first"))
+    line("the same, by one name and no other", "", singles, lambda r: r.get("strict"))
     line("one hidden, over 5 times the noise: first", "95 %", large, lambda r: r.get("first"))
     line(
         "the same: among the first three, or in the ambiguous class", "99 %", large, lambda r: r.get("three")
     )
-    line("the same in open loop: first", "", [r for r in large if "facts" in r and not r["facts"]["closed"]],
-         lambda r: r.get("first"))  # fmt: skip
-    line("the same under a PID: first", "", [r for r in large if "facts" in r and r["facts"]["closed"]],
-         lambda r: r.get("first"))  # fmt: skip
+    for closed, where in ((False, "in open loop"), (True, "under a PID")):
+        part = [r for r in large if r.get("facts", {}).get("closed") is closed]
+        line(f"the same {where}: first", "", part, lambda r: r.get("first"))
     line("1.5 to 5 times the noise: right, or honestly ambiguous or none", "95 %", small, honest)
     line("the same: wrong with p > 0.9", "≤ 1 %", small,
          lambda r: r.get("verdict") == "effect" and not r["first"] and r["said"] > 0.9)  # fmt: skip

@@ -99,6 +99,13 @@ def _parser() -> argparse.ArgumentParser:
     better.add_argument("--model", required=True, metavar="MODEL.toml")
     better.add_argument("--report", metavar="OUT.html", help="write one self-contained HTML page")
     better.add_argument("--json", action="store_true", help="machine-readable answer")
+    better.add_argument(
+        "--budget", type=float, metavar="SECONDS", help="return the best known after so many seconds"
+    )
+    better.add_argument(
+        "--progress", action=argparse.BooleanOptionalAction, default=None,
+        help="tell on stderr what is being done (default: where that is a terminal)",
+    )  # fmt: skip
     better.set_defaults(run=_improve)
     return parser
 
@@ -181,7 +188,7 @@ def _improve(options) -> int:
         place_to_write("improve", "--report", options.report)
     columns = {"time": "t", "input": "r" if model.closed_loop else "F", "output": "x", **model.columns}
     record = Measurement.from_csv(options.data, **columns)
-    study = improve(_subject(model), record)
+    study = improve(_subject(model), record, budget=options.budget, progress=options.progress)
     if options.report:
         study.report(options.report)
     if options.json:
@@ -212,6 +219,7 @@ def _study(study) -> dict[str, Any]:
     block = getattr(getattr(study.model, "parts", None), "block", study.model)
     return {
         "verdict": study.verdict,
+        "status": study.status,
         "steps": steps,
         "model": repr(block),
         "parameters": _parameters(getattr(block, "parameters", {})),

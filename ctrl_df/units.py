@@ -30,6 +30,10 @@ _define("in", 0.0254, {"m": 1})
 _define("inch", 0.0254, {"m": 1})
 _define("N", 1.0, {"N": 1}, "uµμmkM")
 _define("lbf", 4.4482216152605, {"N": 1})
+_define("ozf", 4.4482216152605 / 16, {"N": 1})
+_define("oz", 4.4482216152605 / 16, {"N": 1})  # of motor makers: oz in is a torque
+_define("lb", 4.4482216152605, {"N": 1})  # likewise: lb in, lb ft
+_define("ft", 0.3048, {"m": 1})
 _define("kgf", 9.80665, {"N": 1})
 _define("Nm", 1.0, {"N": 1, "m": 1}, "uµμmk")
 _define("rad", 1.0, {"rad": 1}, "uµμm")
@@ -92,6 +96,11 @@ def _factor(unit: str, word: str) -> tuple[str, int]:
 
 
 def _unknown(unit: str) -> ValueError:
+    if re.search(r"count|cts|tick|puls|step|lsb|inc", unit, re.I):
+        return ValueError(
+            f"a unit must say how large it is; got {unit!r}. Convert counts of an encoder first: "
+            "angle = 2 pi counts / (counts a turn), in rad."
+        )
     known = ", ".join(k for k in _SYMBOLS if k and k not in "μ1-")
     return ValueError(f"a unit must be one of {known}, or made of these (mm/s, N s^2/m^2); got {unit!r}.")
 

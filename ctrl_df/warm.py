@@ -159,9 +159,18 @@ def _many_runs():
     batch_response(friction_mass(1, 1, 1), np.linspace(0, 1, 9), 2.0)
 
 
+def _imposed_motion():
+    from .blocks.effects import Coulomb
+    from .blocks.massless import Massless
+    from .simulate.imposed_response import imposed_response
+
+    imposed_response(Massless().with_effect(Coulomb(5.0)), np.linspace(0, 1, 9), np.linspace(0, 1, 9) ** 2)
+
+
 # the engine is compiled in the first stage, once; what calls it in the second
 STAGES = (
     {"simulation": _simulation, "backlash family": _backlash_family, "laws": _laws,
      "friction family": _friction_family},
-    {"general family": _general_family, "exact orbits": _orbit, "many runs": _many_runs},
+    {"general family": _general_family, "exact orbits": _orbit, "many runs": _many_runs,
+     "imposed motion": _imposed_motion},
 )  # fmt: skip

@@ -175,7 +175,7 @@ def main(folder, report=None):
             print("From where the test record begins:")
             print(line("its phase found again", again.model, train, test), flush=True)
 
-    # our own effect in place of what bends the friction; a tenth of a second at a time, as the slow wander of
+    # our own effect in place of what bends the friction; a tenth of a second at a time, as slow changes of
     # friction (a newton from one record to the other) drowns all else over longer windows
     plain = study.model.without_effect("stribeck") if "stribeck" in study.effects else study.model
     friction = published.parameters["coulomb.level"].value

@@ -150,7 +150,7 @@ class Setup:
         if self.closed_loop:
             return reference(self.rng, kind, self)
         u = excite(self.rng, kind, self)
-        # A free inertia wanders off; a small constant force keeps the base model in place on the whole.
+        # A free inertia drifts away; a small constant force keeps the base model in place on the whole.
         damping = self.base.get("viscous.coefficient", 0.0) + self.kinetic / self.speed
         for _ in range(
             3 if not ({"linear_spring.stiffness", "cubic_spring.stiffness"} & set(self.base)) else 0

@@ -23,6 +23,7 @@ RESULTS = {
     "identify.refit": ("Fit",),
     "identify.results.diagnosis": ("Diagnosis", "CandidateEffect"),
     "identify.results.ladder": ("Study",),
+    "identify.results.neighbours": ("Neighbours",),
 }
 MEMBERS = {name: getattr(cdf, name) for name in sorted(set(cdf.__all__))} | {
     name: getattr(importlib.import_module(f"ctrl_df.{room}"), name)

@@ -110,8 +110,11 @@ def test_what_leaves_no_trace_is_named():
     ],
 )
 def test_a_hidden_effect_is_named_from_its_print(name, added):
-    found = diagnose(user_block(), table(**added), candidates=FEW)
+    known = []
+    found = diagnose(user_block(), table(**added), candidates=FEW, callback=known.append)
+    assert known and {d.status for d in known} == {"under way"} and found.status == "complete"
     assert found.verdict == "effect", found.explanation
+    assert found.best.determined and found.best.error_by_horizon is None
     assert name in {found.best.id, *found.best.equivalents}
     assert found.best.nrmse_holdout < 0.006
     assert found.best.probability > 0.3 and found.best.evidence > 20

@@ -341,3 +341,22 @@ def test_it_travels_to_worker_processes():
     assert np.array_equal(again.channels["reference"], 2 * t)
     with pytest.raises(TypeError):
         again.channels["reference"] = t
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "si"),
+    [
+        ("oz in", 0.0070615518, "N m"),
+        ("lb ft", 1.3558179, "N m"),
+        ("ozf", 0.27801385, "N"),
+        ("ft/s", 0.3048, "m/s"),
+    ],
+)
+def test_units_of_motor_makers(unit, factor, si):
+    assert si_unit(unit) == (pytest.approx(factor, rel=1e-7), si)
+
+
+@pytest.mark.parametrize("unit", ["counts", "ticks", "encoder steps", "LSB"])
+def test_counts_are_no_unit(unit):
+    with pytest.raises(ValueError, match="Convert counts"):
+        si_unit(unit)

@@ -118,3 +118,18 @@ def test_comparisons_in_one_picture_need_one_record(pictures, record):
         whole.plot(beside=half)
     with pytest.raises(ValueError, match="width"):
         whole.plot(width=-1)
+
+
+def test_a_run_shows_units_events_and_where_it_sticks():
+    plt.close("all")
+    t = np.linspace(0, 2, 201)
+    run = cdf.event_response(cdf.friction_mass(9, 5, static=5.5), t, 7 * np.sin(3 * t))
+    drawn = run.plot(plot_inputs=True)
+    assert [ax.get_ylabel() for ax in drawn.axes[:, 0]] == ["x [m]", "v [m/s]", "F [N]"]
+    told = [text.get_text() for text in drawn.axes[0, 0].get_legend().get_texts()]
+    assert told == ["stuck", "stick", "breakaway"] and len(drawn.axes[0, 0].patches) == 2
+    assert "sys[" not in drawn.figure.get_suptitle()
+    plt.close("all")
+    plain = run.plot(events=False)
+    assert plain.axes[0, 0].get_legend() is None
+    plt.close("all")

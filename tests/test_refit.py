@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import rigs
 
+import ctrl_df as cdf
 from ctrl_df.blocks.effects import InputGain, QuadraticDrag, SensorQuantization
 from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
@@ -110,3 +111,16 @@ def test_errors_name_the_remedy():
         refit(block, [1, 2])
     with pytest.raises(ValueError, match="mode must be one of"):
         refit(block, record, mode="long")
+
+
+def test_a_fit_tells_what_is_correlated():
+    """Motion at nearly constant speed: Coulomb and viscous friction are hardly told apart."""
+    t = np.arange(0, 4, 0.01)
+    force = 8.0 + 0.4 * np.sin(5 * t)
+    machine = cdf.friction_mass(1.0, 3.0, 5.0)
+    x = np.asarray(cdf.event_response(machine, t, force, [0, 1.0], input_hold="zoh").outputs)[0]
+    record = cdf.Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
+    fit = cdf.refit(machine, record, ["coulomb.level", "viscous.coefficient"])
+    first, second, r = fit.correlated(0.9)[0]
+    assert {first, second} == {"coulomb.level", "viscous.coefficient"} and r < -0.95
+    assert np.allclose(np.diag(fit.correlation), 1) and "are correlated: -1.000" in fit.report()

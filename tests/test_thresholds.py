@@ -9,6 +9,7 @@ from ctrl_df.identify import thresholds
 
 ELSEWHERE = {
     "_PREPARED",  # a size of memory
+    "OUTPUT_COLUMNS",  # where an engine puts out what
     "_SPEEDS",  # where laws are probed
 }
 

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-import time
-
 from ..checks import executor as checked_executor
 from ..checks import unknown_keywords
 from .arguments import check_limits, check_quantities, effect_classes, free_parameters, mechanism_of
+from .course import Course
 from .datasets.choice import dataset_of
 from .results.diagnosis import Diagnosis
-from .selection.verdict import verdict_of
+from .selection.verdict import diagnosed
 
 __all__ = ["Diagnosis", "diagnose"]
 
 
 def diagnose(
-    model, data, *, holdout=None, candidates=None, free=None, executor=None, limits=None, **keywords
+    model,
+    data,
+    *,
+    holdout=None,
+    candidates=None,
+    free=None,
+    executor=None,
+    limits=None,
+    progress=None,
+    callback=None,
+    budget=None,
+    **keywords,
 ) -> Diagnosis:
     """Find the effect that a model misses.
 
@@ -41,16 +51,27 @@ def diagnose(
         Runs candidates side by side; None: threads of this process do.
     limits : mapping or None
         ``force`` [N] and ``stroke`` [m] for `next_experiment`.
+    progress : bool, callable or None
+        Whether to tell on stderr what is being done (None: where that is a terminal); or a function that
+        takes a line of text. The logger ``ctrl_df`` has the same lines.
+    callback : callable or None
+        Takes the `Diagnosis` as it stands, first once every effect is screened: within seconds. What it
+        raises ends the diagnosis.
+    budget : float or None
+        Seconds after which the diagnosis returns what is known, its `status` ``"budget spent"``; the
+        screened ranking is waited for in any case. None: as many as it takes.
 
     Returns
     -------
     Diagnosis
-        For tables a `FrequencyDiagnosis`.
+        For tables a `FrequencyDiagnosis`. Ctrl-C returns what is known, its `status` ``"interrupted"``.
 
     Raises
     ------
     TypeError, ValueError
         Data that are no measurements, an unknown effect id, a model that is no block.
+    KeyboardInterrupt
+        Ctrl-C before anything is known.
 
     Examples
     --------
@@ -68,9 +89,14 @@ def diagnose(
     checked_executor("diagnose", executor)
     check_limits(limits)
     classes = effect_classes(candidates)
-    began = time.perf_counter()
+    course = Course("diagnose", progress, callback, budget)
     dataset = dataset_of(data, holdout)
     block = mechanism_of(model)
     check_quantities(block, (*dataset.records, *dataset.validation))
-    search = dataset.search(block, free_parameters(block, free))
-    return verdict_of(search, search.candidates(classes, executor), began, limits)
+    names = free_parameters(block, free)
+
+    def work():
+        course.stage("the model refitted")
+        return diagnosed(dataset.search(block, names), classes, executor, course, limits)
+
+    return course.run(work)

@@ -1,27 +1,37 @@
-"""The ladder: one effect at a time while held-out error falls beyond noise."""
+"""The ladder: one effect at a time while held-out error falls beyond noise, and back where it was wrong."""
 
 from __future__ import annotations
-
-import time
-from dataclasses import replace
 
 from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
 from .arguments import check_quantities, effect_classes, free_parameters, mechanism_of
+from .course import Course
 from .datasets.choice import dataset_of
-from .results.diagnosis import NONE
-from .results.ladder import Step, Study, last_diagnosis, outcome
-from .selection.revision import Revision, revised
-from .selection.verdict import verdict_of, worth
-from .thresholds import RIVALS
+from .results.ladder import Step, Study
+from .selection.ladder import Climb
 
 __all__ = ["Step", "Study", "improve"]
 
 
 def improve(
-    model, train, holdout=None, max_effects=5, *, candidates=None, free=None, executor=None, **keywords
+    model,
+    train,
+    holdout=None,
+    max_effects=5,
+    *,
+    candidates=None,
+    free=None,
+    executor=None,
+    progress=None,
+    callback=None,
+    budget=None,
+    **keywords,
 ) -> Study:
     """Add the effects a model misses, one at a time, as long as held-out error falls beyond noise.
+
+    After each, those added before are looked at again; at the end every model one exchange away is tried
+    (`Study.neighbours`), and the ladder goes on from one that is better, or as good and plainer. What
+    the model given has stays.
 
     Parameters
     ----------
@@ -33,12 +43,23 @@ def improve(
         Records to confirm on; None: every third part of the training records, or point of the tables.
     max_effects : int
         Longest ladder, >= 0.
-    candidates, free, executor
+    candidates, free, executor, progress
         As for `diagnose`.
+    callback : callable or None
+        Takes the `Study` as it stands, first within seconds. What it raises ends the ladder.
+    budget : float or None
+        Seconds after which the ladder returns what is known, its `status` ``"budget spent"``; the first
+        screened ranking is waited for in any case. None: as many as it takes.
 
     Returns
     -------
     Study
+        Ctrl-C returns what is known, its `status` ``"interrupted"``.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C before anything is known.
 
     Examples
     --------
@@ -55,49 +76,14 @@ def improve(
     unknown_keywords(keywords)
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
-    began = time.perf_counter()
+    course = Course("improve", progress, callback, budget)
     dataset = dataset_of(train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
     kept = frozenset(start.parameters) - set(free_parameters(start, free))
-    rivals: dict[str, list] = {}
-    steps: list[Step] = []
-    added, revision = None, Revision(start)
-    while True:
-        asked, block = time.perf_counter(), revision.block
-        search = dataset.search(block, [k for k in free_parameters(block) if k not in kept])
-        found = verdict_of(
-            search, search.candidates(classes, executor) if len(steps) < max_effects else [], asked
-        )
-        steps.append(_step(found, added, revision))
-        best = found.ranking[0] if found.ranking else None
-        if best is None or found.verdict == NONE or not worth(best, search):
-            break
-        confirmed = [c.effect for c in found.ranking[1:] if c.confirmed and c.evidence > search.significant]
-        rivals[best.model.newest] = confirmed[:RIVALS]
-        added, revision = best, revised(best.model, start, search, kept, rivals)
-    again = search.final([s.model for s in steps], kept)
-    if again is not None:
-        steps = [
-            replace(
-                s, model=m, nrmse=e, nrmse_holdout=h, parameters={k: p.value for k, p in m.parameters.items()}
-            )
-            for s, (m, e, h) in zip(steps, again, strict=True)
-        ]
-    noise = search.relative(last_diagnosis(steps).noise)
-    return Study(
-        tuple(steps), steps[-1].model, outcome(steps), noise, start, dataset.records, dataset.validation,
-        time.perf_counter() - began,
-    )  # fmt: skip
 
+    def free_of(block) -> list[str]:
+        return [k for k in free_parameters(block) if k not in kept]
 
-def _step(found, added, revision: Revision) -> Step:
-    effect, evidence, same = ("", 0.0, ()) if added is None else (added.id, added.evidence, added.equivalents)
-    return Step(
-        effect, revision.dropped, found.model, found.nrmse, found.nrmse_holdout, evidence,
-        _values(found.model), same, found, revision.instead,
-    )  # fmt: skip
-
-
-def _values(model) -> dict[str, float]:
-    return {k: p.value for k, p in model.parameters.items()}
+    climb = Climb(dataset, start, classes, free_of, max_effects, executor, course)
+    return course.run(climb.to_the_end)

@@ -3,73 +3,16 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
 import math
-from string import Template
+from pathlib import Path
 
 from ..checks import place_to_write
-
-_PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title>
-<style>
-:root { --ink: #1b2430; --soft: #5b6675; --line: #dfe4ea; --blue: #1f4e9c; --paper: #fff; }
-* { box-sizing: border-box; }
-body { font: 16px/1.55 system-ui, "Segoe UI", Arial, sans-serif; color: var(--ink); background: #f4f6f8;
-  margin: 0; overflow-wrap: break-word; }
-main { max-width: 60rem; margin: 0 auto; padding: 2.5rem 1.5rem 4rem; background: var(--paper); }
-h1 { font-size: 1.75rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.2rem; margin: 2.4rem 0 .6rem; padding-top: .8rem; border-top: 1px solid var(--line); }
-p.lead { font-size: 1.08rem; border-left: 4px solid var(--blue); padding: .2rem 0 .2rem 1rem;
-  margin: 1.2rem 0; }
-.verdict { display: inline-block; background: var(--blue); color: #fff; border-radius: 3px;
-  padding: .1rem .6rem; }
-.soft { color: var(--soft); font-size: .92rem; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: .93rem; font-variant-numeric: tabular-nums; }
-th { text-align: left; color: var(--soft); font-weight: 600; border-bottom: 2px solid var(--line);
-  padding: .35rem .6rem; white-space: nowrap; }
-td { border-bottom: 1px solid var(--line); padding: .35rem .6rem; vertical-align: top; }
-td:first-child { min-width: 8.5rem; }
-td.n, th.n { text-align: right; white-space: nowrap; }
-figure { margin: 1rem 0; }
-img { max-width: 100%; height: auto; display: block; margin: 0 auto; }
-figcaption { color: var(--soft); font-size: .92rem; text-align: center; }
-details { margin: .6rem 0; border: 1px solid var(--line); border-radius: 4px; padding: .3rem .9rem; }
-summary { cursor: pointer; font-weight: 600; padding: .3rem 0; }
-@media (max-width: 40rem) {
-  main { padding: 1.2rem .9rem 2.5rem; } h1 { font-size: 1.35rem; }
-  figure { overflow-x: auto; } img { min-width: 34rem; }
-  td, th { padding: .3rem .4rem; }
-}
-@media print { body { background: #fff; } main { padding: 0; } }
-</style></head><body><main>
-<h1>$title</h1>
-<p class="soft">$records</p>
-<p><span class="verdict">$verdict</span></p>
-<p class="lead">$lead</p>
-<h2>The ladder</h2>
-<p>$how</p>
-$ladder
-<div class="scroll">$steps</div>
-<h2>Model and measurement</h2>
-$pictures
-<h2>The model</h2>
-<p>$model</p>
-<div class="scroll">$parameters</div>
-$doubts
-<h2>Step by step</h2>
-$sections
-<p class="soft">$closing</p>
-</main></body></html>
-""")
 
 _ERRORS = {
     "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
-    "model has, such as friction that wanders, are larger here than the noise of the sensor",
+    "model has, such as friction that varies, are larger here than the noise of the sensor",
     "N": "of |N|",
 }
 
@@ -97,34 +40,28 @@ def write_report(study, path) -> str:
 
 def render(study) -> str:
     """Return the report as HTML text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    folder = FileSystemLoader(Path(__file__).parent, encoding="utf-8")
+    page = Environment(loader=folder, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     names = ", ".join(_record(r) for r in study.train)
     held = ", ".join(_record(r) for r in study.holdout) or "a third of the same data"
-    fit = _known(study)
-    return _PAGE.substitute(
-        title=html.escape(f"What the model of {study.train[0].name} was missing"),
-        records=html.escape(f"Fitted to {names}. Held out: {held}."),
+    fit, drawn = _known(study), _drawn(study)
+    return page.get_template("report.html").render(
+        title=f"What the model of {study.train[0].name} was missing",
+        records=f"Fitted to {names}. Held out: {held}.",
         verdict=_VERDICTS[study.verdict],
-        lead=html.escape(study.summary().split("\n")[0]),
-        how=html.escape(
-            "Each step adds the effect that explains most of what is left, and refits everything. It stays "
-            "only if the error on data it was not fitted to falls too. Errors are rms "
-            f"{_ERRORS[study.measure]}."
-        ),
+        lead=study.summary().split("\n")[0],
+        errors=_ERRORS[study.measure],
+        as_drawn=f"over {drawn[0].over}, of {_shown(study).name} alone",
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
-        steps=_steps(study),
-        pictures=_pictures(study),
-        model=html.escape(
-            "A standard error is how far the value may be off by chance alone; two of them hold 95 % of the "
-            "time if the structure is right."
-        ),
+        steps=_steps(study, drawn),
+        pictures=_pictures(study, drawn),
         parameters=_parameters(study, fit),
-        doubts="".join(f"<p>{html.escape(s)}</p>" for s in fit.unidentifiable) if fit else "",
-        sections="\n".join(_section(i, s) for i, s in enumerate(study.steps)),
-        closing=html.escape(
-            "Evidence is the logarithm of the likelihood ratio over the step before, in nats, less Schwarz's "
-            "price of the parameters; twenty nats are half a billion to one. "
-            f"Computed in {study.seconds:.0f} s."
-        ),
+        doubts=fit.unidentifiable if fit else (),
+        neighbours=_neighbours(study.neighbours),
+        sections=[_section(i, s) for i, s in enumerate(study.steps) if s.diagnosis and s.diagnosis.ranking],
+        seconds=f"{study.seconds:.0f}",
     )
 
 
@@ -146,56 +83,78 @@ def _known(study):
         return None
 
 
-def _steps(study):
-    rows = []
-    for s in study.steps:
-        name = "+ " + s.effect.replace("_", " ") if s.effect else "start, refitted"
-        name += "".join(f"; without {d.replace('_', ' ')}" for d in s.dropped)
-        name += "".join(f", {d.replace('_', ' ')} in its place" for d in s.instead)
+def _shown(study):
+    """Return the record of the pictures: one held out, or fitted."""
+    return (study.holdout or study.train)[0]
+
+
+def _drawn(study) -> list:
+    """Return the first and the last model beside the record of the pictures."""
+    from .compare import compare
+
+    models = [study.steps[0].model, study.model][: len(study.steps)]
+    return [compare(model, _shown(study)) for model in models]
+
+
+def _steps(study, drawn):
+    """Return the table of the steps; `drawn`: the comparisons of the pictures, whose numbers it repeats."""
+    rows, last = [], len(study.steps) - 1
+    for i, s in enumerate(study.steps):
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
-        evidence = f"{s.evidence:,.0f}" if s.effect else "–"
-        rows.append([name, _percent(s.nrmse), _percent(s.nrmse_holdout), evidence, same])
-    rows.append(["noise floor", _percent(study.noise), "", "", ""])
-    return _table(["Step", "Error", "Held out", "Evidence", "Same on these data"], rows, numeric=(1, 2, 3))
+        evidence = f"{s.evidence:,.0f}" if s.effect or s.changes else "–"
+        seen = _percent(drawn[0 if i == 0 else -1].nrmse) if i in (0, last) else "–"
+        rows.append([_did(s), _percent(s.nrmse), _percent(s.nrmse_holdout), seen, evidence, same])
+    rows.append(["noise floor", _percent(study.noise), "", "", "", ""])
+    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Same on these data"]
+    return _table(head, rows, numeric=(1, 2, 3, 4))
+
+
+def _did(step) -> str:
+    """Return what a step did, in words."""
+    added = [f"+ {_words(step.effect)}"] if step.effect else []
+    gone, new = " and ".join(map(_words, step.dropped)), " and ".join(map(_words, step.instead))
+    if new:
+        added.append(f"{new} in place of {gone}" if gone else f"with {new}")
+    elif gone:
+        added.append(f"without {gone}")
+    return "; ".join(added) or "start, refitted"
+
+
+def _neighbours(neighbours) -> dict | None:
+    """Return the final model beside all that are one exchange away: a sentence, the nearest, and the rest."""
+    if not neighbours:
+        return None
+    rows = [list(row) for row in neighbours.table(len(neighbours)).rows]
+    head = ["Neighbour", "Evidence", "Error", "Held out", "Verdict"]
+    near, far = (_table(head, some, numeric=(1, 2, 3)) for some in (rows[:10], rows[10:]))
+    return {"sentence": neighbours.sentence, "near": near, "far": far}
 
 
 def _percent(value) -> str:
     return f"{100 * value:.3g} %" if math.isfinite(value) else "–"
 
 
-def _pictures(study):
-    """Compare the first and the last model with the record held out, or the training record."""
-    from .compare import compare
-
-    record = (study.holdout or study.train)[0]
+def _pictures(study, drawn):
+    """Draw the first and the last model beside the record held out, or the training record."""
     parts = []
-    for model, name in ((study.steps[0].model, "The start, refitted"), (study.model, "The improved model")):
-        if parts and len(study.steps) == 1:
-            break
-        comparison = compare(model, record)
-        caption = f"{name}, on {record.name}. {comparison.where.sentences[0]}"
-        parts.append(_picture(lambda c=comparison, n=name: c.plot(title=n), caption, caption=True))
-    return "\n".join(parts)
+    for comparison, name in zip(drawn, ("The start, refitted", "The improved model"), strict=False):
+        caption = (
+            f"{name}, on {_shown(study).name}: it errs by {_percent(comparison.nrmse)} over "
+            f"{comparison.over}. {comparison.places[0]}"
+        )
+        parts.append(_picture(lambda c=comparison, n=name, **size: c.plot(title=n, **size), caption))
+    return parts
 
 
-def _section(number, step):
+def _section(number, step) -> dict:
+    """Return what a step's diagnosis said."""
     d = step.diagnosis
-    if d is None or not d.ranking:
-        return ""
-    title = (
-        "What the start is missing"
-        if number == 0
-        else f"What is missing after {step.effect.replace('_', ' ')}"
-    )
-    body = [
-        f"<details{' open' if number == 0 else ''}><summary>{html.escape(title)}</summary>",
-        f"<p>{html.escape(d.explanation)}</p>",
-        _picture(d.plot, "Held-out error of every candidate"),
-    ]
-    if d.where is not None and d.where.significant:
-        lines = "".join(f"<li>{html.escape(r.sentence)}</li>" for r in d.where.significant[:4])
-        body.append(f"<p>Where the error is:</p><ul>{lines}</ul>")
-    return "\n".join([*body, "</details>"])
+    return {
+        "title": "What the start is missing" if number == 0 else f"What is missing after: {_did(step)}",
+        "explanation": d.explanation,
+        "picture": _picture(d.plot, "Held-out error of every candidate"),
+        "where": [r.sentence for r in d.where.significant[:4]] if d.where is not None else [],
+    }
 
 
 def _parameters(study, fit):
@@ -220,30 +179,20 @@ def _words(name) -> str:
     return f"{effect}: {parameter}".replace("_", " ") if effect else parameter.replace("_", " ")
 
 
-def _table(head, rows, numeric=()):
-    def cell(tag, i, text):
-        kind = ' class="n"' if i in numeric else ""
-        return f"<{tag}{kind}>{html.escape(str(text))}</{tag}>"
-
-    top = "".join(cell("th", i, h) for i, h in enumerate(head))
-    body = "".join("<tr>" + "".join(cell("td", i, c) for i, c in enumerate(row)) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+def _table(head, rows, numeric=()) -> dict:
+    """Return a table as the template takes it; `numeric`: columns of numbers."""
+    return {"head": head, "rows": rows, "numeric": numeric}
 
 
-def _picture(draw, text, caption=False):
-    """Draw into a figure of its own and return it as an inline PNG."""
+def _picture(draw, text) -> dict:
+    """Draw into a figure of its own and return it as an inline PNG, with what it shows."""
     import matplotlib.pyplot as plt
 
     open_before = plt.get_fignums()
-    fig = plt.figure()
+    buffer = io.BytesIO()
     try:
-        drawn = draw().figure
-        buffer = io.BytesIO()
-        drawn.savefig(buffer, format="png", dpi=130)
+        draw(width=8.0).figure.savefig(buffer, format="png", dpi=130)
     finally:
         for number in set(plt.get_fignums()) - set(open_before):
             plt.close(number)
-        plt.close(fig)
-    data = base64.b64encode(buffer.getvalue()).decode("ascii")
-    below = f"<figcaption>{html.escape(text)}</figcaption>" if caption else ""
-    return f'<figure><img alt="{html.escape(text)}" src="data:image/png;base64,{data}">{below}</figure>'
+    return {"png": base64.b64encode(buffer.getvalue()).decode("ascii"), "text": text}

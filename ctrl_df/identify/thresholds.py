@@ -90,6 +90,13 @@ EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 LEFT = 0.2
 """Share of the structure (rms) that the best candidate may leave: 4 % of its power (rigs)."""
 
+SIZE_KNOWN = 0.5
+"""Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
+
+UNMOVED = 0.5
+"""Error over the shortest segments, of the output's rms, beyond which a model explains no motion: one that
+stands still at a fitted place and speed errs by as much over half a turn of a sine."""
+
 NOISIER = 1.4
 """Error on held-out segments over that on fitted ones that may be chance (rigs)."""
 
@@ -159,6 +166,13 @@ FILTERED = 40
 MANY_SEGMENTS = 50
 """Segments of a record from which on they tell how their errors go on from one to the next."""
 
+HORIZONS = 8
+"""Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
+shortest."""
+
+SHORTEST_HORIZON = 0.25
+"""The shortest, in to-and-fro motions: over less the fitted position and speed follow nearly anything."""
+
 HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
 
@@ -177,6 +191,10 @@ SPECTRUM_SAMPLES = 25_000
 CONFIRMED = 6
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best."""
 
+OUTLASTING = 2
+"""Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
+comparison at eight lengths."""
+
 CONFIRMED_FORCED = 10
 """The same where disturbance forces let the first look tell little."""
 
@@ -187,7 +205,11 @@ POINTS, POINTS_COSTLY = 20, 10
 """Points of a table for the first look, and for effects whose orbits take many times as long."""
 
 RIVALS = 2
-"""Candidates of a step of a ladder that are tried again when a later step is taken."""
+"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
+
+BRANCHES = 3
+"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
+hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
 
 BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
 """Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load
@@ -231,6 +253,10 @@ FINER = 3
 
 REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 """Travel after a reversal [typical positions] over which a force may build up."""
+
+HIDDEN_RTOL = 1e-6
+"""Tolerance of hidden states under an imposed motion: far below a load cell's noise, and three times as
+fast as seven digits."""
 
 TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 """Sizes of an effect of which nothing is known, over those of the table."""

@@ -66,9 +66,10 @@ def comparison_plot(
         top.set_ylabel(f"{_said(chosen)} [{unit}]")
         top.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{size * value:.4g}"))
         below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
-        told = f"nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %"
+        over = "free run" if chosen.windows == 1 else f"{chosen.windows} windows"
+        told = f"{over}: nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %"
         if len(models) > 1:
-            told = "nrmse " + ", ".join(f"{m.nrmse:.3g}" for m in models)
+            told = f"{over}: nrmse " + ", ".join(f"{m.nrmse:.3g}" for m in models)
         legend_above(top, told)
         white = chosen.white
         below.set_title(

@@ -6,6 +6,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..identify.results.diagnosis import rivals
 from .labels import settle
 from .page import MODEL, OTHER, QUIET, page
 
@@ -28,20 +29,33 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> 
         ax = drawn.panels(1)[0]
         bars = draw_ranking(ax, diagnosis, rows)
         of = "acceleration" if diagnosis.measure == "acceleration" else "output"
-        ax.set_xlabel(f"held-out error, rms over rms of the {of} [%]")
+        what = "held-out error" if errors_shown(diagnosis) == "nrmse_holdout" else "error"
+        ax.set_xlabel(f"{what}, rms over rms of the {of} [%]")
         return drawn.finished([bars], verdict_title(diagnosis, title))
 
 
+def errors_shown(diagnosis) -> str:
+    """Return which errors are drawn: the held-out ones, unless the diagnosis ended before it knew them."""
+    return "nrmse_holdout" if np.isfinite(diagnosis.nrmse_holdout) else "nrmse"
+
+
 def verdict_title(diagnosis, title) -> str:
-    """Return the title given, or the verdict."""
-    return f"Verdict: {diagnosis.verdict}" if title is None else title
+    """Return the title given, or the verdict in words."""
+    if title is not None:
+        return title
+    if diagnosis.verdict not in ("effect", "ambiguous") or not diagnosis.ranking:
+        return {"none": "Nothing missing"}.get(diagnosis.verdict, "Missing: something outside the library")
+    open_ones = rivals(diagnosis.ranking) if diagnosis.verdict == "ambiguous" else []
+    names = [c.id.replace("_", " ") for c in (diagnosis.ranking[0], *open_ones)]
+    return f"Missing: {' or '.join(dict.fromkeys(names))}"
 
 
 def draw_ranking(ax, diagnosis, rows):
     """Draw one bar a candidate, best on top; bars that leave the picture are cut and say their value."""
     shown = diagnosis.ranking[:rows]
     entries = [None, *shown]
-    values = 100 * np.array([diagnosis.nrmse_holdout, *(c.nrmse_holdout for c in shown)])
+    of = errors_shown(diagnosis)
+    values = 100 * np.array([getattr(d, of) for d in (diagnosis, *shown)])
     labels = ["nothing added", *(c.id.replace("_", " ") for c in shown)]
     shades = [QUIET] + [MODEL if c is diagnosis.best else OTHER for c in shown]
     # A candidate far worse than the model without it must not squeeze the others.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_MARKS = {"impact": "x", "stick": "s", "breakaway": "o", "reversal": "|", "contact": "v", "release": "^"}
+MARKS = {"impact": "x", "stick": "s", "breakaway": "o", "reversal": "|", "contact": "v", "release": "^"}
 _STUCK = "0.9"
 _MOST = 60
 """Events of a kind beyond which marks would cover the curve."""
@@ -13,7 +13,7 @@ _MOST = 60
 def mark_events(axis, events, time, y, *, without=(), window=None):
     """Mark events on a curve, each kind named once in the legend; kinds with very many are left out."""
     low, high = window or (time[0], time[-1])
-    for kind, mark in _MARKS.items():
+    for kind, mark in MARKS.items():
         at = [e.time for e in events if e.kind == kind and low <= e.time <= high]
         if at and kind not in without and len(at) <= _MOST:
             axis.plot(at, np.interp(at, time, y), mark, color="0.35", ms=4, label=kind, ls="none")

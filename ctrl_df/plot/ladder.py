@@ -41,26 +41,25 @@ def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
             ax.bar(at - 0.19, train, 0.36, color=OTHER, label="fitted data"),
             ax.bar(at + 0.19, held, 0.36, color=MODEL, label="held-out data"),
         ]
-        bottom = 0.5 * min(100 * study.noise, train.min(), held.min())
+        bottom = 0.5 * min(100 * study.noise, train.min(), np.nanmin([*held, *train]))
         noise = ax.axhspan(
             bottom, max(100 * study.noise, bottom * 1.001), color="0.88", zorder=0, label="noise"
         )
         ax.set_yscale("log")
-        ax.set_ylim(bottom, 2.2 * max(train.max(), held.max()))
+        ax.set_ylim(bottom, 2.2 * np.nanmax([*train, *held]))
         log_ticks(ax.yaxis, *ax.get_ylim())
         for x, a, b in zip(at, train, held, strict=True):
             ax.text(x - 0.19, a * 1.05, f"{a:.2g}", ha="center", fontsize=small)
-            ax.text(x + 0.19, b * 1.05, f"{b:.2g}", ha="center", fontsize=small)
+            if np.isfinite(b):  # a ladder that ended early may not have been tried on what is held out
+                ax.text(x + 0.19, b * 1.05, f"{b:.2g}", ha="center", fontsize=small)
         ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
-        names = ["refitted", *("+ " + s.effect.replace("_", " ") for s in steps[1:])]
         room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
-        ax.set_xticks(at, [_in_lines(n, s.changes, room) for n, s in zip(names, steps, strict=True)])
+        ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])
         ax.set_ylabel(OF[study.measure])
         legend_above(ax, "Error of every step" if title is None else title)
         return drawn.finished([*bars, [noise]])
 
 
-def _in_lines(name, changes, room) -> str:
+def _in_lines(parts, room) -> str:
     """Return what a step did, broken into lines of so many letters."""
-    parts = [name, *(f"{sign} {key.replace('_', ' ')}" for sign, key in changes)]
-    return "\n".join("\n".join(textwrap.wrap(part, room)) for part in parts)
+    return "\n".join("\n".join(textwrap.wrap(part.replace("_", " "), room)) for part in parts)

@@ -1,4 +1,4 @@
-"""Force and position of a simulated loop over time, as the paper draws them."""
+"""Simulated runs over time: as python-control draws them, with events; force and position as in the paper."""
 
 from __future__ import annotations
 
@@ -6,7 +6,51 @@ import control as ct
 import numpy as np
 
 from ..blocks.coordinates import AXIS, LINE
+from .events import MARKS, mark_events, shade_sticking
 from .page import legend_above, page
+
+
+def event_response_plot(run, *, fmt=(), events=True, **keywords) -> ct.ControlPlot:
+    """Draw an `EventResponse` as ``ct.time_response_plot`` does, with units and events.
+
+    Parameters
+    ----------
+    run : EventResponse
+    fmt : tuple
+        Format of the lines, as in matplotlib.
+    events : bool
+        Whether events are marked, and times of sticking shaded where a single body can stick.
+    **keywords
+        Of ``ct.time_response_plot``.
+
+    Returns
+    -------
+    ControlPlot
+        python-control's.
+    """
+    cplt = ct.time_response_plot(run, *fmt, **keywords)
+    marked = False
+    bodies = {e.subsystem for e in run.events if e.kind in ("stick", "breakaway")}
+    for ax in np.ravel(cplt.axes):
+        label = ax.get_ylabel().strip("$ ")
+        if label in run.signal_units:
+            ax.set_ylabel(f"{label} [{run.signal_units[label]}]")
+        if not events or label not in (run.output_labels or ()):
+            continue
+        if len(bodies) == 1:
+            shade_sticking(ax, run.events, run.time[0], run.time[-1])
+        if not marked:
+            y = np.reshape(run.outputs, (len(run.output_labels), -1, len(run.time)))
+            mark_events(ax, run.events, run.time, y[list(run.output_labels).index(label), 0])
+            marked = True
+            known = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+            kinds = {k: h for k, h in known.items() if k == "stuck" or k in MARKS}
+            if kinds:
+                ax.legend(
+                    kinds.values(), kinds.keys(), fontsize="x-small", ncols=len(kinds), frameon=False,
+                    loc="lower right", bbox_to_anchor=(1, 0.97), handletextpad=0.3, columnspacing=1.0,
+                )  # fmt: skip
+    return cplt
 
 
 def loop_response_plot(runs, *, labels=(), window=None, title=None, ax=None, width=None) -> ct.ControlPlot:

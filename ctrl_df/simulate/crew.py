@@ -1,13 +1,14 @@
-"""Jobs in Python side by side, each with all its runs in a thread of its own; all of them end at Ctrl-C."""
+"""Jobs in Python side by side, each with all its runs in a thread of its own; all end at Ctrl-C."""
 
 from __future__ import annotations
 
 import functools
 import os
 import threading
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from typing import Any, Protocol
 
 import numpy as np
 from numba.core import config
@@ -21,6 +22,57 @@ class Stopped(Exception):  # noqa: N818 - not an error: the thread that waits wa
 
 class Elsewhere(Exception):  # noqa: N818 - not an error: the job is done again
     """A job's runs call Python back: they belong in the thread that hears Ctrl-C."""
+
+
+class TimeUp(Exception):  # noqa: N818 - not an error: no more time was given
+    """Raised in the thread that waits when the time of its `Watch` is over and all jobs have stopped."""
+
+
+class Watch(Protocol):
+    """Who waits for the work of a thread."""
+
+    def left(self) -> float | None:
+        """Return how many seconds are left; None: as many as it takes."""
+        ...
+
+    def done(self) -> None:
+        """Hear that one job of many is done."""
+        ...
+
+
+@contextmanager
+def watched(watch: Watch) -> Iterator[None]:
+    """Let all work of this thread, and its jobs, be watched."""
+    before = getattr(_here, "watch", None)
+    _here.watch = watch
+    try:
+        yield
+    finally:
+        _here.watch = before
+
+
+def check() -> None:
+    """Raise `Stopped` or `TimeUp` where the work of this thread is to end; asked between units of work."""
+    stop = flag()
+    if stop is not None:
+        if stop[0]:
+            raise Stopped
+        return
+    seconds = left()
+    if seconds is not None and seconds <= 0:
+        raise TimeUp
+
+
+def left() -> float | None:
+    """Return how many seconds the work of this thread has; None: as many as it takes."""
+    watch = getattr(_here, "watch", None)
+    return None if watch is None else watch.left()
+
+
+def _done() -> None:
+    watch = getattr(_here, "watch", None)
+    if watch is not None:
+        watch.done()
 
 
 def processors() -> int:
@@ -46,20 +98,23 @@ def require_compiled(engine) -> None:
         raise Elsewhere
 
 
-def side_by_side(function: Callable, items: Iterable) -> list[Any]:
+def side_by_side(function: Callable, items: Iterable, executor: Executor | None = None) -> list[Any]:
     """Return what a function makes of every item, in their order, on all processors.
 
-    A job that calls side by side itself has its own done one after the other.
+    A job that calls side by side itself has its own done one after the other. `executor`: runs the jobs in
+    place of threads of this process; those begun are waited for.
 
     Raises
     ------
     KeyboardInterrupt
         Ctrl-C, once all jobs have stopped: with the run they are at, within a fraction of a second.
+    TimeUp
+        The time of this thread's `Watch` is over; jobs have stopped likewise.
     """
     items = list(items)
     threads = min(processors(), len(items))
-    if threads < 2 or flag() is not None:
-        return [function(item) for item in items]
+    if executor is None and (threads < 2 or flag() is not None):
+        return [_alone(function, item) for item in items]
     stop = np.zeros(1, np.int64)
 
     def job(item):
@@ -71,16 +126,30 @@ def side_by_side(function: Callable, items: Iterable) -> list[Any]:
         finally:
             _here.flag = None
 
-    jobs = [pool(os.getpid(), threads, "jobs").submit(job, item) for item in items]
+    check()
+    if executor is None:
+        jobs = [pool(os.getpid(), threads, "jobs").submit(job, item) for item in items]
+    else:
+        jobs = [executor.submit(function, item) for item in items]
     results = []
     try:
-        for item, done in zip(items, jobs, strict=True):
+        for item, awaited in zip(items, jobs, strict=True):
+            if not wait([awaited], left()).done:
+                raise TimeUp
             try:
-                results.append(done.result())
+                results.append(awaited.result())
             except Elsewhere:
                 results.append(function(item))
+            _done()
     except BaseException:
         stop[0] = 1
-        wait(jobs)
+        wait([begun for begun in jobs if not begun.cancel()])
         raise
     return results
+
+
+def _alone(function: Callable, item):
+    check()
+    result = function(item)
+    _done()
+    return result

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import control as ct
 import numpy as np
 
+from ..blocks.mechanism import Mechanism
 from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
+from ..drawing import draw
 from ..status import Status
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
 from .program import layout as L
@@ -28,6 +33,8 @@ class EventResponse(ct.TimeResponseData):
     status : Status
         How the simulation ended; anything but CONVERGED means that `time` ends early, at the last state that
         is right.
+    signal_units : dict
+        Unit of each signal by its label, as far as the blocks tell.
     propagated : int
         Steps between samples and outputs that were taken at once, by the constant matrices of a mode, where
         no event could lie inside: exactly where all laws are affine between events, else by an exponential
@@ -45,7 +52,22 @@ class EventResponse(ct.TimeResponseData):
     events: list[Event]
     event_count: int
     status: Status
+    signal_units: Mapping[str, str] = MappingProxyType({})
     propagated: int = 0
+
+    def plot(self, *args, **kwargs):
+        """Draw it as ``ct.time_response_plot`` does, with units, events, and times of sticking shaded.
+
+        Parameters
+        ----------
+        *args, **kwargs
+            Of ``ct.time_response_plot``; `events`, True unless told otherwise, marks them.
+
+        Returns
+        -------
+        control.ControlPlot
+        """
+        return draw("event response", self, fmt=args, **kwargs)
 
     def __repr__(self) -> str:
         """Return what was simulated: signals, span, events."""
@@ -170,13 +192,29 @@ def event_response(
         return_x=bool(return_states),
         squeeze=squeeze,
         sysname=system.name,
-        title=f"Event-located response of {system.name}",
+        title=_title(sys, system.name),
     )
+    response.signal_units = _units_of(sys)
     response.events = engine.name_events(run.events) if keep_events else []
     response.event_count = run.event_count
     response.status = run.status
     response.propagated = run.propagated
     return response
+
+
+def _units_of(sys) -> dict[str, str]:
+    """Return the units of a mechanism's signals, or of a loop about one."""
+    block = getattr(getattr(sys, "parts", None), "block", sys)
+    if not isinstance(block, Mechanism):
+        return {}
+    return dict(block.signals) | {"r": block.coordinates.unit}
+
+
+def _title(sys, name: str) -> str:
+    """Return a title; names that python-control numbers are none."""
+    if not re.fullmatch(r"sys\[\d+\]", name or "sys[0]"):
+        return f"Response of {name}"
+    return "Response of the closed loop" if hasattr(sys, "parts") else "Response"
 
 
 def misplaced(engine, par: np.ndarray, x0: np.ndarray) -> tuple[int, str] | None:

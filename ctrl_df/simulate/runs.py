@@ -120,7 +120,10 @@ def run_many(
     ------
     KeyboardInterrupt
         Ctrl-C, within a fraction of a second.
+    crew.Stopped, crew.TimeUp
+        Nobody waits for these runs any more.
     """
+    crew.check()
     runs = sum(len(g.runs) for g in groups)
     engine = groups[0].engine
     rows = _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine)
@@ -198,6 +201,8 @@ class _Work:
         workers = [crew.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)]
         try:
             for worker in workers:
+                if not wait([worker], crew.left()).done:
+                    raise crew.TimeUp
                 worker.result()
         except BaseException:
             self.stop[0] = 1

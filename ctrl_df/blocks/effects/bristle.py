@@ -67,9 +67,9 @@ class Bristle(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Return bristles that the friction bends by shares of the stroke, half damped."""
+        """Return bristles that friction bends by shares of the stroke (presliding: by more), half damped."""
         s = screen.scales
-        for bend in (0.001, 0.003, 0.01, 0.03, 0.1, 0.3):
+        for bend in (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0):
             k = max(screen.friction, 0.05 * s.force) / (bend * s.position)
             yield cls(k, 0.5 * math.sqrt(k * s.mass))
 

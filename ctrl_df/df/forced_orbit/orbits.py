@@ -333,7 +333,8 @@ class OrbitSolver(OrbitSearch):
                 self.touched |= bool(self._shoot(state, RTOL, 1, part) & TOUCH)
                 ends = self.shot.ends[:, self.row]
                 mean += self._coefficients(part[self.row], ends, 1, False) / length
-                y = np.abs(self.symmetries.transform @ state.x) / self._unit
+                with np.errstate(over="ignore"):  # a motion that runs away is seen by its size
+                    y = np.abs(self.symmetries.transform @ state.x) / self._unit
                 size += np.max(y[self.symmetries.free], initial=0.0) / length
             parts.append(mean)
             sizes.append(size)

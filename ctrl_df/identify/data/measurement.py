@@ -439,9 +439,9 @@ class Measurement:
         state = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()}
 
-    def __setstate__(self, state):
+    def __setstate__(self, given):
         """Take the fields back, read-only again."""
-        state: dict[str, Any] = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in state.items()}
+        state: dict[str, Any] = {k: _frozen(v) if isinstance(v, np.ndarray) else v for k, v in given.items()}
         state |= {k: MappingProxyType({n: _frozen(v) for n, v in state[k].items()}) for k in _CHANNELS}
         state["units"] = MappingProxyType(state["units"])
         for key, value in state.items():

@@ -18,7 +18,7 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
     H^-1, Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost
     degrees of freedom are given back. Errors that go on from one of many segments into the next (forces that
-    wander, whose trace in position every fitted start cuts off) are seen from the scores of the segments.
+    vary, whose trace in position every fitted start cuts off) are seen from the scores of the segments.
 
     Returns
     -------

@@ -10,12 +10,10 @@ from ...blocks.core import Core
 from ...simulate.imposed import imposed_forces
 from ...simulate.imposed_response import imposable
 from ..data.imposed import imposed_motion
+from ..thresholds import HIDDEN_RTOL
 from . import initial_states
 from .segments import Segments
 from .simulator import Simulator
-
-RTOL = 1e-6
-"""Of hidden states: far below the noise of any load cell, and three times as fast as seven digits."""
 
 
 class ImposedSimulator(Simulator):
@@ -59,7 +57,7 @@ class ImposedSimulator(Simulator):
         self.runs += len(asked)
         cores = [self._core(values) for _, values, _ in asked]
         z0 = np.array([self._begin(c, w, s) for c, (w, _, s) in zip(cores, asked, strict=True)])
-        forces, back, _ = imposed_forces(cores, self.motion.path, z0, rtol=RTOL)
+        forces, back, _ = imposed_forces(cores, self.motion.path, z0, rtol=HIDDEN_RTOL)
         at = self.motion.path.open
         # at rest dry friction may be anything between its two levels: no error within
         between = np.sort([forces[:, at], back], axis=0)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...simulate.crew import check
 from ..thresholds import GOOD
 from .initial_states import FREE
 from .noise_model import power
@@ -95,6 +96,7 @@ class Problem:
 
     def simulate(self, theta, nuisance) -> Signals:
         """Return the outputs within the segments."""
+        check()
         self.nfev += 1
         values = self.values(theta)
         return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.segments, nuisance, strict=True)]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ..thresholds import UNMOVED
+
 
 @dataclass(frozen=True, eq=False)
 class ComparisonBase:
@@ -39,6 +41,17 @@ class ComparisonBase:
     def where(self) -> Any:
         """Regions ranked by their share of the error."""
         raise NotImplementedError
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Where the error is, in sentences; of a model that misses the motion itself, that it does."""
+        worst = self.worst
+        if not worst.where.significant and worst.nrmse > UNMOVED:
+            return (
+                f"The model misses the motion as a whole: it errs by {worst.nrmse:.0%} of the measured, in "
+                "no region more than in others.",
+            )
+        return self.where.sentences
 
     def report(self) -> str:
         """Return the comparison as text."""

@@ -15,6 +15,7 @@ from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
 from ..estimation.segments import facts
 from ..residuals.comparison_base import ComparisonBase
+from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..residuals.regions import Regions, error_regions
 from ..residuals.residual_tests import (
     InputTest,
@@ -194,6 +195,14 @@ class Comparison(ComparisonBase):
         """The force that would have to be added for the model to follow the worst record."""
         return self.worst.missing_force
 
+    @cached_property
+    def error_by_horizon(self) -> ErrorByHorizon:
+        """Error of free prediction against its length, up to the whole record; seconds.
+
+        `ErrorByHorizon.plot` draws it, several models in one picture.
+        """
+        return error_by_horizon(self.model, [r.record for r in self.records])
+
     @property
     def windows(self) -> int:
         """Number of windows of all records together."""
@@ -203,6 +212,11 @@ class Comparison(ComparisonBase):
     def mode(self) -> str:
         """``free`` or ``windows``."""
         return "windows" if any(r.windows > 1 for r in self.records) else "free"
+
+    @property
+    def over(self) -> str:
+        """What the model was judged over, in words."""
+        return "a free run" if self.mode == "free" else f"{self.windows} windows"
 
     def report(self) -> str:
         """Return the comparison as text: each record, the tests, the regions."""
@@ -225,7 +239,7 @@ class Comparison(ComparisonBase):
                 )
             )
         if self.where:
-            lines += ["", *self.where.sentences[:6], "", self.where.table(8)]
+            lines += ["", *self.places[:6], "", self.where.table(8)]
         return "\n".join(lines)
 
     def __str__(self) -> str:

@@ -37,7 +37,7 @@ def explain(d, words) -> str:
         tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
         return (
             f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}{words.of}. "
-            f"{tried}{d.remains}"
+            + " ".join(filter(None, (tried.rstrip(), *d.doubts, d.remains)))
         )
     size = (
         f"{d.nrmse:.2%} to {first.nrmse:.2%}{words.of} (held out {d.nrmse_holdout:.2%} to "
@@ -51,14 +51,55 @@ def explain(d, words) -> str:
             + "."
         )
     if d.verdict == AMBIGUOUS:
-        names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [first, *rivals(d.ranking)])
+        open_ones = [first, *rivals(d.ranking)]
+        shared = [c for c in d.ranking if c not in open_ones and c.probability > 0.01]
+        names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [*open_ones, *shared])
+        doubts = "".join(f" {s}" for s in d.doubts)
         return (
             f"An effect is missing, and these {words.data} do not tell which: {names}. The first reduces the "
-            f"error from {size}.{same} next_experiment gives {words.separates} that would separate them."
+            f"error from {size}.{same}{doubts} next_experiment gives {words.separates} that would separate "
+            "them."
         )
     where, shows = places(d.where), words.shows.format(first.effect.shows)
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
         f"probability {certainty(d.ranking):.1%}.{same}"
         + (f" Before, {where[0].lower() + where[1:]}" if where else "")
+    )
+
+
+def falls_behind(first, long) -> str:
+    """Return how the first of a ranking does over long stretches (`Lasting`)."""
+    if long.horizon == 0:
+        return (
+            f"Predicting freely, hidden states going on, neither {named(first.effect)} nor any other follows "
+            f"the motion for long: over the shortest stretch it errs by {long.errors[first.id]:.0%}."
+        )
+    who = [(n.replace("_", " ") or "the model without it", long.errors[n]) for n in long.better]
+    others = " and ".join(f"{name} by {error:.2%}" for name, error in who)
+    return (
+        f"Predicting {long.horizon:.3g} s freely, hidden states going on, {named(first.effect)} errs by "
+        f"{long.errors[first.id]:.2%}, but {others}: that it follows short segments is no proof."
+    )
+
+
+def undetermined(first) -> str:
+    """Return which parameters of an effect the data do not determine."""
+    names = " and ".join(k.replace("_", " ") for k in first.undetermined)
+    return f"These data do not determine its {names}."
+
+
+def explain_so_far(d, words) -> str:
+    """Return what a `Diagnosis` under way knows."""
+    size = f"So far: with its parameters refitted the model errs by {d.nrmse:.2%}{words.of}"
+    if d.verdict == NONE:
+        return f"{size}; nothing is missing, as far as is known."
+    if d.verdict == UNKNOWN:
+        return f"{size}; no effect tried yet explains that."
+    first, *others = d.ranking[:4]
+    behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
+    how = "It is refitted and tried on what is held out" if first.confirmed else "None of them is confirmed"
+    return (
+        f"{size}; {named(first.effect)} explains most of that (it leaves {first.nrmse:.2%}){behind}. {how}; "
+        "the diagnosis is not complete."
     )

@@ -95,9 +95,23 @@ class Fit:
         """Residual over the centred output, both rms."""
         return self.comparison.nrmse
 
+    @property
+    def correlation(self) -> np.ndarray:
+        """Correlations of the free parameters, (p, p), in their order; NaN where an error is not known."""
+        errors = np.sqrt(np.diag(self.covariance))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.covariance / np.outer(errors, errors)
+
+    def correlated(self, beyond: float = 0.95) -> list[tuple[str, str, float]]:
+        """Return pairs of parameters that the data hardly tell apart, the strongest first."""
+        names, table = list(self.parameters), self.correlation
+        pairs = [(a, b, float(table[i, j])) for i, a in enumerate(names) for j, b in enumerate(names[:i])]
+        return sorted((p for p in pairs if abs(p[2]) > beyond), key=lambda p: -abs(p[2]))
+
     def report(self) -> str:
-        """Return parameters, doubts and the comparison as text."""
+        """Return parameters, correlations, doubts and the comparison as text."""
         lines = [str(p) for p in self.parameters.values()]
+        lines += [f"{a} and {b} are correlated: {r:+.3f}" for a, b, r in self.correlated()]
         lines += ["", *self.unidentifiable] if self.unidentifiable else []
         if not self.converged:
             lines += ["", "Stopped at the bound on work: the fit may still improve (raise budget)."]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ...drawing import draw, go_on
-from .diagnosis import NONE, UNKNOWN, Diagnosis
+from ..course import COMPLETE
+from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
+from .neighbours import Neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,9 +20,9 @@ class Step:
     Attributes
     ----------
     effect : str
-        Id of the effect added; empty for the refitted start.
+        Id of the effect added; empty for the refitted start, and where others were exchanged or dropped.
     dropped : tuple of str
-        Ids that this effect made idle, or for which others do better beside it.
+        Ids of effects added earlier that are no more needed, or for which others do better.
     instead : tuple of str
         Ids of these others.
     model : block
@@ -35,13 +38,13 @@ class Step:
         What was asked of the model of this step.
     """
 
-    effect: str
-    dropped: tuple[str, ...]
-    model: Any
-    nrmse: float
-    nrmse_holdout: float
-    evidence: float
-    parameters: Mapping[str, float]
+    effect: str = ""
+    dropped: tuple[str, ...] = ()
+    model: Any = None
+    nrmse: float = math.nan
+    nrmse_holdout: float = math.nan
+    evidence: float = 0.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
     equivalents: tuple[str, ...] = ()
     diagnosis: Diagnosis | None = None
     instead: tuple[str, ...] = ()
@@ -52,10 +55,38 @@ class Step:
         return [*(("-", d) for d in self.dropped), *(("+", d) for d in self.instead)]
 
     @property
+    def signs(self) -> tuple[str, ...]:
+        """What the step did: every id with its sign; none for the refitted start."""
+        added = [f"+ {self.effect}"] if self.effect else []
+        return (*added, *(f"{sign} {key}" for sign, key in self.changes))
+
+    @property
     def name(self) -> str:
-        """What the step did, in signs."""
-        first = f"+ {self.effect}" if self.effect else "refitted"
-        return " ".join([first, *(f"{sign} {key}" for sign, key in self.changes)])
+        """The same in one line."""
+        return " ".join(self.signs) or "refitted"
+
+    @property
+    def sentence(self) -> str:
+        """What became of effects added earlier, in plain words; empty where they all stayed."""
+        if not self.changes:
+            return ""
+        gone, new = _named(self.dropped), _named(self.instead)
+        if self.effect:
+            beside = f"Beside {_words(self.effect)}"
+            if not new:
+                return f"{beside} {gone} {_are(self.dropped)} no longer needed."
+            return (
+                f"{beside} {new} {_do(self.instead)} what {gone} stood in for, and took {_its(self.dropped)} "
+                "place."
+            )
+        if not new:
+            return f"In the end {gone} {_are(self.dropped)} not needed, and {_were(self.dropped)} dropped."
+        if self.evidence > 0:
+            return (
+                f"In the end {new} {_do(self.instead)} better than {gone} by {self.evidence:.0f} nats, "
+                f"and took {_its(self.dropped)} place."
+            )
+        return f"The ladder went back: {new} in place of {gone}, which had led to no end without remainder."
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +103,10 @@ class Study:
         Nothing was missing; what was missing is found; something remains that the library does not explain.
     noise : float
         Noise over the rms of the centred output: the floor no model gets below.
+    status : {'complete', 'under way', 'budget spent', 'interrupted'}
+        How far the ladder came. Before it is complete the last step holds what is known so far.
+    neighbours : Neighbours
+        The model against all that are one exchange away.
 
     Examples
     --------
@@ -94,12 +129,19 @@ class Study:
     train: tuple
     holdout: tuple
     seconds: float = 0.0
+    status: str = COMPLETE
+    neighbours: Neighbours = Neighbours()
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Ids of the effects that were added and kept."""
-        before = list(self.start.named_effects)
-        return tuple(k for k in self.model.named_effects if k not in before)
+        return tuple(e.id for e in self.model.effects[len(self.start.effects) :])
+
+    @property
+    def story(self) -> list[str]:
+        """What became of effects on the way, and what the neighbours come to, in sentences."""
+        told = [s.sentence for s in self.steps if s.sentence]
+        return [*told, self.neighbours.sentence] if self.neighbours else told
 
     @property
     def measure(self) -> str:
@@ -126,17 +168,23 @@ class Study:
                 "the noise of these data."
             )
         else:
-            added = ", ".join(e.replace("_", " ") for e in self.effects) or "nothing"
+            added = ", ".join(_words(e) for e in self.effects) or "nothing"
+            held = ""
+            if math.isfinite(first.nrmse_holdout + last.nrmse_holdout):
+                held = f", on held-out data from {first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%}"
             head = (
-                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}, on held-out "
-                "data from "
-                f"{first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%} (noise {self.noise:.2%})."
+                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}{held} "
+                f"(noise {self.noise:.2%})."
             )
         if self.verdict == UNKNOWN and last.diagnosis is not None:
             d = last.diagnosis
             left = f"Something outside the library is missing. {d.remains}" if d.remains else d.explanation
             head += " " + left
-        lines = [head, "", self.table(), ""]
+        if self.status != COMPLETE:
+            head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
+        lines = [" ".join([head, *self.story]), "", self.table(), ""]
+        if self.neighbours:
+            lines += [str(self.neighbours.table()), ""]
         for name, p in self.model.parameters.items():
             lines.append(f"  {name:<30} {p.value:>12.6g} {p.unit}")
         return "\n".join(lines)
@@ -161,7 +209,32 @@ def last_diagnosis(steps: Sequence[Step]) -> Diagnosis:
 
 
 def outcome(steps: Sequence[Step]) -> str:
-    """Return the verdict of a ladder."""
-    if last_diagnosis(steps).verdict == UNKNOWN:
+    """Return the verdict of a ladder; where it ended early, something that is not in it yet is unknown."""
+    verdict = last_diagnosis(steps).verdict
+    if verdict == UNKNOWN or (len(steps) == 1 and verdict != NONE):
         return UNKNOWN
-    return NONE if len(steps) == 1 else "effect"
+    return NONE if len(steps) == 1 else EFFECT
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _named(names: Sequence[str]) -> str:
+    return " and ".join(_words(n) for n in names)
+
+
+def _are(names) -> str:
+    return "is" if len(names) == 1 else "are"
+
+
+def _were(names) -> str:
+    return "was" if len(names) == 1 else "were"
+
+
+def _do(names) -> str:
+    return "does" if len(names) == 1 else "do"
+
+
+def _its(names) -> str:
+    return "its" if len(names) == 1 else "their"

@@ -7,6 +7,7 @@ results are the same however many run at once.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -81,7 +82,14 @@ class Attempt:
 
 
 def tried(
-    classes, screen: Screen, shortest: SegmentedData, free, nominal, executor=None
+    classes,
+    screen: Screen,
+    shortest: SegmentedData,
+    free,
+    nominal,
+    executor=None,
+    screened=None,
+    reached: float = math.inf,
 ) -> list[CandidateFit]:
     """Return every effect that can be added, fitted over the segments of the screen.
 
@@ -97,32 +105,39 @@ def tried(
         Their values as the user has them.
     executor : concurrent.futures.Executor or None
         Runs the fits side by side; None: threads do.
+    screened : callable or None
+        Takes every effect by what its best start explains, before any fit.
+    reached : float
+        Error of a model that is known: all begin at the nominal values, too, what cannot come near it is left
+        where that shows, and joints are not sought over the plane.
     """
+    near, known = HOPELESS * reached, math.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
 
     def run(function: Callable, jobs: list) -> list:
-        return side_by_side(function, jobs) if executor is None else list(executor.map(function, jobs))
+        return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1]
-    jobs = [(c, s, screen, shortest, free, nominal) for c in joints for s in LOAD_SHARES]
-    jobs += [(c, None, screen, shortest, free, nominal) for c in kinds]
-    begun = run(_begin, jobs)
-    attempts = _best([a for found in begun for a in found if a.fit is not None], JOINTS)
-    attempts += [a for found in begun for a in found if a.fit is None]
+    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
+    begun = run(_begin, [(c, screen, shortest, free, nominal, known) for c in kinds])
+    if screened is not None:
+        screened(_screened(begun, screen))
+    resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
+    attempts = _best([a for found in resonating for a in found], JOINTS)
+    attempts += [a for _, found in begun for a in found]
     # those of few steps first: what they come to tells of the others which need no long look
     short = [a for a in attempts if not a.multimodal]
-    begun = run(_first, [(a, np.inf) for a in short])
+    begun = run(_first, [(a, near) for a in short])
     least = min((a.error for a in begun), default=np.inf)
-    least = min(least, screen.base.rmse)
+    least = min(least, screen.base.rmse, reached)
     begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
     begun = [a for a in begun if itself(a.trial, span)]
-    kept = _best(begun, KEPT)
+    kept = _best(begun, 1 if known else KEPT)
     # few steps from where the user begins tell little: the baseline may have ended in another minimum
     own = _best([a for a in begun if a.nominal], 1)
     begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
     ahead = _best(begun, 1)[:2]
-    found = run(_finish, [(a, screen.data, np.inf) for a in ahead])
+    found = run(_finish, [(a, screen.data, near) for a in ahead])
     least = min([least, *(t.train.rmse for t in found)])
     rest = [a for a in begun if not any(a is o for o in ahead)]
     found += run(_finish, [(a, screen.data, HOPELESS * least) for a in rest])
@@ -131,6 +146,28 @@ def tried(
         if itself(t, span) and (t.key not in best or t.train.rmse < best[t.key].train.rmse):
             best[t.key] = t
     return [best[c.id] for c in kinds if c.id in best]
+
+
+def _screened(begun, screen: Screen) -> list[CandidateFit]:
+    """Return every effect by what its best start explains, before any fit, that of most evidence first.
+
+    The share of the residual that a start leaves is of a linear estimate: it ranks, and promises no more.
+    """
+    base, found = screen.base, []
+    samples = len(screen.residual)
+    for starts, attempts in begun:
+        known = [s for s in starts if s.left > 0]  # of regressions of the force it is not known
+        if not known or not attempts:
+            continue
+        best = min(known, key=lambda s: s.left)
+        block = extended(screen.block, best.effect)
+        if block is None:
+            continue
+        left, extra = math.sqrt(best.left), len(own_names(block))
+        fit = replace(base, model=block, rmse=base.rmse * left, nrmse=base.nrmse * left, linear=None)
+        evidence = -samples * math.log(left) - 0.5 * extra * math.log(samples)
+        found.append(CandidateFit(best.effect.id, fit, extra=extra, evidence=evidence))
+    return sorted(found, key=lambda t: -t.evidence)
 
 
 def itself(tried: CandidateFit, span) -> bool:
@@ -152,20 +189,28 @@ def _best(attempts, count) -> list[Attempt]:
 # --- jobs -----------------------------------------------------------------------------------------
 
 
-def _begin(job) -> list[Attempt]:
-    """Return where fits of one effect class begin; with a `share` of load given, those of joints."""
-    cls, share, screen, shortest, free, nominal = job
-    if share is not None:
-        found = []
-        for near in resonating(cls, screen, share, JOINTS):
-            added = own_names(near.model)
-            found.append(
-                Attempt(
-                    cls.id, near.model, (*free, *added), screen.data, 14, 3e-3, len(added), near.starts, near
-                )
-            )
-        return found
+def _begin_joint(job) -> list[Attempt]:
+    """Return where fits of a joint begin that has a share of the load behind it."""
+    cls, share, screen, free = job
+    found = []
+    for near in resonating(cls, screen, share, JOINTS):
+        names = own_names(near.model)
+        found.append(
+            Attempt(cls.id, near.model, (*free, *names), screen.data, 14, 3e-3, len(names), near.starts, near)
+        )
+    return found
+
+
+def _begin(job) -> tuple[list[Start], list[Attempt]]:
+    """Return the starts of one effect class, and where fits begin there."""
+    cls, screen, shortest, free, nominal, known = job
     found, starts = [], starts_for(cls, screen)
+    if known:
+        # with the other parameters as the model has them, or as they are without the effect
+        best = starts[: 1 + cls.multimodal]
+        own = [replace(s, values=tuple(nominal.items())) for s in best[:1]]
+        begun = [_from(s, screen, shortest, free) for s in (*own, *best)]
+        return starts, [a for a in begun if a is not None]
     for i, start in enumerate(starts):
         if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
             break
@@ -176,7 +221,7 @@ def _begin(job) -> list[Attempt]:
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
             attempt = _from(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
             found.append(attempt and replace(attempt, nominal=True))
-    return [a for a in found if a is not None]
+    return starts, [a for a in found if a is not None]
 
 
 def _from(start: Start, screen: Screen, shortest: SegmentedData, free) -> Attempt | None:

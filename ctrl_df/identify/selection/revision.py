@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
-from ..estimation.variables import default_free
-from ..starting.extend import extended
+from ..thresholds import RIVALS
 from .search import Search
+from .structure import Structure, exchanged
 
 
 @dataclass(frozen=True)
@@ -17,44 +16,59 @@ class Revision:
 
     Attributes
     ----------
-    block : Mechanism
+    structure : Structure
     dropped, instead : tuple of str
-        Names of effects that are no more in it, and of those in the place of some of them.
+        Ids of effects that are no more in it, and of those in the place of some of them.
     """
 
-    block: Any
+    structure: Structure
     dropped: tuple[str, ...] = ()
     instead: tuple[str, ...] = ()
 
 
-def revised(block, start, search: Search, kept, rivals: Mapping[str, Sequence]) -> Revision:
-    """Look again at effects added to `start` earlier, beside the last one of the block.
+def revised(structure: Structure, search: Search, free: Callable) -> Revision:
+    """Look again at effects added earlier, beside the last one.
 
     Those without which the error stays as it is are dropped. Those that stood in for something else, too,
-    give way to another candidate of their own step that does better now, or as well with fewer parameters:
-    `rivals`, effects by the name chosen. `kept`: parameters that are not to be refitted.
+    give way to a rival of their own step that does better now, or as well with fewer parameters.
+
+    Parameters
+    ----------
+    structure : Structure
+    search : Search
+        In which the last effect was found.
+    free : callable
+        Parameters of a block that may be refitted.
     """
     dropped: list[str] = []
     instead: list[str] = []
 
-    def fitted(model, iterations):
-        return search.fitted(model, [k for k in default_free(model) if k not in kept], iterations)
+    def fitted(block, iterations):
+        return search.fitted(block, free(block), iterations)
 
-    for key in [k for k in list(block.named_effects)[:-1] if k not in start.named_effects]:
-        less = fitted(block.without_effect(key), 8)
-        tried = [fitted(block, 4)]
-        for effect in rivals.get(key, ()):
-            other = extended(less.block, effect)
+    place = 0
+    for _ in structure.added[:-1]:
+        old, rivals = structure.added[place], structure.rivals[place]
+        less = fitted(structure.without(place).block, 8)
+        own, tried = fitted(structure.block, 4), []
+        for effect in rivals[:RIVALS]:
+            other = exchanged(less.block, effect)
             if other is not None:
-                tried.append(fitted(other, 8))
-        tried = [replace(t, extra=t.extra - less.extra) for t in tried]
-        judged = search.ranked(less, tried)
-        best, own = judged[0], next(t for t in judged if t.block is tried[0].block)
+                tried.append((effect, fitted(other, 8)))
+        judged = search.ranked(
+            less, [replace(t, extra=t.extra - less.extra) for t in (own, *(t for _, t in tried))]
+        )
+        own = next(t for t in judged if t.block is own.block)
+        best = judged[0]
         if best.evidence < search.significant:
-            block = less.block
-            dropped.append(key)
+            structure = structure.without(place).at(less.block)
+            dropped.append(old.id)
         elif best.evidence > own.evidence + (0.0 if best.extra < own.extra else search.significant):
-            block = best.block
-            dropped.append(key)
-            instead.append(block.newest)
-    return Revision(block, tuple(dropped), tuple(instead))
+            new = next(effect for effect, t in tried if t.block is best.block)
+            others = (old, *(e for e in rivals if e is not new))
+            structure = structure.without(place).plus(best.block, others)
+            dropped.append(old.id)
+            instead.append(new.id)
+        else:
+            place += 1
+    return Revision(structure, tuple(dropped), tuple(instead))

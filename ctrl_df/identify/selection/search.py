@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+from ..course import Course
 from ..results.diagnosis import Diagnosis
 
 
@@ -84,6 +85,10 @@ class Search(ABC):
     words : Words
     kind : type
         Class of the answer.
+    course : Course
+        Hears of the candidates as they stand, best first.
+    first_look : sequence of Judged
+        The candidates as they were before any was confirmed.
     """
 
     block: Any
@@ -94,6 +99,8 @@ class Search(ABC):
     measure: str
     words: Words
     kind: type[Diagnosis] = Diagnosis
+    course: Course = Course()
+    first_look: Sequence[Judged] = ()
 
     @property
     @abstractmethod
@@ -103,6 +110,23 @@ class Search(ABC):
     @abstractmethod
     def candidates(self, classes, executor=None) -> list[Any]:
         """Return every effect that can be added, fitted, that of most evidence first."""
+
+    def rivals(self, model, names, classes, executor=None) -> list[Any]:
+        """Return effects that may do what a model of one effect more does, with evidence over it, best first.
+
+        Its values are where they begin; what comes nowhere near it need not be brought to its end.
+
+        Parameters
+        ----------
+        model : Mechanism
+        names : sequence of str
+            Its parameters that are fitted.
+        classes : sequence of effect classes
+        executor : concurrent.futures.Executor or None
+        """
+        known, more = self.fitted(model, names, 2), len(names) - len(self.free)
+        found = self.candidates(classes, executor)
+        return self.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
     def confirm(self, found) -> list[Any]:
@@ -115,6 +139,19 @@ class Search(ABC):
     @abstractmethod
     def standard_errors(self, judged) -> dict[str, float]:
         """Return the standard errors of the parameters fitted, as far as they are known."""
+
+    def undetermined(self, judged) -> tuple[str, ...]:
+        """Return the parameters of the newest effect of a confirmed candidate that data do not determine."""
+        return ()
+
+    def predicted(self, judged) -> tuple[Any, tuple] | None:
+        """Return a model and the records that it is to predict; None where there is nothing to predict."""
+        return None
+
+    @property
+    def at_first(self) -> Remainder:
+        """What the refitted model leaves, as far as is known before anything is confirmed."""
+        return Remainder(0.0, 0.0, False)
 
     @abstractmethod
     def alike(self, a, b) -> bool:
@@ -144,10 +181,10 @@ class Search(ABC):
     def ranked(self, base, judged: Sequence) -> list[Any]:
         """Return models with their evidence over `base`, best first."""
 
-    def final(self, models: Sequence, kept) -> list[tuple[Any, float, float]] | None:
+    def final(self, models: Sequence, free) -> list[tuple[Any, float, float]] | None:
         """Return the models of a ladder with their two errors, all over the same data; None: as they are.
 
-        `kept`: parameters that are not to be refitted.
+        `free`: parameters of a model that may be refitted.
         """
         return None
 

@@ -14,10 +14,10 @@ from ...simulate.crew import side_by_side
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
+from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.segments import facts
 from ..estimation.simulator import feasible
-from ..estimation.variables import default_free
 from ..starting.regression import force_regression, heavy, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (
@@ -28,20 +28,23 @@ from ..thresholds import (
     FLOOR,
     GROWTH,
     HOPELESS,
+    LEFT,
     PASSED,
     PROCESS_NOISE,
     PROMISING,
     SHOWS_HARDLY,
     SIGNIFICANT,
     SIGNIFICANT_HELD,
+    SIZE_KNOWN,
     STILL_POSSIBLE,
     STOPPED_EARLY,
+    UNMOVED,
 )
-from .attempts import itself, tried
+from .attempts import itself, own_names, tried
 from .equivalence import indistinguishable
 from .evidence import ranked, rounds
 from .remaining import located, remainder
-from .search import Search, Words
+from .search import Remainder, Search, Words
 
 
 class StructureSearch(Search):
@@ -68,11 +71,9 @@ class StructureSearch(Search):
         self._look_at(data, 1)
         self.base = self._baseline(block)
         self.floor = 0.0  # error that a fit can come down to at best, from `confirm` on
-        # a disturbance force drowns all else over longer segments
-        near = self.segmentations[0].moved(self.base.train)
-        if self.disturbs(near.rmse, data):
-            self._look_at(self.segmentations[0].with_process_noise, 0)
-            self.base = CandidateFit("", self.data.fit(near.model, self.free))
+        # over the shortest segments nearly every model follows, unless forces disturb it
+        self.nearest = self.segmentations[0].moved(self.base.train)
+        self.noise = ranked(self.base, ())[1]  # of the best model's residual
 
     def disturbs(self, error: float, data: SegmentedData) -> bool:
         """Whether an error over the shortest segments is one that disturbance forces make."""
@@ -113,18 +114,43 @@ class StructureSearch(Search):
 
     def candidates(self, classes, executor=None) -> list[CandidateFit]:
         """Return every effect that can be added, fitted, the one with most evidence first."""
+        self.course.stage(f"{len(classes)} effects tried over short segments")
+        base, found = self._look(classes, executor, self.data.sampled, self.course.known)
+        self.course.known(found)
+        if self._disturbed(found):
+            # a disturbance force drowns all else over longer segments
+            self._look_at(self.segmentations[0].with_process_noise, 0)
+            self.base = CandidateFit("", self.data.fit(self.nearest.model, self.free))
+            self.noise = ranked(self.base, ())[1]
+            self.course.stage("the same by accelerations: forces that wander outweigh the noise")
+            base, found = self._look(classes, executor, self.data.sampled)
+            self.course.known(found)
         longest = self.segmentations[-1]
-        base, found = self._look(classes, executor, self.data.sampled)
         there = base.rmse if self.data.disturbed else longest.moved(base).rmse
         if there > GROWTH * base.rmse:
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
+            self.course.stage("the same over long segments")
             moved = self._over_long_windows(base.rmse, there, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
                 found = _best_of(base, [*moved, *again])
+                self.course.known(found)
         if found:
             self._rebase(found)
         return found
+
+    def _disturbed(self, found) -> bool:
+        """Whether forces disturb the machine that no effect accounts for.
+
+        The baseline then errs over the shortest segments by far more than the sensor's noise, and so does the
+        best candidate; an effect that is missing would take most of that away.
+        """
+        least, shortest = self.nearest.rmse, self.segmentations[0]
+        if not self.disturbs(least, self.data):
+            return False
+        best = sorted(found, key=lambda t: t.train.rmse)[:2]
+        moved = side_by_side(lambda t: shortest.moved(t.train, hopeless=least), best)
+        return all(self.disturbs(f.rmse, self.data) and f.rmse > LEFT * least for f in moved)
 
     def _over_long_windows(self, here, there, found) -> list[CandidateFit] | None:
         """Return the best by error moved to the longest segments; None where they explain enough there.
@@ -139,13 +165,30 @@ class StructureSearch(Search):
         shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
-    def _look(self, classes, executor, data: SegmentedData):
-        """Fit every effect over one set of segments; return baseline and effects there, best first."""
+    def _look(self, classes, executor, data: SegmentedData, screened=None):
+        """Fit every effect over one set of segments; return baseline and effects there, best first.
+
+        `screened` takes the effects before they are fitted.
+        """
+        base, found = self._tried(classes, executor, data, screened)
+        return base, ranked(CandidateFit("", base), found)[0]
+
+    def _tried(self, classes, executor, data: SegmentedData, screened=None, reached: float = math.inf):
         base = data.moved(self.base.train, 3)
+        if not classes:
+            return base, []
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        found = tried(classes, screen, self.segmentations[0].sampled, self.free, nominal, executor)
-        return base, ranked(CandidateFit("", base), found)[0]
+        short = self.segmentations[0].sampled
+        return base, tried(classes, screen, short, self.free, nominal, executor, screened, reached)
+
+    def rivals(self, model, names, classes, executor=None):
+        """Return effects that may do what the model of one effect more does, with evidence over it."""
+        data = self.data.sampled
+        known = data.fit(model, names, iterations=4)
+        _, found = self._tried(classes, executor, data, reached=known.rmse)
+        more = len(names) - len(self.free)
+        return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
     def _rebase(self, found):
         """Refit the baseline from what the best candidates say of its parameters: it may have been stuck."""
@@ -163,6 +206,7 @@ class StructureSearch(Search):
 
         The segments are of the length that suits these data (`_longest_coherent`).
         """
+        self.course.stage("the best refitted over segments of every length")
         # Disturbance forces let the first look tell little.
         found = _promising(found, CONFIRMED_FORCED, 0.0) if self.data.disturbed else _promising(found)
         stages, floor = self._stages([self.base.train, *(t.train for t in found)])
@@ -180,6 +224,7 @@ class StructureSearch(Search):
             at = len(stages) - 1
         self.data = levels[at]
         fine = self.data.fine
+        self.course.stage("the best refitted at the full rate, and tried on what is held out")
         pairs = [(t, f) for t, f in zip((self.base, *found), stages[at], strict=True) if f is not None]
         best = side_by_side(
             lambda pair: fine.validate(replace(pair[0], train=fine.moved(pair[1], 3, 1e-3), confirmed=True)),
@@ -189,6 +234,8 @@ class StructureSearch(Search):
         chosen, self.noise = ranked(self.base, best[1:])
         if not chosen:
             return []
+        self.course.known(chosen)
+        self.course.stage("near ones begun again where the best one ended")
         chosen = self._again(chosen, chosen[:1])
         # Near equals are told apart by fits that have come to an end, and in the right minimum.
         near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
@@ -288,13 +335,49 @@ class StructureSearch(Search):
         """Return the standard errors of a fit that came to its end."""
         return judged.train.standard_errors if len(judged.train.covariance) else {}
 
+    def undetermined(self, judged):
+        """Return the parameters of the newest effect at a bound, or known to worse than their size."""
+        fit = judged.train
+        if not judged.confirmed or not len(fit.covariance):
+            return ()
+        # a bound that the records prove, where a body has been, is what they tell of the parameter
+        proved = {f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.data.filtered)}
+        at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
+        doubtful = (at_bound - proved) | blurred(fit)
+        # a static level is found by trying, as single samples pass it: slopes know nothing of it
+        table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
+        own = [k for k in own_names(judged.block) if not table[k].threshold]
+        # the size of an effect, its first parameter, is measured by itself
+        size = set(own_names(judged.block)[:1]).intersection(own)
+        doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
+        return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
+
+    def predicted(self, judged):
+        """Return the model and the records held out (angles as these have them), or those fitted."""
+        fitted, held = self.records
+        if held and judged.validation is not None:
+            return judged.validation.model, held
+        return judged.block, held or fitted
+
+    @property
+    def at_first(self):
+        """Noise of the sensor, and what the refitted model errs by beyond it."""
+        noise, error = self.data.noise, self.base.train.rmse
+        if self.data.disturbed:
+            return Remainder(0.0, error, False)
+        return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
+
     def exact(self):
         """Whether the model errs by rounding alone."""
         return self.base.train.nrmse < EXACT and not self.data.disturbed
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
-        return remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+        left = remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+        if self.data.disturbed and not significant and self.nearest.nrmse > UNMOVED:
+            # accelerations that are mostly noise do not speak for a model that does not even move
+            return replace(left, unexplained=True)
+        return left
 
     def located(self, best, remainder, unknown):
         """Return where the error is."""
@@ -314,21 +397,21 @@ class StructureSearch(Search):
         """Return models with their evidence over `base`, best first."""
         return ranked(base, judged)[0]
 
-    def final(self, models, kept):
+    def final(self, models, free):
         """Return the models with their errors at the full rate, over the segments that the last one bears.
 
         Where disturbance forces blur parameters they are fitted over shorter segments first.
         """
         common = self.data.fine
         if common.disturbed:
-            models = [self._sharpened(m, common, kept) for m in models]
+            models = [self._sharpened(m, common, free) for m in models]
         return [(m, *common.errors(m)) for m in models]
 
     @staticmethod
-    def _sharpened(model, data: SegmentedData, kept):
+    def _sharpened(model, data: SegmentedData, free):
         if data.carries(model):
             return model
-        return data.short_segments.fit(model, [k for k in default_free(model) if k not in kept]).model
+        return data.short_segments.fit(model, free(model)).model
 
     def relative(self, noise):
         """Return noise over the rms of the centred output, or of the acceleration."""

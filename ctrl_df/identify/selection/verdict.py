@@ -3,56 +3,151 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..results.diagnosis import AMBIGUOUS, EFFECT, NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
-from ..results.explain import explain
-from .search import Search
+from ..course import COMPLETE, UNDER_WAY, Course
+from ..results.diagnosis import (
+    AMBIGUOUS,
+    EFFECT,
+    NONE,
+    UNKNOWN,
+    Baseline,
+    CandidateEffect,
+    Diagnosis,
+    rivals,
+)
+from ..results.explain import explain, explain_so_far, falls_behind, undetermined
+from .lasting import lasting
+from .search import Remainder, Search
 
 
-def verdict_of(search: Search, found, began: float, limits=None) -> Diagnosis:
-    """Confirm the best candidates and say what they amount to.
+def diagnosed(search: Search, classes, executor=None, course: Course | None = None, limits=None) -> Diagnosis:
+    """Try effects, confirm the best candidates, and say what they amount to.
 
     Parameters
     ----------
     search : Search
-    found : list
-        Of its `candidates`.
-    began : float
-        When the diagnosis did (``time.perf_counter()``).
+    classes : sequence of effect classes
+        To try; with none the model is judged as it is.
+    executor : concurrent.futures.Executor or None
+        Runs candidates side by side; None: threads of this process do.
+    course : Course or None
+        Hears of the diagnosis as it stands.
     limits : mapping or None
         What the next experiment may do to the machine.
     """
+    asked = _Asked(search, time.perf_counter(), dict(limits or {}))
+    if course is not None:
+        search.course = course.within(asked.so_far)
+    search.first_look = found = search.candidates(classes, executor) if classes else []
     chosen = search.confirm(found)
-    base, best = search.base, chosen[0] if chosen else search.base
-    keys = {c.key for c in chosen}
-    ranking = []
-    for judged, weight in zip(chosen, _probabilities(chosen), strict=True):
-        same = tuple(o.key for o in chosen if o is not judged and search.alike(judged, o))
-        ranking.append(_entry(judged, search, weight, same))
-    ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
-    significant = bool(ranking) and worth(ranking[0], search)
-    remainder = search.remainder(best, significant)
-    if search.exact():
-        verdict = NONE
-    elif remainder.unexplained:
-        verdict = UNKNOWN
-    elif not significant:
-        verdict = NONE
-    else:
-        open_ones = rivals(ranking)
-        verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
-    located = search.located(best, remainder, verdict == UNKNOWN)
-    fitted, validation = search.records
-    result = search.kind(
-        verdict, tuple(ranking), base.block, base.block, *search.errors(base), remainder.noise,
-        remainder.structure, "", located.kinds, located.where, fitted, validation,
-        time.perf_counter() - began, dict(limits or {}), search.measure, located.remains,
-        **search.answer(best),
-    )  # fmt: skip
-    return replace(result, explanation=explain(result, search.words) + located.note)
+    search.course.stage("verdict")
+    return asked.answer(chosen, found)
+
+
+class _Asked:
+    """One question: which effect the model of a search misses."""
+
+    def __init__(self, search: Search, began: float, limits):
+        self.search, self.began, self.limits = search, began, limits
+
+    def so_far(self, found: Sequence) -> Diagnosis:
+        """Return the diagnosis as it stands with these candidates, best first."""
+        chosen = [t for t in found if t.confirmed]
+        answer = self.answer(chosen, found, UNDER_WAY) if chosen else self._screened(found)
+        return replace(answer, explanation=explain_so_far(answer, self.search.words))
+
+    def answer(self, chosen: Sequence, found: Sequence, status: str = COMPLETE) -> Diagnosis:
+        """Return what confirmed candidates amount to, `found` beside them.
+
+        Only a complete answer looks at long stretches; any other names no effect.
+        """
+        search = self.search
+        best = chosen[0] if chosen else search.base
+        keys = {c.key for c in chosen}
+        ranking = []
+        for judged, weight in zip(chosen, _probabilities(chosen), strict=True):
+            same = tuple(o.key for o in chosen if o is not judged and search.alike(judged, o))
+            ranking.append(_entry(judged, search, weight, same))
+        ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
+        significant = bool(ranking) and worth(ranking[0], search)
+        remainder = search.remainder(best, significant)
+        if search.exact():
+            verdict = NONE
+        elif remainder.unexplained:
+            verdict = UNKNOWN
+        elif not significant:
+            verdict = NONE
+        else:
+            open_ones = rivals(ranking)
+            verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
+        base, doubts = self._base(), ()
+        if verdict == EFFECT and status != COMPLETE:
+            verdict = AMBIGUOUS
+        elif verdict == EFFECT:
+            search.course.stage("free prediction over long stretches")
+            verdict, ranking, doubts = doubted(ranking, base, search.significant)
+        result, note = self._made(verdict, ranking, remainder, best, base, status, doubts)
+        return replace(result, explanation=explain(result, search.words) + note)
+
+    def _base(self) -> Baseline:
+        search = self.search
+        errors, predicted = search.errors(search.base), search.predicted(search.base)
+        return Baseline(search.base.block, *errors, predicted=predicted)
+
+    def _screened(self, found: Sequence) -> Diagnosis:
+        """Return what candidates amount to of which none is confirmed."""
+        search = self.search
+        ranking = [_entry(t, search, p, ()) for t, p in zip(found, _probabilities(found), strict=True)]
+        if search.exact():
+            verdict = NONE
+        else:
+            told = bool(ranking) and ranking[0].evidence > search.significant
+            verdict = AMBIGUOUS if told else UNKNOWN
+        return self._made(verdict, ranking, search.at_first, search.base, self._base(), UNDER_WAY)[0]
+
+    def _made(
+        self, verdict, ranking, remainder: Remainder, best, base: Baseline, status, doubts=()
+    ) -> tuple[Diagnosis, str]:
+        search = self.search
+        located = search.located(best, remainder, verdict == UNKNOWN and status == COMPLETE)
+        fitted, validation = search.records
+        result = search.kind(
+            verdict, tuple(ranking), base.model, base, base.nrmse, base.nrmse_holdout, remainder.noise,
+            remainder.structure, "", located.kinds, located.where, fitted, validation,
+            time.perf_counter() - self.began, self.limits, search.measure, located.remains, status,
+            doubts, **search.answer(best),
+        )  # fmt: skip
+        return result, located.note
+
+
+def doubted(ranking, base: Baseline, significant: float):
+    """Return what becomes of the verdict that the first of a ranking is the effect, and why.
+
+    It stands where the first predicts the motion over long stretches as well as any rival, and better than
+    the model without it, and where the data determine the effect's size, its first parameter.
+
+    Returns
+    -------
+    verdict : str
+    ranking : list of CandidateEffect
+        Those that predict better share the probability with the first: one judgement is against the other.
+    doubts : tuple of str
+    """
+    long, first = lasting(ranking, base, significant), ranking[0]
+    if long is not None and not long.ahead:
+        doubts, named = (falls_behind(first, long),), [c for c in ranking if c.id in long.better]
+        if not named:
+            return UNKNOWN, ranking, doubts
+        share = first.probability / (1 + len(named))
+        shared = [replace(c, probability=share) if c is first or c in named else c for c in ranking]
+        return AMBIGUOUS, shared, doubts
+    if next(iter(first.parameters), None) in first.undetermined:
+        return AMBIGUOUS, ranking, (undetermined(first),)
+    return EFFECT, ranking, ()
 
 
 def worth(first: CandidateEffect, search: Search) -> bool:
@@ -67,7 +162,7 @@ def worth(first: CandidateEffect, search: Search) -> bool:
 
 
 def _probabilities(chosen) -> list[float]:
-    """Return those of confirmed candidates, "nothing missing" being one more, all equal before the data."""
+    """Return those of candidates, "nothing missing" being one more, all equal before the data."""
     if not chosen:
         return []
     top = max(chosen[0].evidence, 0.0)
@@ -79,8 +174,11 @@ def _entry(judged, search: Search, probability: float, same) -> CandidateEffect:
     effect, key = judged.block.effects[-1], judged.block.newest
     values = {k: p.value for k, p in effect.parameters.items()}
     known = search.standard_errors(judged)
+    nrmse, held = search.errors(judged)
     return CandidateEffect(
-        effect, effect.id, *search.errors(judged), judged.evidence, probability, values, same, judged.block,
-        judged.confirmed, errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
-        evidence_holdout=judged.evidence_validation,
+        judged.block, predicted=search.predicted(judged), effect=effect, id=effect.id, nrmse=nrmse,
+        nrmse_holdout=held, evidence=judged.evidence, probability=probability, parameters=values,
+        equivalents=same, confirmed=judged.confirmed,
+        errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
+        evidence_holdout=judged.evidence_validation, undetermined=search.undetermined(judged),
     )  # fmt: skip

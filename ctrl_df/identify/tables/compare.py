@@ -100,7 +100,7 @@ class FrequencyComparison(ComparisonBase):
         lines = [str(self)]
         if len(self.records) > 1:
             lines += [f"  {r.record.name:<24} nrmse {r.nrmse:.4g}" for r in self.records]
-        return "\n".join([*lines, "", *self.where.sentences[:6], "", self.where.table(8)])
+        return "\n".join([*lines, "", *self.places[:6], "", self.where.table(8)])
 
     def __str__(self) -> str:
         """Return it as text."""
@@ -114,6 +114,11 @@ class FrequencyComparison(ComparisonBase):
         if lost:
             text += f"; at {lost} of them the model stands still or has no periodic answer (counted as N = 0)"
         return text + "."
+
+    @property
+    def over(self) -> str:
+        """What the model was judged over, in words."""
+        return "the plane"
 
     def plot(self, record=None, **keywords):
         """Draw measured and model's N, and the error on the plane; returns a ``ct.ControlPlot``."""

@@ -130,6 +130,8 @@ class TableSearch(Search):
 
     def candidates(self, classes, executor=None):
         """Return every effect that can be added, fitted roughly to some points, the best first."""
+        if not classes:
+            return []
         size = np.abs(self.inside.weight * self.base.error[self.train])
         few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
@@ -141,11 +143,18 @@ class TableSearch(Search):
                 some = fewer if c.costly else few
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
-        found = [self._trial(*r, work=WORK_MEDIUM) for r in run(try_effect, jobs) if r is not None]
+        found = []
+        self.course.stage(f"{len(jobs)} effects tried on some points")
+        for r in run(try_effect, jobs):
+            self.course.done()
+            if r is not None:
+                found.append(self._trial(*r, work=WORK_MEDIUM))
+                self.course.known(self.ranked(self.base, found))
         return self.ranked(self.base, found)
 
     def confirm(self, found):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
+        self.course.stage("the best fitted to all points")
         best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
@@ -213,6 +222,19 @@ class TableSearch(Search):
     def standard_errors(self, judged):
         """Return the standard errors of a candidate fitted to all points."""
         return uncertainty(judged.fitted)[1] if judged.confirmed else {}
+
+    def undetermined(self, judged):
+        """Return the parameters of the newest effect at a bound, or known to worse than their size."""
+        if not judged.confirmed:
+            return ()
+        own, fitted = judged.block.newest + ".", judged.fitted
+        table, doubtful = fitted.block.parameters, uncertainty(fitted)[2]
+        named = [v for v in fitted.variables if v.name.startswith(own)]
+        return tuple(
+            v.name.rpartition(".")[2]
+            for v in named
+            if v.name in doubtful or table[v.name].value in (v.lower, v.upper)
+        )
 
     # --- what it comes to -----------------------------------------------------------------------------
 

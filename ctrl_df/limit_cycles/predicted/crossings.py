@@ -228,7 +228,7 @@ def _polish(D, p, q, reach, box, refine):
         finished[active[settled | ~moved]] = True
         if iteration == 8:  # quadratic convergence shows by now; what has none sits at a jump
             alive &= np.abs(value) < 1e-3
-        far = np.abs((x - start) / reach).max(axis=1) > 6  # wandered off: another start owns what is there
+        far = np.abs((x - start) / reach).max(axis=1) > 6  # strayed: another start owns what is there
         alive &= ~far
         if refine:
             alive &= ~_followers(x, np.where(alive, np.abs(value), np.inf), reach)

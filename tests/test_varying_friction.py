@@ -1,4 +1,4 @@
-"""Machines whose own forces wander far beyond the noise of their sensor: fitted and judged by forces."""
+"""Machines whose own forces vary far beyond the noise of their sensor: fitted and judged by forces."""
 
 import math
 from dataclasses import replace
@@ -21,8 +21,8 @@ from ctrl_df.identify.estimation.simulator import Simulator
 DT = 1e-3
 
 
-def machine(seed, difference=0.0, wander=0.06, n=10_000):
-    """A mass of 3 kg on 2 N of friction that wanders by a share of it within a tenth of a second.
+def machine(seed, difference=0.0, share=0.06, n=10_000):
+    """A mass of 3 kg on 2 N of friction that varies by a share of it within a tenth of a second.
 
     Integrated here, by small steps; the encoder is good to 10 nm.
     """
@@ -35,7 +35,7 @@ def machine(seed, difference=0.0, wander=0.06, n=10_000):
     for i in range(n):
         y[i] = x
         level += -level * DT / 0.1 + math.sqrt(2 * DT / 0.1) * rng.standard_normal()
-        dry = 2.0 * (1 + wander * level)
+        dry = 2.0 * (1 + share * level)
         viscous = 6.0 + 0.5 * difference * np.sign(v)
         for _ in range(sub):
             h = DT / sub
@@ -49,7 +49,7 @@ MODEL = cdf.Mass(2.5, [cdf.Coulomb(2.4), cdf.Viscous(5.0), cdf.LinearSpring(0.5)
 FEW = ("asymmetric_viscous", "asymmetric_coulomb", "quadratic_drag", "bristle", "compliance")
 
 
-def test_what_is_missing_is_told_from_what_wanders():
+def test_what_is_missing_is_told_from_what_varies():
     found = diagnose(MODEL, machine(1, difference=2.0), holdout=machine(2, difference=2.0), candidates=FEW)
     assert found.measure == "acceleration"
     best = found.ranking[0]
@@ -58,7 +58,7 @@ def test_what_is_missing_is_told_from_what_wanders():
     assert best.nrmse_holdout < found.nrmse_holdout
 
 
-def test_what_wanders_is_no_effect():
+def test_what_varies_is_no_effect():
     found = diagnose(MODEL, machine(3), holdout=machine(4), candidates=FEW)
     assert found.measure == "acceleration"
     assert found.verdict in ("none", "unknown")
@@ -77,7 +77,7 @@ def test_parameters_are_fitted_where_slow_forces_move_nothing_far():
     assert fit.parameters["mass"].standard_error < 0.7 * named.parameters["mass"].standard_error
 
 
-def test_a_ladder_of_a_wandering_machine_has_such_parameters():
+def test_a_ladder_of_a_machine_whose_friction_varies_has_such_parameters():
     train, held = machine(1, difference=2.0), machine(2, difference=2.0)
     study = cdf.improve(MODEL, train, held, 1, candidates=("asymmetric_viscous", "quadratic_drag"))
     assert study.effects == ("asymmetric_viscous",)
@@ -110,7 +110,7 @@ def test_forces_are_second_differences():
     assert cubic == pytest.approx(6 * t[rows[:38]], abs=6 * DT)
 
 
-def test_wandering_forces_are_whitened():
+def test_varying_forces_are_whitened():
     rng = np.random.default_rng(2)
     force = [np.convolve(rng.standard_normal(1200), 0.97 ** np.arange(200))[:1200] for _ in range(20)]
     pieces = [np.cumsum(np.cumsum(f)) for f in force]

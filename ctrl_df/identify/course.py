@@ -1,0 +1,176 @@
+"""The course of a long computation: what is known so far, who hears of it, and how long it may go on.
+
+Work is done in units, between which it may end: where the time given is over, or at Ctrl-C, it is left where
+it stands, and what was known last is the answer.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from ..checks import CHECK_VALUE, positive, shown
+from ..df.work import progress_bar
+from ..simulate import crew
+
+COMPLETE, UNDER_WAY, BUDGET_SPENT, INTERRUPTED = "complete", "under way", "budget spent", "interrupted"
+"""How far an answer has come."""
+
+_log = logging.getLogger("ctrl_df")
+_log.addHandler(logging.NullHandler())
+
+
+class Course:
+    """How far a computation has come.
+
+    Parameters
+    ----------
+    owner : str
+        The function that was called.
+    progress : bool, callable or None
+        Whether to tell on stderr what is being done (None: where that is a terminal), or what takes a line
+        of text instead.
+    callback : callable or None
+        Takes every answer as it stands; what it returns is ignored, what it raises ends the computation.
+    budget : float or None
+        Seconds from now on; the first answer is waited for in any case.
+
+    Raises
+    ------
+    TypeError, ValueError
+        A `progress` or `callback` that cannot be called, a `budget` that is no positive number.
+    """
+
+    def __init__(self, owner: str = "", progress: Any = None, callback: Any = None, budget: Any = None):
+        for name, given, others in (
+            ("progress", progress, "True, False, None or a function of a line of text"),
+            ("callback", callback, "None or a function of the answer so far"),
+        ):
+            truth = name == "progress" and isinstance(given, bool)
+            if not (given is None or truth or callable(given)):
+                raise TypeError(f"{owner} needs {name} as {others}; got {shown(given)}.")
+        self.owner, self.began = owner, time.perf_counter()
+        self.latest: Any = None
+        self._callback, self._progress = callback, progress
+        self._until = math.inf
+        if budget is not None:
+            seconds = positive(owner, "budget", budget, "s", remedy=CHECK_VALUE)
+            self._until = self.began + seconds
+        self._jobs, self._stage, self._bar = 0, "", None
+
+    # --- what happens on the way ----------------------------------------------------------------------
+
+    def stage(self, text: str) -> None:
+        """Tell what is done from here on."""
+        crew.check()
+        self._stage, self._jobs = text, 0
+        line = f"{self.owner}: {time.perf_counter() - self.began:.1f} s, {text}"
+        _log.info(line)
+        if callable(self._progress):
+            self._progress(line)
+        elif self._bar is not None:
+            self._bar.set_description_str(f"{self.owner}: {text}")
+
+    def detail(self, text: str, *values) -> None:
+        """Log what only a developer wants to know."""
+        _log.debug("%s: " + text, self.owner, *values)
+
+    def known(self, answer: Any) -> None:
+        """Keep an answer as it stands, and let it be heard of."""
+        self.latest = answer
+        _log.debug("%s: known so far\n%s", self.owner, answer)
+        if self._callback is not None:
+            self._callback(answer)
+        crew.check()
+
+    def within(self, whole: Callable[[Any], Any]) -> Course:
+        """Return the course of a part: its answers count as what `whole` makes of them."""
+        return _Part(self, whole)
+
+    # --- crew.Watch -----------------------------------------------------------------------------------
+
+    def left(self) -> float | None:
+        """Return how many seconds are left; None: no end is set, or nothing is known yet."""
+        if self.latest is None or math.isinf(self._until):
+            return None
+        return max(self._until - time.perf_counter(), 0.0)
+
+    def done(self) -> None:
+        """Count a job."""
+        self._jobs += 1
+        if self._bar is not None:
+            self._bar.update(1)
+
+    # --- from begin to end ----------------------------------------------------------------------------
+
+    def run(self, work: Callable[[], Any]) -> Any:
+        """Return what `work` comes to, or the last answer known where it is ended before.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            Ctrl-C before anything was known.
+        """
+        try:
+            with crew.watched(self), self._shown():
+                return work()
+        except crew.TimeUp:
+            status = BUDGET_SPENT
+        except KeyboardInterrupt:
+            if self.latest is None:
+                raise
+            status = INTERRUPTED
+        _log.info("%s: %s after %.1f s, at: %s", self.owner, status, self.seconds, self._stage)
+        return replace(self.latest, status=status, seconds=self.seconds)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since it began."""
+        return time.perf_counter() - self.began
+
+    def _shown(self):
+        return _Bar(self, self._progress)
+
+
+class _Part(Course):
+    """The course of a part of something larger."""
+
+    def __init__(self, outer: Course, whole: Callable[[Any], Any]):
+        self.outer, self.whole = outer, whole
+        self.owner, self.began = outer.owner, time.perf_counter()
+
+    def stage(self, text):
+        self.outer.stage(text)
+
+    def detail(self, text, *values):
+        self.outer.detail(text, *values)
+
+    def known(self, answer):
+        self.outer.known(self.whole(answer))
+
+    def left(self):
+        return self.outer.left()
+
+    def done(self):
+        self.outer.done()
+
+
+class _Bar:
+    """A bar on stderr while a course is run."""
+
+    def __init__(self, course: Course, progress):
+        self.course, self.progress = course, progress
+
+    def __enter__(self):
+        if not callable(self.progress):
+            self.course._bar = progress_bar(None, self.progress, self.course.owner, "job")
+        return self
+
+    def __exit__(self, *_):
+        if self.course._bar is not None:
+            self.course._bar.close()
+            self.course._bar = None

@@ -1,0 +1,117 @@
+"""Error of free prediction against how far ahead it is made, from some motions to the whole record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...drawing import draw
+from ..data.imposed import imposes_motion
+from ..data.measurement import Measurement
+from ..estimation.fit import FitResult, fit_segments
+from ..estimation.initial_states import CONTINUED, FREE
+from ..estimation.segmented import same_begins
+from ..estimation.segments import cut, facts
+from ..estimation.simulators import simulator_of
+from ..thresholds import FULL_SAMPLES, HORIZONS, SHORTEST_HORIZON
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorByHorizon:
+    """Error of a model's free prediction against its length.
+
+    The records are cut into stretches of every length. In each the model runs freely from a position and a
+    speed that are fitted; what hides in joints, gaps and bristles goes on from one into the next. The longest
+    is the whole record, a free run, as `compare` makes it with ``mode="free"``.
+
+    Attributes
+    ----------
+    horizon : (n,) array
+        Lengths [s], ascending; the last is that of the longest record.
+    rmse, nrmse : (n,) arrays
+        Error, in the unit of the output, and over the rms of the centred output.
+    unit : str
+        Of the output.
+    name : str
+        Of the records.
+    """
+
+    horizon: np.ndarray
+    rmse: np.ndarray
+    nrmse: np.ndarray
+    unit: str = ""
+    name: str = ""
+
+    @property
+    def whole(self) -> float:
+        """The nrmse of the free run of the whole record."""
+        return float(self.nrmse[-1])
+
+    def plot(self, *others: ErrorByHorizon, labels: Sequence[str] = (), **keywords):
+        """Draw it, beside others where they are given; returns a ``ct.ControlPlot``.
+
+        Parameters
+        ----------
+        *others : ErrorByHorizon
+        labels : sequence of str
+            One a curve.
+        """
+        return draw("horizons", (self, *others), labels=labels, **keywords)
+
+    def __str__(self) -> str:
+        rows = (f"{h:>9.3g} s  {e:.3g}" for h, e in zip(self.horizon, self.nrmse, strict=True))
+        return "\n".join(["  horizon    nrmse", *rows])
+
+
+def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS) -> ErrorByHorizon:
+    """Return the error of a model as it is over stretches of every length.
+
+    Parameters
+    ----------
+    model : block or loop
+        Of a loop, and of a system of which nothing is known, the whole record alone is a horizon, as what
+        hides in them cannot begin anew; and so it is under an imposed motion.
+    records : sequence of Measurement
+    most : int
+        Lengths at most, each half of the one before.
+    """
+    records = list(records)
+    found = _ladder(model, records, most)
+    power = sum(float(np.sum((r.y - r.y.mean()) ** 2)) for r in records)
+    count = sum(map(len, records))
+    squares = np.array([sum(float(e @ e) for e in f.residual) for f in found])
+    longest = max(r.duration for r in records)
+    horizon = longest / 2.0 ** np.arange(len(found) - 1, -1, -1)
+    return ErrorByHorizon(
+        horizon, np.sqrt(squares / count), np.sqrt(squares / max(power, 1e-300)), records[0].output_unit,
+        ", ".join(r.name for r in records),
+    )  # fmt: skip
+
+
+def _ladder(model, records, most) -> list[FitResult]:
+    """Return the initial states fitted over stretches of every length, the shortest first."""
+    thin = max(1, round(max(map(len, records)) / FULL_SAMPLES))
+    first, found = simulator_of(model, records[0]), []
+    if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
+        least = [max(SHORTEST_HORIZON * facts(r).swing, 50 * facts(r).dt) for r in records]
+        halvings = min(int(math.log2(max(r.duration / s, 1.0))) for r, s in zip(records, least, strict=True))
+        for k in range(min(halvings, most - 1), 0, -1):
+            found.append(_fitted(model, records, 2**k, thin, CONTINUED, found))
+    return [*found, _fitted(model, records, 1, thin, FREE, found)]
+
+
+def _fitted(model, records, parts, thin, begins, shorter) -> FitResult:
+    """Fit where stretches begin: roughly from those of shorter ones, then once at the full rate."""
+    segments = [cut(r, parts) for r in records]
+    near: Any = same_begins(shorter[-1], segments) if shorter else None
+    for rate, iterations in ((4 * thin, 3 if shorter else 8), (thin, 2)):
+        found = fit_segments(
+            model, records, segments, (), thin=rate, starts=near, iterations=iterations, tolerance=1e-2,
+            begins=begins,
+        )  # fmt: skip
+        near = found.starts
+    return found

@@ -1,0 +1,174 @@
+"""The final model of a ladder beside all models that are one exchange away."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...table import Table, frame
+
+BETTER, EQUAL, WORSE = "better", "equal", "worse"
+DROP, EXCHANGE, ADD = "drop", "exchange", "add"
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbour:
+    """A model one exchange away from the final one.
+
+    Attributes
+    ----------
+    change : {'drop', 'exchange', 'add'}
+        What was done to the final model. An exchange of two effects for one that does both is an exchange.
+    dropped : tuple of str
+        Ids of the effects taken out.
+    added : str
+        Id of the effect put in; empty where none was.
+    evidence : float
+        Log likelihood ratio over the final model [nats], less the price of parameters (Schwarz): positive
+        where the data speak for the neighbour.
+    nrmse, nrmse_holdout : float
+        Errors, on training and on held-out data (NaN: not `refitted`).
+    verdict : {'better', 'equal', 'worse'}
+        ``equal``: within what chance makes. A model that has an effect more needs the evidence of any effect.
+    refitted : bool
+        Whether it was fitted to all data. If not, a first look has shown that it comes nowhere near.
+    given : bool
+        Whether the effect dropped is the user's own: such effects stay, whatever the data say.
+    parameters : dict
+        All parameters of the neighbour.
+    model : block
+    """
+
+    change: str
+    dropped: tuple[str, ...]
+    added: str
+    evidence: float
+    nrmse: float
+    nrmse_holdout: float
+    verdict: str
+    refitted: bool
+    given: bool = False
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    model: Any = field(default=None, repr=False)
+
+    @property
+    def name(self) -> str:
+        """What was done, in signs."""
+        signs = [*(f"- {d}" for d in self.dropped), *([f"+ {self.added}"] if self.added else [])]
+        return " ".join(signs)
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours(Sequence):
+    """The final model of a ladder against all models that are one exchange away, nearest first.
+
+    Attributes
+    ----------
+    rows : tuple of Neighbour
+    nrmse, nrmse_holdout : float
+        Errors of the final model.
+    complete : bool
+        Whether all were looked at; False where the time given was over before.
+
+    Examples
+    --------
+    >>> names = ["constant_force", "quadratic_drag"]
+    >>> t = np.arange(0, 4, 0.01)
+    >>> F = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    >>> machine = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.ConstantForce(1.0))
+    >>> x = np.asarray(cdf.event_response(machine, t, F, input_hold="zoh").outputs)[0]
+    >>> record = cdf.Measurement(t, F, x + 1e-4 * np.random.default_rng(1).standard_normal(t.size))
+    >>> study = cdf.improve(cdf.friction_mass(2.0, 2.5, 5.0), record, candidates=names)
+    >>> [(n.name, n.verdict) for n in study.neighbours if n.change == "exchange"]
+    [('- constant_force + quadratic_drag', 'worse')]
+    """
+
+    rows: tuple[Neighbour, ...] = ()
+    nrmse: float = math.nan
+    nrmse_holdout: float = math.nan
+    complete: bool = True
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, index):
+        return self.rows[index]
+
+    def __iter__(self) -> Iterator[Neighbour]:
+        return iter(self.rows)
+
+    def of(self, *verdicts: str) -> tuple[Neighbour, ...]:
+        """Return the neighbours of these verdicts."""
+        return tuple(n for n in self.rows if n.verdict in verdicts)
+
+    @property
+    def sentence(self) -> str:
+        """What they come to, in plain words."""
+        if not self.rows:
+            return ""
+        how = f"{len(self.rows)} models one exchange away were looked at"
+        how += "" if self.complete else " before the time was over"
+        better, equal = self.of(BETTER), [n for n in self.of(EQUAL) if n.change != ADD]
+        found = [f"{how}: {_listed(better)} would do better." if better else f"{how}: none does better."]
+        own = [n for n in equal if n.given]
+        others = [n for n in equal if not n.given]
+        if others:
+            found.append(f"As good within chance: {_listed(others)}.")
+        if own:
+            names = ", ".join(_words(n.dropped[0]) for n in own)
+            found.append(f"The data do not need {names}, which the model given has; it was left in.")
+        nearest = next((n for n in self.rows if n.verdict == WORSE and n.change == EXCHANGE), None)
+        if nearest is not None and not others and not better:
+            found.append(
+                f"The nearest exchange, {_told(nearest)}, is {-nearest.evidence:.0f} nats behind"
+                + ("." if nearest.refitted else " at a first look.")
+            )
+        return " ".join(found)
+
+    def table(self, rows: int = 5) -> Table:
+        """Return the final model and the nearest ones as a table."""
+        lines = [("final model", "", _percent(self.nrmse), _percent(self.nrmse_holdout), "")]
+        for n in self.rows[:rows]:
+            errors = _percent(n.nrmse), _percent(n.nrmse_holdout)
+            lines.append((_told(n), f"{n.evidence:.0f}", *errors, n.verdict))
+        return Table(("neighbour", "evidence", "error", "held out", "verdict"), tuple(lines), 60)
+
+    def to_pandas(self):
+        """Return one row a neighbour as a pandas DataFrame."""
+        return frame(
+            {
+                "change": n.change, "dropped": ", ".join(n.dropped), "added": n.added, "evidence": n.evidence,
+                "nrmse": n.nrmse, "nrmse_holdout": n.nrmse_holdout, "verdict": n.verdict,
+                "refitted": n.refitted, "given": n.given,
+            }
+            for n in self.rows
+        )  # fmt: skip
+
+    def __str__(self) -> str:
+        return f"{self.sentence}\n{self.table()}"
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_()
+
+
+def _told(n: Neighbour) -> str:
+    gone = " and ".join(_words(d) for d in n.dropped)
+    if n.change == ADD:
+        return f"with {_words(n.added)} besides"
+    if n.change == DROP:
+        return f"without {gone}"
+    return f"{_words(n.added)} in place of {gone}"
+
+
+def _listed(rows) -> str:
+    return "; ".join(_told(n) for n in rows)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.3g} %" if math.isfinite(value) else "–"

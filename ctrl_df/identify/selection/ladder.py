@@ -1,0 +1,322 @@
+"""The ladder: effects added one at a time, looked at again, taken back; at its end all neighbours.
+
+From rung to rung the effect that explains most is added, and all those before it are looked at again beside
+it. Where nothing more is found, every model one exchange away is tried; a better one, or one as good and
+plainer, is where the ladder goes on. No structure is visited twice, so that it ends.
+
+Where something remains that no effect explains, an effect taken early may have stood in for several: the
+ladder then begins again from what came next at its own step, and the better end counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any
+
+from ...blocks.effect import Effect
+from ..course import COMPLETE, UNDER_WAY, Course
+from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
+from ..results.ladder import Step, Study, last_diagnosis, outcome
+from ..results.neighbours import ADD, Neighbour, Neighbours
+from ..thresholds import BRANCHES, CONFIRMED, SHOWS_HARDLY
+from .neighbours import Around, Look
+from .revision import Revision, revised
+from .search import Search
+from .structure import Structure, plainness
+from .verdict import diagnosed, worth
+
+
+@dataclass(frozen=True, eq=False)
+class Rung:
+    """A model of the ladder and what was asked of it.
+
+    Attributes
+    ----------
+    structure : Structure
+        Refitted.
+    search : Search
+    found : Diagnosis
+    steps : tuple of Step
+        How it was come to; the last one is its own.
+    """
+
+    structure: Structure
+    search: Search
+    found: Diagnosis
+    steps: tuple[Step, ...]
+
+    @property
+    def next(self) -> CandidateEffect | None:
+        """The effect to be added; None where there is none."""
+        ranking = self.found.ranking
+        if not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
+            return None
+        return plainest(ranking)
+
+
+def plainest(ranking) -> CandidateEffect:
+    """Return the plainest of the candidates that the data hardly tell from the first."""
+    first, near = ranking[0], rivals(ranking)
+    same = [c for c in near if c.id in first.equivalents]
+    fewer = [c for c in near if plainness(c.effect)[0] < plainness(first.effect)[0]]
+    return min([first, *same, *fewer], key=lambda c: plainness(c.effect))
+
+
+class Climb:
+    """The way up, and back where it was wrong.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    start : Mechanism
+    classes : sequence of effect classes
+        To be tried; what is found does not depend on their order.
+    free : callable
+        Parameters of a block that may be refitted.
+    max_effects : int
+        Most effects added.
+    executor : concurrent.futures.Executor or None
+    course : Course
+        Hears of the `Study` as it stands.
+    """
+
+    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor, course: Course):
+        self.dataset, self.free, self.executor, self.course = dataset, free, executor, course
+        self.classes = sorted(dict.fromkeys(classes), key=lambda c: c.id)
+        self.max_effects = max_effects
+        self.start = Structure(start, len(start.effects))
+        self.rungs: dict[tuple[str, ...], Rung] = {}
+        self.best: Study | None = None  # what is known, while something else is tried
+
+    def to_the_end(self) -> Study:
+        """Return the end of the ladder and its neighbours."""
+        end, around = self._settled(self._up(self.start, ()))
+        for rung, effect in islice(self._rivals(end), BRANCHES):
+            if end.found.verdict != UNKNOWN:
+                break
+            self.best = self._study(end.steps, end.search, UNDER_WAY, around)
+            other = self._again(end, rung, effect)
+            self.best = None
+            if other is not None:
+                end, around = self._settled(self._on(other))
+        self.course.stage("all models over the same data")
+        steps = list(end.steps)
+        again = end.search.final([s.model for s in steps], self.free)
+        if again is not None:
+            steps = [
+                replace(s, model=m, nrmse=e, nrmse_holdout=h, parameters=_values(m))
+                for s, (m, e, h) in zip(steps, again, strict=True)
+            ]
+        return self._study(steps, end.search, COMPLETE, around)
+
+    # --- up -------------------------------------------------------------------------------------------
+
+    def _up(self, structure: Structure, steps, how: dict | None = None) -> Rung:
+        """Climb from a structure until nothing more is found."""
+        return self._on(self._rung(structure, steps, how or {}))
+
+    def _on(self, rung: Rung) -> Rung:
+        while (best := rung.next) is not None:
+            step = _step(rung.found, best.model, (best.nrmse, best.nrmse_holdout), _added(best))
+            self._known((*rung.steps, step), rung.search)
+            self.course.stage("earlier effects looked at again")
+            revision = self._beside(rung, best)
+            if revision.structure.key in self.rungs:
+                break
+            how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
+            rung = self._rung(revision.structure, rung.steps, how)
+        return rung
+
+    def _rung(self, structure: Structure, steps, how: dict) -> Rung:
+        """Ask of a structure what it misses."""
+        self.course.stage(f"step {len(steps)}: the model refitted")
+        search = self.dataset.search(structure.block, self.free(structure.block))
+        last = steps[-1] if steps else None
+
+        def told(found: Diagnosis) -> Step:
+            errors = found.nrmse, found.nrmse_holdout
+            if last is not None and not math.isfinite(errors[1]):  # not tried on what is held out yet
+                errors = last.nrmse, last.nrmse_holdout
+            return _step(found, found.model, errors, how)
+
+        def so_far(found: Diagnosis) -> Study:
+            return self.best or self._study((*steps, told(found)), search, UNDER_WAY)
+
+        room = len(structure.added) < self.max_effects
+        found = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
+        rung = Rung(structure.at(found.model), search, found, (*steps, told(found)))
+        self.rungs[structure.key] = rung
+        return rung
+
+    def _beside(self, rung: Rung, effect: CandidateEffect) -> Revision:
+        """Add an effect, and look again at those before it."""
+        others = [c.effect for c in rung.found.ranking if c is not effect and c.confirmed]
+        return revised(rung.structure.plus(effect.model, others), rung.search, self.free)
+
+    # --- about ----------------------------------------------------------------------------------------
+
+    def _settled(self, end: Rung) -> tuple[Rung, Neighbours]:
+        """Go on to better neighbours until there are none."""
+        refound: set[tuple[str, ...]] = set()
+        for _ in range(self.max_effects):
+            around, table = self._around(end)
+            better = around.better(self.rungs, end.structure.key not in refound)
+            if better is None:
+                return end, table
+            structure, how = better
+            if structure.key == end.structure.key:
+                refound.add(structure.key)
+            end = self._up(structure, end.steps, _exchanged(how))
+        return end, self._around(end)[1]
+
+    def _around(self, end: Rung) -> tuple[Around, Neighbours]:
+        """Look at every neighbour of a model in which nothing more was found."""
+        self._known(end.steps, end.search)
+        self.course.stage("every effect left out in turn")
+        around = Around(end.structure, end.search, self.free)
+        around.add(end.found.ranking)
+        around.drop_each()
+        if end.found.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
+            around.add_again(self._seen(end))
+        errors = end.search.errors(around.own)
+        for place in reversed(range(len(end.structure.added))):
+            self._known(end.steps, end.search, Neighbours(around.rows(), *errors, complete=False))
+            self.course.stage(f"others in place of {end.structure.added[place].id.replace('_', ' ')}")
+            around.exchange(place, self._look(end, place))
+        around.merge()
+        table = Neighbours(around.rows(), *errors)
+        self._known(end.steps, end.search, table)
+        return around, table
+
+    def _look(self, end: Rung, place: int) -> Look:
+        """Return what was tried in the place of an effect: when it was added, or now."""
+        less, old = end.structure.without(place), end.structure.added[place]
+        rung = self.rungs.get(less.key)
+        if rung is not None and rung.found.ranking:
+            return _looked(rung, old)
+        search = self.dataset.search(less.block, self.free(less.block))
+        model = end.structure.block
+        return Look(less, search.rivals(model, self.free(model), self.classes, self.executor), search.errors)
+
+    def _seen(self, end: Rung) -> list[Effect]:
+        """Return effects that left less error at an earlier step, with the values of the last such one."""
+        found: dict[str, Effect] = {}
+        for rung in reversed([r for r in self._way(end) if r is not end]):
+            ranking = sorted(rung.found.ranking, key=lambda c: c.nrmse)
+            for c in ranking:
+                if c.confirmed and c.nrmse < rung.found.nrmse:
+                    found.setdefault(c.id, c.effect)
+        return list(found.values())[:CONFIRMED]
+
+    def _way(self, end: Rung) -> list[Rung]:
+        """Return the rungs that led to an end, it included."""
+        return [r for r in self.rungs.values() if any(r.steps[-1] is s for s in end.steps)]
+
+    # --- again from below -----------------------------------------------------------------------------
+
+    def _rivals(self, end: Rung) -> Iterator[tuple[Rung, CandidateEffect]]:
+        """Yield what was not followed on the way to an end, the first of every step before the second of any.
+
+        Within a step by the error left: of several effects that are missing none need show by itself.
+        """
+        found = []
+        for rung in self._way(end):
+            followed = rung.next
+            named = {followed.id, *followed.equivalents} if followed is not None else set()
+            ranking = sorted((c for c in rung.found.ranking if c.confirmed), key=lambda c: c.nrmse)
+            rank = 0
+            for c in ranking:
+                if c.id in named or not c.nrmse < SHOWS_HARDLY * rung.found.nrmse:
+                    continue
+                named |= {c.id, *c.equivalents}
+                key = rung.structure.plus(c.model).key
+                found.append(((rank, c.nrmse / rung.found.nrmse, key), rung, c))
+                rank += 1
+        for (_, _, key), rung, c in sorted(found, key=lambda f: f[0]):
+            if key not in self.rungs:
+                yield rung, c
+
+    def _again(self, end: Rung, rung: Rung, effect: CandidateEffect) -> Rung | None:
+        """Ask of the model with a rival of an earlier step; return it if it, or what follows, is better."""
+        structure = self._beside(rung, effect).structure
+        if structure.key in self.rungs:
+            return None
+        gone, new = [e.id for e in end.structure.added], [e.id for e in structure.added]
+        how = {
+            "dropped": tuple(e for e in gone if e not in new),
+            "instead": tuple(e for e in new if e not in gone),
+            "evidence": effect.evidence - max(rung.found.ranking[0].evidence, 0.0),
+        }
+        other = self._rung(structure, end.steps, how)
+        following = other.next
+        ahead = other.structure.block if following is None else following.model
+        return other if self._beats(ahead, end.structure.block, other.search) else None
+
+    def _beats(self, block, end, search: Search) -> bool:
+        """Whether a model does better than the end of the ladder, on the data of a search."""
+        fits = [search.fitted(b, self.free(b), 6) for b in (end, block)]
+        judged = search.ranked(fits[0], [replace(fits[1], extra=fits[1].extra - fits[0].extra)])[0]
+        return judged.evidence > search.significant
+
+    # --- what is known --------------------------------------------------------------------------------
+
+    def _known(self, steps, search: Search, neighbours: Neighbours | None = None) -> None:
+        self.course.known(self.best or self._study(steps, search, UNDER_WAY, neighbours))
+
+    def _study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
+        return Study(
+            tuple(steps), steps[-1].model, outcome(steps), search.relative(last_diagnosis(steps).noise),
+            self.start.block, self.dataset.records, self.dataset.validation, self.course.seconds, status,
+            neighbours or Neighbours(complete=False),
+        )  # fmt: skip
+
+
+def _step(found: Diagnosis, model, errors, how: dict) -> Step:
+    return Step(
+        model=model,
+        nrmse=errors[0],
+        nrmse_holdout=errors[1],
+        parameters=_values(model),
+        diagnosis=found,
+        **how,
+    )
+
+
+def _values(model) -> dict[str, float]:
+    return {k: p.value for k, p in model.parameters.items()}
+
+
+def _added(effect: CandidateEffect) -> dict:
+    return {"effect": effect.id, "evidence": effect.evidence, "equivalents": effect.equivalents}
+
+
+def _exchanged(n: Neighbour) -> dict:
+    if n.dropped == (n.added,):  # the same in a better minimum
+        return {"evidence": n.evidence}
+    if n.change == ADD:
+        return {"effect": n.added, "evidence": n.evidence}
+    return {"dropped": n.dropped, "instead": (n.added,) if n.added else (), "evidence": n.evidence}
+
+
+def _looked(rung: Rung, old) -> Look:
+    """Return what was asked of a structure as a look at what may stand for an effect that was then added."""
+    first = {t.key: t.evidence for t in rung.search.first_look}
+    own = next((c for c in rung.found.ranking if c.confirmed and c.id == old.id), rung.found.ranking[0])
+    entries = []
+    for c in rung.found.ranking:
+        # those confirmed are judged by other segments than at the first look
+        ahead = c.evidence - own.evidence if c.confirmed else first[c.id] - max(first.get(old.id, 0.0), 0.0)
+        entries.append(_Entry(c.model, ahead, (c.nrmse, c.nrmse_holdout), c.confirmed))
+    entries.sort(key=lambda e: (not e.confirmed, -e.evidence))
+    return Look(rung.structure, entries, lambda e: e.errors)
+
+
+@dataclass(frozen=True, eq=False)
+class _Entry:
+    block: Any
+    evidence: float
+    errors: tuple[float, float]
+    confirmed: bool

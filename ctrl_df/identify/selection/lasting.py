@@ -1,0 +1,87 @@
+"""Whether the best candidate is ahead of all others however far ahead it has to predict.
+
+Evidence is of segments that begin anew, some motions long. A model of other physics may follow those, from
+states that are fitted in each; over longer stretches, hidden states going on, it falls behind one that is
+right, or behind the model without it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...simulate.crew import side_by_side
+from ..estimation.segments import facts
+from ..results.diagnosis import Baseline, CandidateEffect
+from ..thresholds import GROWTH, OUTLASTING, UNMOVED
+
+
+@dataclass(frozen=True)
+class Lasting:
+    """How the first of some models does over long stretches.
+
+    Attributes
+    ----------
+    horizon : float
+        The longest over which the best of them explains the motion [s], or the one where the first falls
+        behind most; 0: none explains the motion over any.
+    errors : mapping of str to float
+        nrmse there, by id; that of the baseline has an empty one.
+    better : tuple of str
+        Ids of those that err clearly less than the first, the best first.
+    """
+
+    horizon: float
+    errors: Mapping[str, float]
+    better: tuple[str, ...]
+
+    @property
+    def ahead(self) -> bool:
+        """Whether the first explains the motion there, and none does so better."""
+        return self.horizon > 0 and not self.better
+
+
+def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: float) -> Lasting | None:
+    """Compare the first of a ranking with its rivals over all stretches up to the longest that one predicts.
+
+    Errors count by their mean square over these lengths: what follows long ones by chance fails over others.
+    Where nothing pulls a model back, small errors of parameters drift apart in time: beyond some length no
+    model predicts anything, and there nothing is compared.
+
+    Parameters
+    ----------
+    ranking : sequence of CandidateEffect
+        The best of these are compared, those that the first equals left aside.
+    base : Baseline
+        Compared as well; its name is empty.
+    significant : float
+        Evidence that a rival needs [nats].
+
+    Returns
+    -------
+    Lasting or None
+        None where there is nothing to predict.
+    """
+    first, *others = ranking
+    if first.predicted is None:
+        return None
+    near = [c for c in others if c.confirmed and c.evidence > significant and c.id not in first.equivalents]
+    models = [base, first, *near[:OUTLASTING]]
+    curves = side_by_side(lambda m: m.error_by_horizon, models)
+    facts_of = [facts(r) for r in first.predicted[1]]
+    noise = math.sqrt(sum(f.noise**2 for f in facts_of) / sum(f.spread**2 for f in facts_of))
+    names = ["", *(c.id for c in models[1:])]
+    table = np.maximum([c.nrmse for c in curves], noise)  # errors below tell nothing
+    told = np.flatnonzero(np.min(table, axis=0) < UNMOVED)
+    if not told.size:
+        return Lasting(0.0, dict(zip(names, table[:, 0].tolist(), strict=True)), ())
+    table = table[:, : told[-1] + 1]
+    usual = dict(zip(names, np.sqrt(np.mean(table**2, axis=1)).tolist(), strict=True))
+    better = sorted((n for n in names if GROWTH * usual[n] < usual[first.id]), key=usual.__getitem__)
+    others = np.array([n != first.id for n in names])
+    shown = int(np.argmax(table[1] / np.min(table[others], axis=0))) if better else len(table[0]) - 1
+    errors = dict(zip(names, table[:, shown].tolist(), strict=True))
+    return Lasting(float(curves[0].horizon[shown]), errors, tuple(better))

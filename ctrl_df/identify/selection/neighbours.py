@@ -1,0 +1,196 @@
+"""All models one exchange away from one: an effect less, another in its place, one more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
+from ..thresholds import RIVALS, RULED_OUT
+from .search import Search
+from .structure import Structure, exchanged, parameters_of, plainness
+from .verdict import worth
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What was tried in the place of an effect.
+
+    Attributes
+    ----------
+    less : Structure
+        The model without it.
+    trials : sequence of Judged
+        Blocks with another effect at their end, roughly fitted, best first; evidence over the model.
+    errors : callable
+        Errors of a trial, on the data fitted and on those held out.
+    """
+
+    less: Structure
+    trials: Sequence[Any]
+    errors: Callable[[Any], tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A neighbour to be fitted: what was done, and the structure it then is."""
+
+    change: str
+    dropped: tuple[str, ...]
+    added: str
+    structure: Structure
+    given: bool = False
+
+
+class Around:
+    """The neighbours of a model, fitted as far as they come near.
+
+    Parameters
+    ----------
+    structure : Structure
+        The model.
+    search : Search
+        In which nothing more was found.
+    free : callable
+        Parameters of a block that may be refitted.
+    """
+
+    def __init__(self, structure: Structure, search: Search, free: Callable):
+        self.structure, self.search, self.free = structure, search, free
+        self.own = self._fitted(structure.block, 8)
+        self.near: list[tuple[Trial, Any]] = []
+        self.far: list[Neighbour] = []
+
+    def _fitted(self, block, iterations):
+        return self.search.fitted(block, self.free(block), iterations)
+
+    def fit(self, trial: Trial) -> None:
+        """Fit one to the data that judge the model."""
+        found = self._fitted(trial.structure.block, 8)
+        self.near.append((trial, replace(found, extra=found.extra - self.own.extra)))
+
+    # --- an effect less -------------------------------------------------------------------------------
+
+    def drop_each(self) -> None:
+        """Leave out every effect in turn, the user's own too: those are told of, and stay."""
+        at = self.structure
+        for place, effect in enumerate(at.block.effects):
+            own = place < at.given
+            less = at.at(at.bare(place)) if own else at.without(place - at.given)
+            self.fit(Trial(DROP, (effect.id,), "", less, own))
+
+    # --- another in its place -------------------------------------------------------------------------
+
+    def exchange(self, place: int, look: Look) -> None:
+        """Fit what comes nearest to an effect in its place; keep what the first look says of the others."""
+        old = self.structure.added[place]
+        others = [t for t in look.trials if t.block.effects[-1].id != old.id]
+        again = [
+            t
+            for t in look.trials
+            if t.block.effects[-1].id == old.id and t.evidence > self.search.significant
+        ]
+        nearest = others[:RIVALS]
+        for t in [*again, *nearest]:
+            rivals = (old, *(o.block.effects[-1] for o in nearest if o is not t))
+            self.fit(Trial(EXCHANGE, (old.id,), t.block.effects[-1].id, look.less.plus(t.block, rivals)))
+        for t in others[RIVALS:]:
+            added = t.block.effects[-1].id
+            self.far.append(
+                _row(EXCHANGE, (old.id,), added, t.evidence, look.errors(t), WORSE, False, t.block)
+            )
+
+    def merge(self) -> None:
+        """Let what does as well in the place of one effect stand for another one, too.
+
+        An effect more never fits worse: only exchanges that are no worse can be such.
+        """
+        for trial, t in self._judged():
+            if trial.change != EXCHANGE or t.evidence < -self.search.significant:
+                continue
+            structure = trial.structure.at(t.block)
+            for place, other in enumerate(structure.added[:-1]):
+                self.fit(
+                    replace(trial, dropped=(*trial.dropped, other.id), structure=structure.without(place))
+                )
+
+    # --- one more -------------------------------------------------------------------------------------
+
+    def add(self, ranking) -> None:
+        """Take what the diagnosis of the model says of every effect besides."""
+        for c in ranking:
+            better = c.confirmed and worth(c, self.search)
+            verdict = BETTER if better else WORSE if c.evidence < -RULED_OUT else EQUAL
+            errors = c.nrmse, c.nrmse_holdout
+            self.far.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
+
+    def add_again(self, effects) -> None:
+        """Begin effects besides with values that they had at earlier steps."""
+        for effect in effects:
+            block = exchanged(self.structure.block, effect)
+            if block is not None:
+                self.fit(Trial(ADD, (), effect.id, self.structure.plus(block)))
+
+    # --- what they come to ----------------------------------------------------------------------------
+
+    def _judged(self) -> list[tuple[Trial, Any]]:
+        ranked = self.search.ranked(self.own, [t for _, t in self.near])
+        by_block = {id(t.block): t for t in ranked}
+        return [(trial, by_block[id(t.block)]) for trial, t in self.near]
+
+    def rows(self) -> tuple[Neighbour, ...]:
+        """Return all of them, those that were fitted first, by evidence."""
+        others = [(trial, t) for trial, t in self._judged() if trial.structure.key != self.structure.key]
+        near = [self._told(trial, t) for trial, t in others]
+        return tuple(sorted([*near, *self.far], key=lambda n: (not n.refitted, -n.evidence)))
+
+    def _told(self, trial: Trial, t) -> Neighbour:
+        errors = self.search.errors(t)
+        verdict = self._verdict(trial, t)
+        return _row(
+            trial.change, trial.dropped, trial.added, t.evidence, errors, verdict, True, t.block, trial.given
+        )
+
+    def _verdict(self, trial: Trial, t) -> str:
+        """Return how a neighbour does: what has an effect more needs the evidence of any effect."""
+        fewer = len(trial.dropped) > bool(trial.added)
+        more = len(trial.dropped) < bool(trial.added)
+        alone = t.evidence_validation > self.search.significant_validation
+        if t.evidence > self.search.significant and (alone or not more):
+            return BETTER
+        return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
+
+    def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:
+        """Return the neighbour to go to: the best of those that do better, else the plainest of the equals.
+
+        `known`: keys of structures that the ladder has been at; `again`: whether the model itself with other
+        values, in a better minimum, may be one.
+        """
+        found = []
+        for trial, t in self._judged():
+            verdict = self._verdict(trial, t)
+            same = trial.structure.key == self.structure.key
+            if trial.given or verdict == WORSE or not (again if same else trial.structure.key not in known):
+                continue
+            structure = trial.structure.at(t.block)
+            if verdict == EQUAL and _plain(structure) >= _plain(self.structure):
+                continue
+            order = (0, -t.evidence, ()) if verdict == BETTER else (1, 0.0, _plain(structure))
+            found.append((order, structure, self._told(trial, t)))
+        return min(found, key=lambda f: f[0])[1:] if found else None
+
+
+def _plain(structure: Structure) -> tuple:
+    """Return the order of structures as good as each other."""
+    kinds = sorted(plainness(e) for e in structure.added)
+    return sum(parameters_of(e) for e in structure.added), len(structure.added), tuple(kinds)
+
+
+def _row(change, dropped, added, evidence, errors, verdict, refitted, block, given=False) -> Neighbour:
+    values = {k: p.value for k, p in block.parameters.items()}
+    nrmse, held = errors
+    return Neighbour(
+        change, tuple(dropped), added, float(evidence), float(nrmse), float(held), verdict, refitted, given,
+        values, block,
+    )  # fmt: skip

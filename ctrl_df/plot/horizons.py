@@ -1,0 +1,40 @@
+"""The error of free prediction against its length."""
+
+from __future__ import annotations
+
+import control as ct
+
+from .curves import log_ticks
+from .page import ERROR, MEASURED, MODEL, legend_above, page
+
+_COLOURS = (MODEL, ERROR, MEASURED, "#3f8f5f", "#8a5fa8")
+
+
+def horizons_plot(curves, *, labels=(), title=None, width=None, **keywords) -> ct.ControlPlot:
+    """Draw one or more `ErrorByHorizon`.
+
+    Parameters
+    ----------
+    curves : sequence of ErrorByHorizon
+    labels : sequence of str
+        One a curve; none: no legend.
+    title : str or None
+        Over the picture.
+    width : float or None
+        Of a new figure [in].
+    """
+    with page(0.55, narrow=0.8, width=width, keywords=keywords) as drawn:
+        ax, lines = drawn.panels(1)[0], []
+        for i, curve in enumerate(curves):
+            label = labels[i] if i < len(labels) else None
+            colour = _COLOURS[i % len(_COLOURS)]
+            lines.append(ax.plot(curve.horizon, 100 * curve.nrmse, "o-", ms=4, color=colour, label=label))
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        log_ticks(ax.xaxis, *ax.get_xlim())
+        log_ticks(ax.yaxis, *ax.get_ylim())
+        ax.set_xlabel("time predicted freely [s]")
+        ax.set_ylabel("error [% of the output's rms]")
+        named = curves[0].name or "records"
+        legend_above(ax, f"Error against the horizon, {named}" if title is None else title)
+        return drawn.finished(lines)

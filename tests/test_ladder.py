@@ -1,0 +1,286 @@
+"""The course of a ladder on data of which all likelihoods are given: up, back, about, again from below."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.course import Course
+from ctrl_df.identify.selection.ladder import Climb
+from ctrl_df.identify.selection.revision import revised
+from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
+from ctrl_df.identify.selection.structure import Structure
+from ctrl_df.identify.starting.extend import applicable, extended
+
+MADE = {
+    "coulomb": cdf.Coulomb(1.0),
+    "stribeck": cdf.Stribeck(1.0, 0.1),
+    "stiction": cdf.Stiction(1.0),
+    "constant_force": cdf.ConstantForce(1.0),
+    "asymmetric_coulomb": cdf.AsymmetricCoulomb(1.0),
+    "quadratic_drag": cdf.QuadraticDrag(1.0),
+    "position_ripple": cdf.PositionRipple(1.0, 0.1),
+    "linear_spring": cdf.LinearSpring(1.0),
+    "hysteresis": cdf.Hysteresis(1.0, 0.1),
+}
+"""Effects of which the data know."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    block: Any
+    level: float
+    key: str = ""
+    extra: int = 0
+    evidence: float = 0.0
+    evidence_validation: float = 0.0
+    confirmed: bool = False
+
+
+class Given(Search):
+    """A search that knows the likelihood of every structure."""
+
+    significant, significant_validation, measure = 20.0, 5.0, "output"
+    words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
+
+    def __init__(self, data, block, free):
+        self.data, self.block, self.free = data, block, tuple(free)
+        self.base = self.fitted(block, free, 0)
+        data.asked.append(data.added(block))
+
+    records = ((), ())
+
+    def fitted(self, block, names, iterations):
+        return Fit(block, self.data.level(block), block.newest if block.effects else "", len(names))
+
+    def candidates(self, classes, executor=None):
+        made = [self.data.made(c.id, self.block) for c in classes if applicable(c, self.block)]
+        blocks = [extended(self.block, effect) for effect in made]
+        found = [self.fitted(b, (), 0) for b in blocks if b is not None]
+        return self.ranked(self.base, [replace(t, extra=1) for t in found])
+
+    def confirm(self, found):
+        return [replace(t, confirmed=True) for t in found]
+
+    def ranked(self, base, judged):
+        found = [replace(t, evidence=t.level - base.level - 3.0 * t.extra) for t in judged]
+        return sorted(
+            (replace(t, evidence_validation=t.evidence / 2) for t in found), key=lambda t: -t.evidence
+        )
+
+    def errors(self, judged):
+        return (math.exp(-judged.level / 1000),) * 2
+
+    def standard_errors(self, judged):
+        return {}
+
+    def determined(self, judged):
+        return True
+
+    def predicted(self, judged):
+        return None
+
+    at_first = Remainder(0.0, 0.0, False)
+
+    def alike(self, a, b):
+        return {a.key, b.key} in self.data.alike
+
+    def remainder(self, best, significant):
+        return Remainder(0.01, 0.0, best.level < self.data.top - 50)
+
+    def located(self, best, remainder, unknown):
+        return Located(None, ())
+
+
+class Data:
+    """Log likelihoods by the effects added, the others by those they are made of."""
+
+    def __init__(self, levels, alike=(), start=None):
+        self.levels, self.alike, self.asked = {frozenset(k.split()): v for k, v in levels.items()}, alike, []
+        self.start = start or cdf.Mass(1.0)
+        self.top = max(self.levels.values())
+        self.records, self.validation = (), ()
+
+    def added(self, block):
+        return tuple(e.id for e in block.effects[len(self.start.effects) :])
+
+    def made(self, id, block):
+        return MADE[id]
+
+    def level(self, block):
+        if block.effects[: len(self.start.effects)] != self.start.effects:
+            return -1e3  # one of the user's own is missing
+        mine = frozenset(self.added(block))
+        # an effect that is not spoken of does nothing
+        return max(v for k, v in self.levels.items() if k <= mine)
+
+    def search(self, block, free):
+        return Given(self, block, free)
+
+
+def climb(data, names=tuple(MADE), most=5, course=None):
+    def free(block):
+        return [k for k, p in block.parameters.items() if p.free]
+
+    classes = [cdf.effect_class(n) for n in names]
+    course = course or Course("improve")
+    ladder = Climb(data, data.start, classes, free, most, None, course)
+    return course.run(ladder.to_the_end)
+
+
+def test_one_effect_and_its_neighbours():
+    study = climb(Data({"": 0, "linear_spring": 900, "constant_force": 300}))
+    assert study.effects == ("linear_spring",) and study.verdict == "effect"
+    around = {n.name: n for n in study.neighbours}
+    assert around["- linear_spring"].verdict == "worse"
+    assert around["- linear_spring + constant_force"].evidence == pytest.approx(-600, abs=10)
+    assert around["+ coulomb"].verdict == "equal" and around["+ coulomb"].change == "add"
+    assert study.neighbours.complete and "none does better" in study.summary()
+    table = study.neighbours.to_pandas()
+    assert len(table) == len(study.neighbours) and set(table["verdict"]) <= {"better", "equal", "worse"}
+
+
+def test_what_stood_in_gives_way_beside_a_later_effect():
+    # one curve over speed looks like dry friction and drag together
+    levels = {"": 0, "stribeck": 500, "coulomb": 400, "quadratic_drag": 300, "stribeck quadratic_drag": 800,
+              "coulomb quadratic_drag": 1000}  # fmt: skip
+    study = climb(Data(levels))
+    assert set(study.effects) == {"coulomb", "quadratic_drag"}
+    last = study.steps[-1]
+    assert (last.effect, last.dropped, last.instead) == ("quadratic_drag", ("stribeck",), ("coulomb",))
+    assert "coulomb does what stribeck stood in for" in study.summary()
+
+
+def test_the_end_is_exchanged_for_a_better_neighbour():
+    # what is right beside the others was nowhere near at its own step
+    levels = {"": 0, "stribeck": 500, "constant_force": 100, "coulomb": 40, "stiction": 480,
+              "hysteresis": 470, "asymmetric_coulomb": 460, "stribeck constant_force": 700,
+              "coulomb constant_force": 900}  # fmt: skip
+    study = climb(Data(levels))
+    assert set(study.effects) == {"coulomb", "constant_force"}
+    assert "coulomb" in study.story[0] and not study.neighbours.of("better")
+    # no structure is asked about twice for what it misses
+    assert study.steps[-1].diagnosis.verdict == "none"
+
+
+def test_two_that_stood_in_for_one_are_merged():
+    # a bad optimum: beside either half the right one shows what it can do, and the other half is idle
+    levels = {"": 0, "constant_force": 300, "linear_spring": 200, "hysteresis": 150, "stiction": 180,
+              "constant_force linear_spring": 600, "hysteresis linear_spring": 700,
+              "hysteresis constant_force": 700}  # fmt: skip
+    data = Data(levels)
+    found = data.level
+
+    def level(block):
+        bad = data.added(block) == ("hysteresis",) and ("constant_force",) not in data.asked
+        return 150 if bad else 700 if "hysteresis" in data.added(block) else found(block)
+
+    data.level = level
+    study = climb(data)
+    assert study.effects == ("hysteresis",)
+    assert any(len(n.dropped) == 1 and n.change == "drop" for n in study.neighbours)
+
+
+def test_equals_are_told_by_fewer_parameters_and_plain_terms_whatever_the_order():
+    levels = {"": 0, "constant_force": 500, "asymmetric_coulomb": 501, "hysteresis": 503}
+    data = Data(levels, alike=[{"constant_force", "asymmetric_coulomb"}])
+    for names in (tuple(MADE), tuple(reversed(MADE))):
+        assert climb(data, names).effects == ("constant_force",)
+
+
+def test_where_something_remains_the_ladder_begins_again_from_what_was_not_followed():
+    levels = {"": 0, "hysteresis": 600, "linear_spring": 500, "quadratic_drag": 100,
+              "linear_spring quadratic_drag": 2000}  # fmt: skip
+    study = climb(Data(levels))
+    assert set(study.effects) == {"linear_spring", "quadratic_drag"} and study.verdict == "effect"
+    back = next(s for s in study.steps if not s.effect and s.changes)
+    assert back.dropped == ("hysteresis",) and back.instead == ("linear_spring",)
+    assert "The ladder went back" in study.summary()
+
+
+def test_what_an_earlier_step_has_seen_is_tried_again():
+    # beside dry friction the search for ripples ends at the wrong length; before, it had the right one
+    class Blind(Data):
+        def made(self, id, block):
+            wrong = id == "position_ripple" and "coulomb" in self.added(block)
+            return cdf.PositionRipple(1.0, 5.0) if wrong else MADE[id]
+
+        def level(self, block):
+            wrong = any(getattr(e, "wavelength", 0.0) == 5.0 for e in block.effects)
+            return super().level(block.without_effect("position_ripple") if wrong else block)
+
+    levels = {"": 0, "coulomb": 900, "position_ripple": 300, "coulomb position_ripple": 1500}
+    study = climb(Blind(levels))
+    assert set(study.effects) == {"coulomb", "position_ripple"} and study.verdict == "effect"
+    assert [s.effect for s in study.steps] == ["", "coulomb", "position_ripple"]
+
+
+def test_of_two_that_hide_each_other_neither_need_be_significant():
+    levels = {"": 0, "coulomb": 15, "constant_force": 5, "coulomb constant_force": 900}
+    data = Data(levels)
+    # errors fall, evidence does not reach what chance does
+    Given.errors, before = (lambda self, t: (math.exp(-t.level / 100),) * 2), Given.errors
+    try:
+        study = climb(data)
+    finally:
+        Given.errors = before
+    assert set(study.effects) == {"coulomb", "constant_force"}
+
+
+def test_several_of_a_kind_are_known_by_their_places():
+    # names of several ripples change as soon as one of them goes
+    start = cdf.Mass(1.0, [cdf.PositionRipple(2.0, 0.3)])
+    data = Data({"": 0, "position_ripple": 500, "bristle": 700}, start=start)
+    added = [cdf.PositionRipple(1.0, 0.1), cdf.PositionRipple(1.0, 0.2), cdf.Bristle(1e4, 10.0)]
+    block = start
+    for effect in added:
+        block = block.with_effect(effect)
+    search = Given(data, start, ("mass",))
+    found = revised(Structure(block, 1, ((), (), ())), search, lambda b: ["mass"])
+    assert found.dropped == ("position_ripple", "position_ripple")
+    assert found.structure.block.effects == (start.effects[0], added[2])
+    assert climb(Data({"": 0, "position_ripple": 500}, start=start)).effects == ("position_ripple",)
+
+
+def test_no_exchange_makes_a_second_of_what_can_be_there_once():
+    # each is a rival of the other's step
+    levels = {"": 0, "stribeck": 500, "quadratic_drag": 480, "quadratic_drag stribeck": 900,
+              "quadratic_drag coulomb": 1000, "coulomb": 470}  # fmt: skip
+    study = climb(Data(levels))
+    assert len(set(study.effects)) == len(study.effects) == 2
+
+
+def test_what_the_user_gave_stays_and_is_told_of():
+    class Idle(Data):
+        def level(self, block):
+            mine = frozenset(e.id for e in block.effects if e.id not in ("viscous",))
+            return max(v for k, v in self.levels.items() if k <= mine)
+
+    start = cdf.Mass(1.0, [cdf.Viscous(1.0)])
+    study = climb(Idle({"": 0, "linear_spring": 500}, start=start))
+    own = next(n for n in study.neighbours if n.given)
+    assert own.dropped == ("viscous",) and own.verdict == "equal"
+    assert study.model.effects[0] == start.effects[0]
+    assert "do not need viscous" in study.summary()
+
+
+def test_a_longest_ladder_of_nothing():
+    study = climb(Data({"": 0, "linear_spring": 500}), most=0)
+    assert study.effects == () and not [n for n in study.neighbours if n.change != "drop"]
+
+
+@pytest.mark.parametrize("after", range(1, 12, 3))
+def test_ctrl_c_keeps_the_best_so_far(after):
+    heard = []
+
+    def stop(study):
+        heard.append(study)
+        if len(heard) == after:
+            raise KeyboardInterrupt
+
+    data = Data({"": 0, "linear_spring": 900, "constant_force": 300, "constant_force linear_spring": 1200})
+    study = climb(data, course=Course("improve", False, stop, None))
+    assert study.status in ("interrupted", "complete") and study.model is study.steps[-1].model
+    assert study.summary() and str(study.neighbours) is not None

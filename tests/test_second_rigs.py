@@ -1,0 +1,213 @@
+"""The second generator of rigs: physics against SciPy, by hand, by shorter steps; always the same rigs."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+
+import rigs_second as rigs
+import second_physics as physics
+import second_signals as signals
+from second_table import share, table
+
+TICK = 0.01
+T = TICK * np.arange(200)
+FORCE = 30 * np.sin(6 * T) + 8 * np.sin(17 * T)
+
+
+def machine(**values):
+    p = physics.blank()
+    for name, value in values.items():
+        p[physics.AT[name]] = value
+    return p
+
+
+def run(p, force=FORCE, start=(0.0,) * 8, fineness=1.0, linear=True, **other):
+    h = physics.longest_step(p, TICK, 3.0, 40.0) / fineness
+    late_in, late_out = other.get("late_in", 0.0), other.get("late_out", 0.0)
+    return physics.run(
+        p, np.array(start), force, other.get("closed", False), TICK, h, linear, late_in, late_out,
+        other.get("load", False), other.get("pid", np.zeros(6)), np.zeros(len(force)), 0.0,
+    )  # fmt: skip
+
+
+def scipy_says(rates, states=2):
+    return solve_ivp(
+        rates, (0, T[-1]), np.zeros(states), "DOP853", T, rtol=1e-11, atol=1e-12, max_step=TICK
+    ).y
+
+
+def u(t):
+    i = min(int(t / TICK), len(T) - 2)
+    return FORCE[i] + (t / TICK - i) * (FORCE[i + 1] - FORCE[i])
+
+
+SMOOTH = {
+    "spring": (dict(spring=20.0, viscous=1.0), lambda t, x, v: -20 * x - v),
+    "cubic": (dict(cubic=9.0, viscous=1.0), lambda t, x, v: -9 * x**3 - v),
+    "drag": (dict(drag=2.0, constant=3.0), lambda t, x, v: 3 - 2 * v * abs(v)),
+    "uneven": (dict(uneven_viscous=1.5, viscous=2.0), lambda t, x, v: -2 * v - 0.75 * abs(v)),
+    "ripple": (
+        dict(ripple=5.0, ripple_wave=0.4, ripple_phase=0.3),
+        lambda t, x, v: 5 * np.sin(2 * np.pi * x / 0.4 + 0.3),
+    ),
+    "gravity": (dict(weight=15.0, hangs_at=0.5), lambda t, x, v: -15 * np.sin(x - 0.5)),
+    "eddy": (dict(eddy=20.0, eddy_speed=0.6), lambda t, x, v: -20 * v / (1 + (v / 0.6) ** 2)),
+    "hum": (dict(hum=6.0, hum_omega=9.0, spring=5.0), lambda t, x, v: 6 * np.sin(9 * t) - 5 * x),
+    "cogging": (
+        dict(cogging=8.0, cogging_wave=0.5, cogging_speed=1.0),
+        lambda t, x, v: 8 * np.tanh(v) ** 2 * np.sin(4 * np.pi * x),
+    ),
+    "grease": (
+        dict(greasy=3.0, greasy_wave=0.7),
+        lambda t, x, v: -3 * v * (1 + np.sin(2 * np.pi * x / 0.7)),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_smooth_machines_against_scipy(name):
+    values, law = SMOOTH[name]
+    place, speed, *_ = run(machine(**values))
+    x, v = scipy_says(lambda t, y: [y[1], u(t) + law(t, *y)])
+    assert np.max(np.abs(place - x)) < 2e-6 * np.ptp(x)
+    assert np.max(np.abs(speed - v)) < 2e-6 * np.ptp(v)
+
+
+def test_lag_bristle_and_pad_against_scipy():
+    lag = run(machine(lag=0.05, spring=10.0))[0]
+    x = scipy_says(lambda t, y: [y[1], y[2] - 10 * y[0], (u(t) - y[2]) / 0.05], 3)[0]
+    assert np.max(np.abs(lag - x)) < 1e-6 * np.ptp(x)
+
+    def lugre(t, y):
+        rate = y[1] - 400 * abs(y[1]) * y[2] / 5
+        return [y[1], u(t) - 400 * y[2] - 12 * rate, rate]
+
+    bristle = run(machine(coulomb=5.0, bristle=400.0, bristle_damping=12.0))[0]
+    assert np.max(np.abs(bristle - scipy_says(lugre, 3)[0])) < 1e-6
+
+    def bouc(t, y):
+        return [y[1], u(t) - 6 * y[2], (y[1] - abs(y[1]) * abs(y[2]) * y[2]) / 0.2]
+
+    pad = run(machine(pad=6.0, pad_stroke=0.2))[0]
+    assert np.max(np.abs(pad - scipy_says(bouc, 3)[0])) < 1e-5
+
+
+def test_two_bodies_on_a_shaft_against_scipy():
+    p = machine(
+        motor=0.6, load=0.4, joint=physics.SPRUNG, joint_stiffness=90.0, joint_damping=0.3, spring=8.0
+    )
+
+    def rates(t, y):
+        pull = 90 * (y[0] - y[2]) + 0.3 * (y[1] - y[3])
+        return [y[1], (u(t) - pull - 8 * y[0]) / 0.6, y[3], pull / 0.4]
+
+    x = scipy_says(rates, 4)
+    assert np.max(np.abs(run(p, load=True)[0] - x[2])) < 1e-5
+    assert np.max(np.abs(run(p, load=True, fineness=4.0)[0] - x[2])) < 1e-7
+    assert np.max(np.abs(run(p)[0] - x[0])) < 1e-5
+
+
+def test_dry_friction_by_hand():
+    level, push = 4.0, np.where(TICK * np.arange(400) < 1.0, 9.0, 0.0)
+    place, speed, *_ = run(machine(coulomb=level), push, linear=False)
+    assert speed[100] == pytest.approx(5.0, abs=1e-12)  # (9 - 4) N / 1 kg for a second
+    assert place[-1] == pytest.approx(2.5 + 25.0 / 8.0, abs=1e-9)  # then braked by 4 N
+    assert speed[-1] == 0.0
+    held = run(machine(coulomb=level, breakaway=9.5), push, linear=False)[0]
+    assert np.all(held == 0.0)
+
+
+def test_impacts_by_hand():
+    # thrown at 2 m/s over a gap of a metre, at once after the load has stopped counting
+    p = machine(motor=1.0, load=3.0, joint=physics.LOOSE, gap=1.0, gap_restitution=0.5)
+    _, _, _, states = run(p, np.zeros(100), (0.0, 2.0, 0.0, 2.0, 0, 0, 0, 0), linear=False)
+    motor, apart = states[-1, 1], states[-1, 3]
+    assert motor == pytest.approx((2.0 - 3.0 * 0.5 * 2.0) / 4.0, abs=1e-12)
+    assert apart == pytest.approx(-1.0, abs=1e-12)
+    bounced = run(machine(stop_high=1.0, stop_low=-1.0, stop_restitution=0.5), np.zeros(100),
+                  (0.0, 2.0, 0, 0, 0, 0, 0, 0), linear=False)  # fmt: skip
+    assert bounced[1][-1] == pytest.approx(-1.0, abs=1e-12)
+    assert bounced[0][-1] == pytest.approx(1.0 - 0.49, abs=1e-9)
+
+
+def test_delays_shift():
+    p = machine(spring=15.0, viscous=1.0)
+    plain, late = run(p)[0], run(p, late_in=0.037)[0]
+    seen = run(p, late_out=0.037)[0]
+    assert np.max(np.abs(late - seen)) < 1e-9
+    whole = run(p, late_in=0.04)[0]
+    assert np.max(np.abs(whole[4:] - plain[:-4])) < 1e-9
+
+
+LOOSE = dict(motor=0.6, load=0.4, joint=physics.LOOSE, gap=0.1)
+ROUGH = [
+    dict(coulomb=5.0), dict(coulomb=5.0, static=9.0, stribeck_speed=0.1),
+    dict(coulomb=3.0, uneven_coulomb=2.0), dict(coulomb=3.0, place=2.0, place_wave=0.4),
+    dict(coulomb=2.0, carried=0.2), dict(dead=4.0, coulomb=1.0),
+    dict(**LOOSE, gap_restitution=0.3, coulomb=3.0, load_coulomb=1.0), dict(**LOOSE, coulomb=3.0),
+    dict(stop_high=0.4, stop_low=-0.4, stop_restitution=0.4, coulomb=2.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("values", ROUGH, ids=lambda v: "+".join(v))
+def test_shorter_steps_change_nothing(values):
+    p = machine(**values)
+    coarse, fine = run(p, linear=False)[0], run(p, linear=False, fineness=4.0)[0]
+    assert np.max(np.abs(coarse - fine)) < 3e-6 * np.ptp(fine)
+
+
+def test_a_controller_follows():
+    pid = np.array([400.0, 600.0, 30.0, 0.004, 1, 1e9])
+    place, _, force, _ = run(
+        machine(coulomb=2.0, viscous=1.0), np.sin(2 * T), closed=True, pid=pid, linear=False
+    )
+    assert np.std(place - np.sin(2 * T)) < 0.15
+    again = run(machine(coulomb=2.0, viscous=1.0), force, linear=False)[0]
+    assert np.max(np.abs(again - place)) < 1e-9  # driven by its own force it does the same
+
+
+@pytest.mark.parametrize("kind, number", [("single", 9), ("nothing", 3), ("double", 10)])
+def test_a_rig_is_the_same_for_ever(kind, number):
+    a, b = rigs.rig(kind, number), rigs.rig(kind, number)
+    assert a.hidden == b.hidden and a.baseline == b.baseline and a.truth == b.truth
+    assert np.array_equal(a.train.y, b.train.y) and np.array_equal(a.held.u, b.held.u)
+
+
+def test_every_effect_is_hidden_once_in_a_round():
+    assert len(rigs.EFFECTS) == 29
+    first = rigs.rig("single", 0)
+    assert first.hidden == ("viscous",) and "viscous" in {e.id for e in first.truth.effects}
+    off = [p.value / first.truth.parameters[k].value for k, p in first.baseline.parameters.items()]
+    assert all(0.69 < x < 1.31 for x in off)
+
+
+@pytest.mark.parametrize("kind", ["white", "coloured", "pink", "encoder"])
+def test_noise_has_unit_size(kind):
+    assert np.std(signals.noise(kind, np.random.default_rng(0), 4000)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("kind", signals.FORCES)
+def test_forces_leave_no_impulse(kind):
+    t = 0.02 * np.arange(1000)
+    s = signals.excitation(kind, np.random.default_rng(1), t, False)
+    push = np.cumsum(s) * 0.02
+    assert np.max(np.abs(s)) == pytest.approx(1.0)
+    assert abs(np.polyfit(t, push, 1)[0]) < 1e-9
+
+
+def test_tables():
+    rows = [
+        dict(job=["single", 0], verdict="effect", first=True, three=True, said=0.99, ranking=[]),
+        dict(job=["single", 1], stopped=300.0),
+        dict(job=["nothing", 0], verdict="effect", said=0.999, ranking=[]),
+    ]
+    text = table(rows)
+    assert "| one hidden, all: first | 95 % | 1/2 = 50%" in text
+    assert "| said at 95 % or more: right | 95 % | 1/2 = 50%" in text
+    assert "| single 1:" in text and "stopped" in text
+    assert share(19, 20).startswith("19/20 = 95% (76% to 99%)")
