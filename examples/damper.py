@@ -4,8 +4,8 @@ What gives way in a friction damper?
 
 **Problem.** A banded rotary friction damper stands on a test machine: a displacement is imposed as a sine, a
 load cell records the force (data set "Friction damper with backlash", ARTS Laboratory, CC BY-SA 4.0). The
-building's engineers want a model that holds at other strokes and other frequencies than the one measured. Run
-with ``python examples/damper.py FOLDER``: FOLDER holds the CSV files, columns ``t_s``, ``displacement_m``,
+building's engineers want a model that holds at other strokes and frequencies than the one measured. Run with
+``python examples/damper.py FOLDER``: FOLDER holds the CSV files, columns ``t_s``, ``displacement_m``,
 ``force_N``. The data are no part of this repository, and this page is not run when the site is built.
 
 .. code-block:: text

@@ -56,9 +56,9 @@ def imposed_response(
     --------
     >>> t = np.linspace(0, 1, 501)
     >>> damper = cdf.Massless().with_effect(cdf.Coulomb(5.0)).with_effect(cdf.LinearSpring(100.0))
-    >>> F = np.asarray(cdf.imposed_response(damper, t, 0.1 * np.sin(2 * np.pi * t)).outputs)
-    >>> round(float(F[125]), 3), round(float(F[250]), 3)  # at the reversal, and half a period on
-    (15.0, -5.0)
+    >>> F = np.asarray(cdf.imposed_response(damper, t, 0.1 * np.sin(2 * np.pi * t)).outputs)[0]
+    >>> round(float(F[100]), 3), round(float(F[200]), 3)  # before and after the reversal
+    (14.511, 0.878)
     """
     core = imposable(block)
     block = block.with_parameters(params) if params else block
