@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rigs
 
+import ctrl_df as cdf
 from ctrl_df.blocks.effects import Drift, InputDelay, InputSaturation, SensorDelay, SensorOffset
 from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
@@ -112,3 +113,18 @@ def test_errors_name_the_remedy():
         compare(3, record)
     with pytest.raises(ValueError, match="window needs a length"):
         compare(friction_mass(1, 1), record, window=-1)
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_free_run_finds_where_a_pendulum_begins(seed):
+    """Over turns of the pendulum the error has many minima over the state that the run begins in."""
+    rng, t = np.random.default_rng(seed), np.arange(0, 12, 0.005)
+    waves = zip(rng.uniform(1, 9, 5), rng.uniform(0, 6, 5), strict=True)
+    torque = sum(0.08 * np.sin(w * t + p) for w, p in waves)
+    pendulum = cdf.Inertia(0.005).with_effect(cdf.Coulomb(0.01)).with_effect(cdf.Viscous(0.004))
+    pendulum = pendulum.with_effect(cdf.Gravity(0.5))
+    begin = [rng.uniform(-1, 1), rng.uniform(-3, 3)]
+    x = np.asarray(cdf.event_response(pendulum, t, torque, begin, input_hold="zoh").outputs)[0]
+    noisy = x + 1e-3 * rng.standard_normal(t.size)
+    record = cdf.Measurement(t, torque, noisy, input_unit="N m", output_unit="rad")
+    assert compare(pendulum, record, mode="free").rmse < 1.2e-3

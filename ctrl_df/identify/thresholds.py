@@ -265,6 +265,9 @@ fast as seven digits."""
 TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 """Sizes of an effect of which nothing is known, over those of the table."""
 
+BEGINNINGS = (16, 8, 4, 2)
+"""Shares of a segment over which the state that it begins in is found first, each twice the last."""
+
 BALANCED_STARTS = 2
 """Starts of an effect on a table from which its forces are balanced: sizes apart may balance alike."""
 
