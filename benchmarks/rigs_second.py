@@ -319,7 +319,7 @@ def _cogging(rng, c):
     return lambda s: {"cogging": s * 0.6 * c.force, "cogging_wave": wave, "cogging_speed": v}
 
 
-def _wandering(rng, c):
+def _varying(rng, c):
     share, waves = rng.uniform(0.4, 0.95), rng.uniform(0.3, 2.5)
     return lambda s: {"warming": s * share, "warming_time": -1 / waves}
 
@@ -357,7 +357,7 @@ def _failing(rng, c):
 OUTSIDE: dict[str, tuple[Callable, tuple[str, ...], tuple[str, ...]]] = {
     # what, the baselines it is hidden in, the regions that tell of it
     "speed_dependent_cogging": (_cogging, ("plain", "slick"), ("position", "low_speed", "frequency")),
-    "wandering_friction": (_wandering, RUBS, ("time",)),
+    "varying_friction": (_varying, RUBS, ("time",)),
     "magnetic_drag": (_eddy, ("plain", "slick", "spring"), ("low_speed",)),
     "limited_power": (_power, ("plain", "slick", "spring"), ("load", "low_speed")),
     "hum": (_hum, ("plain", "slick", "dry", "spring"), ("frequency", "time")),
@@ -528,7 +528,7 @@ def _suited(motion, setting):
     window = max(int(3 / setting.tick), 10)
     swing = np.median([np.std(x[i : i + window]) for i in range(0, len(x) - window, window)])
     if np.ptp(x) > 40 * swing:
-        raise Unsuited("it wanders off")
+        raise Unsuited("it drifts away")
     return swing
 
 

@@ -130,7 +130,7 @@ class StructureSearch(Search):
             self._look_at(self.segmentations[0].with_process_noise, 0)
             self.base = CandidateFit("", self.data.fit(self.nearest.model, self.free))
             self.noise = ranked(self.base, ())[1]
-            self.course.stage("the same by accelerations: forces that wander outweigh the noise")
+            self.course.stage("the same by accelerations: disturbance forces outweigh the noise")
             base, found = self._look(classes, executor, self.data.sampled)
             self.course.known(found)
         longest = self.segmentations[-1]
