@@ -53,7 +53,9 @@ class PositionDependentFriction(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Yield waves of the friction that explain most of the force."""
+        """Yield long waves by what they change in the output, and those that explain most of the force."""
+        for amplitude, wavelength, phase in screen.long_waves(cls)[:2]:
+            yield cls(min(amplitude, 2.0 * screen.scales.force), wavelength, phase)
         for turns, pair in _waves(screen)[:4]:
             size = min(float(np.hypot(*pair)), 2.0 * screen.scales.force)
             for factor in (1.0, 0.5):
