@@ -225,6 +225,7 @@ def test_the_library_is_covered():
 
     builtin = {k for k, c in effect_library().items() if c.__module__.startswith("ctrl_df.")}
     builtin -= {"torque_constant"}  # what goes in is known
+    builtin -= {"loose_linkage", "maxwell_slip"}  # their rig is a test machine, in test_imposed.py
     assert set(rigs.ORDER) == set(rigs.EFFECTS) == builtin
 
 

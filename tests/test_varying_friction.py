@@ -12,7 +12,7 @@ from ctrl_df.identify.estimation.initial_states import MEASURED
 from ctrl_df.identify.estimation.noise_model import (
     noise_model,
     prediction_error_filter,
-    second_difference_filter,
+    acceleration_filter,
     whitened_power,
 )
 from ctrl_df.identify.estimation.segments import make_segments
@@ -98,7 +98,7 @@ def test_noise_is_told_from_the_jumps_between_windows():
 def test_forces_are_second_differences():
     t = DT * np.arange(400)
     pieces = [3.0 * t**2 / 2 + 5 * t + 1, -2.0 * t**2 / 2]
-    noise = second_difference_filter(10)
+    noise = acceleration_filter(10)
     whole, windows = np.concatenate(pieces), [slice(0, 400), slice(400, 800)]
     seen = noise.filtered(whole, windows) / (10 * DT) ** 2
     assert len(seen) == 2 * 38
@@ -114,7 +114,7 @@ def test_varying_forces_are_whitened():
     rng = np.random.default_rng(2)
     force = [np.convolve(rng.standard_normal(1200), 0.97 ** np.arange(200))[:1200] for _ in range(20)]
     pieces = [np.cumsum(np.cumsum(f)) for f in force]
-    noise = prediction_error_filter(pieces, second_difference_filter(10))
+    noise = prediction_error_filter(pieces, acceleration_filter(10))
     white = [noise.filtered(p, [slice(0, len(p))]) for p in pieces]
     one = sum(float(w[1:] @ w[:-1]) for w in white) / whitened_power(pieces, noise)[0]
     assert abs(one) < 0.05

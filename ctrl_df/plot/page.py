@@ -111,7 +111,7 @@ class Page:
 
     def rows(self, *, wide: Sequence, narrow: Sequence, **layout) -> dict:
         """Return axes by name from a mosaic for each width; `layout`: of ``Figure.subplot_mosaic``."""
-        names = list(dict.fromkeys(np.ravel(wide).tolist()))
+        names = list(dict.fromkeys(name for row in wide for name in row))
         if self.given:
             found = dict(zip(names, self.given, strict=False))
         else:

@@ -129,6 +129,11 @@ def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
         around[:-lag] = np.maximum(around[:-lag], steps[lag:])
     alone = steps > _LEAP * np.maximum(around, max(step_of(x), grain(x)))
     leaps = np.flatnonzero(alone & (steps > _FAST * np.max(steps[~alone], initial=0.0)))
+    jumps = np.zeros(len(steps))
+    jumps[leaps] = np.diff(x)[leaps]
+    between = x[1:] - np.cumsum(jumps)
+    # a coarse sensor that rounds moves by its steps alone
+    leaps = leaps[steps[leaps] <= np.ptp(between)]
     if len(leaps):
         i = int(leaps[0])
         raise ValueError(

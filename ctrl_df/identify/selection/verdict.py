@@ -42,7 +42,7 @@ def diagnosed(search: Search, classes, executor=None, course: Course | None = No
     asked = _Asked(search, time.perf_counter(), dict(limits or {}))
     if course is not None:
         search.course = course.within(asked.so_far)
-    search.first_look = found = search.candidates(classes, executor) if classes else []
+    search.first_look = found = search.candidates(classes, executor)
     chosen = search.confirm(found)
     search.course.stage("verdict")
     return asked.answer(chosen, found)
