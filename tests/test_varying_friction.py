@@ -10,9 +10,9 @@ import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.estimation.initial_states import MEASURED
 from ctrl_df.identify.estimation.noise_model import (
+    acceleration_filter,
     noise_model,
     prediction_error_filter,
-    acceleration_filter,
     whitened_power,
 )
 from ctrl_df.identify.estimation.segments import make_segments
