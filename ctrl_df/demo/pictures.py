@@ -143,9 +143,9 @@ def _crossings(key):
     def draw(findings):
         figure, ax = plt.subplots(figsize=(7.4, 5), layout="constrained")
         describing_function_plot(
-            findings[key].response, ax=ax, label="PID", point_label="%.4g N @ %.4g rad/s"
-        )
-        ax.set_title(f"PID and -1/N(a, ω): {findings[key].loop.title}", fontsize="medium")
+            findings[key].response, ax=ax, label="PID", point_label="%.4g N @ %.4g rad/s",
+            title=f"PID and -1/N(a, ω): {findings[key].loop.title}",
+        )  # fmt: skip
         return figure
 
     return draw
