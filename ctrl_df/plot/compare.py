@@ -88,8 +88,7 @@ def comparison_plot(
                 ax.axvline(data.t[edge], color="0.85", lw=0.6, zorder=0)
         lines[2] = _regions(bars, chosen.where, rows)
         top.tick_params(labelbottom=False)
-        drawn.finished([], data.name if title is None else title)
-        return ct.ControlPlot(lines, np.array(drawn.keep, dtype=object), drawn.figure)
+        return drawn.finished(lines, data.name if title is None else title)
 
 
 def _said(comparison) -> str:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..core import is_kinetic
 from ..effect import Effect, register_effect
 from ..parameter import parameter
 
@@ -76,7 +77,7 @@ class MaxwellSlip(Effect):
     @classmethod
     def applicable(cls, block):
         """Return whether there is a kinetic level that slips."""
-        return any(e.role == "friction" and e.side == "motor" and e.rank == 0 for e in block.effects)
+        return any(map(is_kinetic, block.effects))
 
     @classmethod
     def suggest(cls, screen):
