@@ -201,7 +201,7 @@ class Segments:
     def only(self, which) -> Segments:
         """Return some of the segments; `which` a boolean array (nw,)."""
         arrays = (n for n in self.__dataclass_fields__ if n not in ("outputs", "step"))
-        return Segments(*(getattr(self, name)[which] for name in arrays), self.outputs, self.step)
+        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
     def every(self, step: int) -> Segments:
         """Return the same segments, of which every `step`-th sample counts."""
