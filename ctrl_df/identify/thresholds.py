@@ -222,6 +222,10 @@ that begin, and from how many these are chosen."""
 ANGLES = 6
 """Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
 
+STRONG = 0.5
+"""Share of the mean squared force that is missing up to which a single law leaves: it takes more of it than
+all that is left, and the model's own parameters are bent by it."""
+
 # --- where fits begin again -------------------------------------------------------------------------
 
 RESTART_FACTORS = (0.6, 0.8, 1.25, 1.6)
