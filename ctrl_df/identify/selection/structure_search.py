@@ -226,7 +226,9 @@ class StructureSearch(Search):
             # would pass for it.
             levels[0] = levels[0].continued
             short = levels[0]
-            stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
+            stages[0] = side_by_side(
+                lambda f: short.moved(f) if f is not None and short.carries(f.model) else f, stages[0]
+            )
             at = _longest_coherent(stages)
         if found and rounds(found[0]) and not self.data.disturbed:
             # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
