@@ -19,7 +19,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.segments import facts
 from ..estimation.sensed import POSITION, sensed
 from ..estimation.simulator import feasible
-from ..starting.regression import force_regression, heavy, motion_of
+from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (
     CONFIRMED,
@@ -89,8 +89,9 @@ class StructureSearch(Search):
         shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
-        w, _ = force_regression(motion_of(data.train, data.thin, block), data.scales, heavy=heavy(block))
-        guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
+        plain, own, *_ = force_regression(motion_of(data.train, data.thin, block), data.scales, block)
+        guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
+        guess = {k: v for k, v in guess.items() if k in self.free}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
         found = []
@@ -225,7 +226,9 @@ class StructureSearch(Search):
             # would pass for it.
             levels[0] = levels[0].continued
             short = levels[0]
-            stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
+            stages[0] = side_by_side(
+                lambda f: short.moved(f) if f is not None and short.carries(f.model) else f, stages[0]
+            )
             at = _longest_coherent(stages)
         if found and rounds(found[0]) and not self.data.disturbed:
             # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
