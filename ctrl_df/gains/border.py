@@ -45,15 +45,15 @@ def deep_points(predicted) -> np.ndarray:
 class Border:
     """Answers at points of the unit square, and what they say between.
 
-    A line across which everything may change is known beforehand: the sides of it never speak for each other.
+    Lines across which everything may change are known beforehand: their sides never speak for each other.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2)
     answers : ndarray, shape (n, k)
         Booleans; the first column is the one whose border is sought.
-    side : ndarray of bool, shape (n,)
-        On which side of the line a point lies.
+    side : ndarray of int, shape (n,)
+        On which side of these lines a point lies.
     predicted : ndarray of bool, shape (n,)
         What a model says in the place of the first answer: where it is right all around, it also tells where
         between the points the answer changes.
@@ -61,16 +61,16 @@ class Border:
 
     def __init__(self, points, answers, side, predicted):
         self.points, self.answers = np.asarray(points, float), np.asarray(answers, float)
-        self.side, self.predicted = np.asarray(side, bool), np.asarray(predicted, bool)
+        self.side, self.predicted = np.asarray(side, int), np.asarray(predicted, bool)
         self.right = self.predicted == (self.answers[:, 0] > 0.5)
         self.mesh = Delaunay(self.points, qhull_options="QJ")
 
     def __call__(self, places, side, predicted) -> np.ndarray:
         """Return the answers at places (m, 2), given their sides and predictions (m,), as booleans (m, k).
 
-        Where the corners of the triangle around a place disagree, the model's answer if it is right at all of
-        them; else linear between those on the same side; where none is, the answers of the nearest point that
-        lies there, or of the nearest of all.
+        Where those corners of the triangle around a place disagree that lie on its side, the model's answer
+        if it is right at all of them, else linear between them; where no corner lies there, the answers of
+        the nearest point that does, or of the nearest of all.
         """
         places = np.clip(np.atleast_2d(places), 0.0, 1.0)
         simplex = self.mesh.find_simplex(places, tol=1e-9)
@@ -86,13 +86,15 @@ class Border:
         weight = share.sum(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             out = np.einsum("nc,nck->nk", share, self.answers[corners]) / weight[:, None] > 0.5
-        for here in (False, True):
+        for here in np.unique(side):
             mine = np.flatnonzero((weight == 0) & (side == here))
             known = np.flatnonzero(self.side == here)
             known = known if known.size else np.arange(self.side.size)
             if mine.size:
                 out[mine] = self.answers[known[KDTree(self.points[known]).query(places[mine])[1]]] > 0.5
-        trusted = self.right[corners].all(axis=1) & np.ptp(self.answers[corners, 0], axis=1).astype(bool)
+        yes = self.answers[corners, 0] > 0.5
+        changes = (yes & own).any(axis=1) & (~yes & own).any(axis=1)
+        trusted = changes & (self.right[corners] | ~own).all(axis=1)
         out[trusted, 0] = np.asarray(predicted, bool)[trusted]
         return out
 

@@ -17,7 +17,7 @@ from .map import LimitCycleMap, corrected
 from .plane import plane_of, require_linear
 from .predicted import at_one, over_grid, summed_up
 from .simulated import Simulated, all_simulated
-from .stability import linear_border, unstable_poles
+from .stability import linear_border, side, unstable_poles
 
 _OWNER = "limit_cycle_map"
 _SPREAD = 0.4  # of the exact checks: spread evenly; the others close in on borders
@@ -128,7 +128,9 @@ def limit_cycle_map(
     if checks:
         border, found, agreement = _checked(plane, box, predicted.words, checks, seed, progress)
         unit = box.to_unit(x, y).reshape(-1, 2)
-        verdict = corrected(border, unit, (poles > 0).ravel(), verdict.ravel()).reshape(poles.shape)
+        sides = np.broadcast_to(side(poles, gains), poles.shape)
+        words = corrected(border, unit, sides.ravel(), (poles > 0).ravel(), verdict.ravel())
+        verdict = words.reshape(poles.shape)
     curves = folds(plane, box.free, box.fixed, box.axes)
     output_amplitude = predicted.amplitude / np.abs(structure.loop_gain(gains, predicted.omega))
     return LimitCycleMap(
@@ -170,10 +172,10 @@ def _checked(plane, box, predicted, budget, seed, progress):
             gains = (box.every(float(x), float(y)) for x, y in zip(*box.from_unit(unit), strict=True))
             return np.array([any(c.stable for c in at_one(plane, g, box.free[1])) for g in gains])
 
-        def grows(unit):
+        def side_of(unit):
             gains = box.every(*box.from_unit(unit))
-            return unstable_poles(plane, *(gains[name] for name in GAINS)) > 0
+            return side(unstable_poles(plane, *(gains[name] for name in GAINS)), gains)
 
-        border = refined(first, budget, ask, predict, grows)
+        border = refined(first, budget, ask, predict, side_of)
     right = predict(even) == np.array([s.cycles for s in found[: len(even)]])
     return border, found, float(right.mean())

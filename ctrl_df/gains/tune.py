@@ -313,9 +313,9 @@ def _where_linear(structure: Structure, omega) -> tuple[float, np.ndarray]:
             return at, np.broadcast_to(N[int(by_size[1] == at)], omega.shape)
     raise ValueError(
         f"{_OWNER} needs a block that keeps its gain for large or for small amplitudes: there the loop is "
-        "linear, which bandwidth and margin are judged by. The gain of "
-        f"{shown(structure.block)} does neither. Map the gains of a relay with limit_cycle_map; a machine with friction and a limited input is tuned "
-        "without the limit (block.without_effect) and verified with it."
+        f"linear, which bandwidth and margin are judged by. {shown(structure.block)} keeps none. Map the "
+        "gains of a relay with limit_cycle_map; tune a machine with friction and a limited input without "
+        "the limit (block.without_effect), and verify with it."
     )
 
 
