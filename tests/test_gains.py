@@ -176,6 +176,13 @@ def test_sides_do_not_speak_for_each_other():
     assert border(places, places[:, 0] > 0.3, [True, True])[:, 0].tolist() == [False, True]
 
 
+def test_gains_without_integral_action_do_not_speak_for_others(hunting):
+    """With static friction any integral action ends in hunting; without it the axis stays where it sticks."""
+    assert hunting.at(kp=2000, ki=0).verdict == "rests"
+    for kp, ki in ((1500, 20), (3000, 800), (2000, 3000)):
+        assert "cycles" in hunting.at(kp=kp, ki=ki).verdict
+
+
 @pytest.mark.parametrize(
     ("keywords", "error"),
     [

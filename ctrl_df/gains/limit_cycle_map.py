@@ -17,7 +17,7 @@ from .map import LimitCycleMap, corrected
 from .plane import plane_of, require_linear
 from .predicted import at_one, over_grid, summed_up
 from .simulated import Simulated, all_simulated
-from .stability import linear_border, side, unstable_poles
+from .stability import linear_border, unstable_poles
 
 _OWNER = "limit_cycle_map"
 _SPREAD = 0.4  # of the exact checks: spread evenly; the others close in on borders
@@ -51,7 +51,8 @@ def limit_cycle_map(
 
     A share of the gains is simulated from twelve starts each, half of them spread evenly, the others where
     what the loop does changes: so the map is right also where the describing function is not (friction whose
-    static level lies above the kinetic one hunts where it predicts nothing).
+    static level lies above the kinetic one hunts where it predicts nothing). Gains with ki = 0 are answered
+    apart; between there and a fiftieth of the range of ki the answer is the one at that fiftieth.
 
     Parameters
     ----------
@@ -128,8 +129,7 @@ def limit_cycle_map(
     if checks:
         border, found, agreement = _checked(plane, box, predicted.words, checks, seed, progress)
         unit = box.to_unit(x, y).reshape(-1, 2)
-        sides = np.broadcast_to(side(poles, gains), poles.shape)
-        words = corrected(border, unit, sides.ravel(), (poles > 0).ravel(), verdict.ravel())
+        words = corrected(border, unit, box.side(poles, gains).ravel(), (poles > 0).ravel(), verdict.ravel())
         verdict = words.reshape(poles.shape)
     curves = folds(plane, box.free, box.fixed, box.axes)
     output_amplitude = predicted.amplitude / np.abs(structure.loop_gain(gains, predicted.omega))
@@ -154,11 +154,11 @@ def limit_cycle_map(
 
 def _checked(plane, box, predicted, budget, seed, progress):
     """Simulate at points spread and at points where the answer changes; see `border.refined`."""
-    even = spread_points(max(int(_SPREAD * budget), 4), seed)
+    even = box.off_the_rim(spread_points(max(int(_SPREAD * budget), 4), seed))
     deep = [
         d for d in deep_points(predicted)[: budget // 8] if np.linalg.norm(even - d, axis=1).min() > _APART
     ]
-    first = np.concatenate([even, *(d[None] for d in deep)])
+    first = np.concatenate([even, *(d[None] for d in deep), box.rim()])
     found: list[Simulated] = []
     with progress_bar(budget, progress, "simulating gains", "point") as bar:
 
@@ -174,7 +174,7 @@ def _checked(plane, box, predicted, budget, seed, progress):
 
         def side_of(unit):
             gains = box.every(*box.from_unit(unit))
-            return side(unstable_poles(plane, *(gains[name] for name in GAINS)), gains)
+            return box.side(unstable_poles(plane, *(gains[name] for name in GAINS)), gains)
 
         border = refined(first, budget, ask, predict, side_of)
     right = predict(even) == np.array([s.cycles for s in found[: len(even)]])

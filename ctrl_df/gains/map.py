@@ -18,7 +18,7 @@ from .controller import GAINS, Structure
 from .plane import Plane
 from .predicted import PredictedCycle, at_one, fates, over_grid, summed_up
 from .simulated import Simulated, simulated, worded
-from .stability import side, unstable_poles
+from .stability import unstable_poles
 
 _ENOUGH = 6  # exact cycles from which sizes between them are told
 
@@ -191,7 +191,9 @@ class LimitCycleMap:
             verdict = truth.verdict
         elif self.border is not None:
             place, here = self.box.to_unit(*(every[name] for name in self.free)), np.array([poles])
-            words = corrected(self.border, place[None], side(here, every), here > 0, np.array([predicted]))
+            words = corrected(
+                self.border, place[None], self.box.side(here, every), here > 0, np.array([predicted])
+            )
             verdict = str(words[0])
         return GainPoint(every, verdict, predicted, cycles, truth)
 
@@ -274,8 +276,9 @@ class LimitCycleMap:
         if self.border is None:
             return predicted
         square = np.stack(np.meshgrid(unit, unit, indexing="ij"), axis=-1).reshape(-1, 2)
-        sides = np.broadcast_to(side(grows, gains), grows.shape)
-        words = corrected(self.border, square, sides.ravel(), grows.ravel(), found.words.ravel())
+        words = corrected(
+            self.border, square, self.box.side(grows, gains).ravel(), grows.ravel(), found.words.ravel()
+        )
         words = words.reshape(grows.shape)
         known = [c for c in self.checks if c.orbit is not None]
         if len(known) < _ENOUGH:

@@ -34,15 +34,6 @@ def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
     return np.maximum(poles, 0).astype(int).reshape(shape)
 
 
-def side(poles, gains) -> np.ndarray:
-    """Return the number of the part of the plane in which gains lie, given the poles to the right.
-
-    The parts never speak for each other: what is stable in the large does not tell of what is not, nor a
-    loop without integral action, one order lower, of those with ever so little of it.
-    """
-    return np.asarray(np.asarray(poles) > 0, int) + 2 * np.asarray(np.equal(gains["ki"], 0), int)
-
-
 def far_loop(plane: Plane, gains, q) -> np.ndarray:
     """Open loop for large amplitudes at frequencies exp(q)."""
     C = sum(gains[name] * t for name, t in zip(GAINS, plane.structure.terms(np.exp(q)), strict=True))
