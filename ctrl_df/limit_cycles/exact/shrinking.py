@@ -47,7 +47,10 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
     border = tangent(J, -np.eye(n + 2)[-1])
     step, least = 0.1 * min(1.0, scale), 1.0
     for _ in range(_MOST_STEPS):
-        met = curve.onto(y + step * border, border)
+        ahead = y + step * border
+        met = curve.onto(ahead, border)
+        if met is not None and np.linalg.norm(met[0] - ahead) > step:
+            met = None  # farther across the curve than along it: another one, as that of laps without length
         turned = None if met is None else tangent(met[1], border)
         if met is not None and turned is not None and turned @ border >= 0.8:
             y, border = met[0], turned
