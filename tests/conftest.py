@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item):
-    """Write how long a test took [s of processor], its fixtures and processes included, where that is asked."""
+    """Write how long a test took [s of processor], fixtures and processes included, where that is asked."""
     began = processor_time()
     yield
     times = os.environ.get("CTRL_DF_TIMES")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -39,10 +40,10 @@ class WaveformOrbit:
 
     def __init__(self, block, output, max_steps=60_000):
         self.motion = None
-        self.core = block.core if isinstance(block, Mechanism) else None
+        self.core: Any = block.core if isinstance(block, Mechanism) else None
         inner = without_delays(block)[0] if self.core is not None else block
         suited = not np.isin(Engine(inner).program.nodes[:, layout.KIND], _UNSUITED).any()
-        self.search = OrbitSearch(block, output, max_steps=max_steps) if suited else None
+        self.search: Any = OrbitSearch(block, output, max_steps=max_steps) if suited else None
 
     def __call__(self, U, omega: float):
         """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, or None."""
@@ -73,7 +74,7 @@ class WaveformOrbit:
                 self.motion = orbit
                 yield search.coefficients()
 
-    def _starts(self):
+    def _starts(self) -> Iterator[tuple[Any, dict[str, Any]]]:
         """States to start from: the last motion; if there is none, rest, or a knock against a gap's faces."""
         search, core = self.search, self.core
         gap = 0.0 if core is None else core.gap
