@@ -76,7 +76,7 @@ def main(folder):
 
     # Half the stroke is held out: what describes one record, not the damper, makes the error there larger.
     # The third record is not touched before the end.
-    study = cdf.improve(begin, runs[TRAIN], runs.get(HELD_OUT))
+    study = cdf.improve(begin, runs[TRAIN], runs.get(HELD_OUT), max_effects=2)
     print(study.summary(), "\n")
 
     print("Error of force, relative rms, on records that were not fitted:")
