@@ -67,6 +67,10 @@ that is missing (between the rigs and the recorded machines)."""
 HOPELESS = 3.0
 """Error over the best candidate's beyond which another try is not worth it (rigs)."""
 
+PROMISES = 0.25
+"""Share of the squared error the best candidate explains that an effect has to explain for one that contains
+it to be tried: the special case of a right law is right over a part of the motion."""
+
 STILL_POSSIBLE = 1.5
 """Error over the best candidate's up to which another may yet turn out to be the right one (rigs)."""
 
@@ -187,6 +191,11 @@ HOLDOUT_PARTS = 9
 SCREEN_SAMPLES = 2500
 """Steps of the input to which a record is thinned while candidates are screened: a quarter of those
 of the rigs' records."""
+
+RTOL, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
+"""Relative tolerance of simulations: at the full rate; at most, while candidates are screened, where it is
+that share of the sensors' noise over the motion. Derivatives are differences over which the output moves by
+0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
 
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""

@@ -370,10 +370,9 @@ class StructureSearch(Search):
             return judged.validation.model, held
         return judged.block, held or fitted
 
-    @property
-    def at_first(self):
-        """Noise of the sensor, and what the refitted model errs by beyond it."""
-        noise, error = self.data.noise, self.base.train.rmse
+    def so_far(self, judged):
+        """Return the noise of the sensor, and what a model errs by beyond it."""
+        noise, error = self.data.noise, judged.train.rmse
         if self.data.disturbed:
             return Remainder(0.0, error, False)
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
@@ -384,7 +383,7 @@ class StructureSearch(Search):
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
-        left = remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+        left = remainder(self.base, best, self.data.fine, self.noise, self.floor, self.significant)
         if self.data.disturbed and not significant and self.nearest.nrmse > UNMOVED:
             # accelerations that are mostly noise do not speak for a model that does not even move
             return replace(left, unexplained=True)
@@ -393,7 +392,7 @@ class StructureSearch(Search):
     def located(self, best, remainder, unknown):
         """Return where the error is."""
         return located(
-            self.base, best, self.data, self.noise, remainder, unknown=unknown,
+            self.base, best, self.data.fine, self.noise, remainder, unknown=unknown,
             significant=self.significant, measure=self.measure,
         )  # fmt: skip
 

@@ -37,12 +37,12 @@ class Motion:
 
 
 def motion_of(view, thin: int, block) -> Motion:
-    """Return every `thin`-th sample within the segments; the force as the drive of a block makes it."""
+    """Return every `thin`-th sample of the segments; the force as the drive of a block makes it."""
     parts = []
     for record, segments in zip(view.records, view.segments, strict=True):
         known = facts(record)
         acceleration = np.gradient(known.velocity, record.t)
-        some = segments.samples[::thin]
+        some = segments.every(thin).samples
         parts.append(
             [np.asarray(c)[some] for c in (load_of(block, record), known.place, known.velocity, acceleration)]
         )
