@@ -143,6 +143,10 @@ EXACT = 10 * NOISE_FREE
 PARAMETER_RANGE = 12.0
 """Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
 
+SIZE_PRIOR = 3.0
+"""Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
+and a half lies `PARAMETER_RANGE`."""
+
 PASSED = 2.15e-3
 """Speed, over the typical one, at which a bump of friction is gone to 1 % that only breaking away shows: a
 Gaussian one of a thousandth of the typical speed, sqrt(log 100) of its width away."""

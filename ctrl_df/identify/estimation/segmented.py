@@ -136,6 +136,7 @@ class SegmentedData:
     thin: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
+    about: Mapping[str, float]  # what these are about, before any data
     filtered: RecordScales  # of effects
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
@@ -287,7 +288,7 @@ class SegmentedData:
         view = view or self.train
         return fit_segments(
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
+            tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
             error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
             robust=self.robust, rtol=self.rtol_of(block),
         )  # fmt: skip
@@ -368,7 +369,8 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
     )  # fmt: skip
-    return SegmentedData(learn, judge, 1, scales, limits, seen).coarse(thin, step)
+    about = {k: p.value for k, p in block.parameters.items()}
+    return SegmentedData(learn, judge, 1, scales, limits, about, seen).coarse(thin, step)
 
 
 def _within(own, shown) -> tuple[float, float]:
