@@ -22,7 +22,9 @@ _STEP = 2e-5  # of differences, relative
 _ITERATIONS = 40
 
 
-def close_far(search, state: State, periods: int = 1, orders: int = 9, patient: bool = True):
+def close_far(
+    search, state: State, periods: int = 1, orders: int = 9, patient: bool = True, repelling: bool = False
+):
     """Close an orbit from a state far off; return (state, error) of one that attracts, or None.
 
     Parameters
@@ -37,6 +39,8 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9, patient: 
     patient : bool
         Whether to go on where steps must be cut short, as is worth while on a slow transient; irregular
         motion is given up at once.
+    repelling : bool
+        Whether one that does not attract will do.
     """
     s = search.symmetries
     free = s.free
@@ -92,7 +96,7 @@ def close_far(search, state: State, periods: int = 1, orders: int = 9, patient: 
         if not (error < 30 * GOOD or (error < POOR and miss < 100 * FINE)):
             return None
         radius = np.max(np.abs(np.linalg.eigvals(jacobian * size[free] / size[free][:, None])))
-        if not radius < 1.0 + NEUTRAL:
+        if not repelling and not radius < 1.0 + NEUTRAL:
             return None
         found = search._state(y, state.mode)
         if search.mirrored and s.shifts:

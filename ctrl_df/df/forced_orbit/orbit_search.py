@@ -15,7 +15,7 @@ from ...status import Status
 from ..threads import go_on
 from . import shooting
 from .linear_orbit import linear_orbit
-from .shooting import CLOSED, SPENT, close_orbit
+from .shooting import CLOSED, SPENT, UNSTABLE, close_orbit
 from .shot import follow, make_shot, set_state, shoot
 from .symmetries import Probe, Sizes, find_symmetries
 
@@ -164,9 +164,14 @@ class OrbitSearch:
     # --- the search -----------------------------------------------------------------------------------------
 
     def _aim(self, A, omega):
+        self.aim([0.0, A], omega)
+
+    def aim(self, U, omega):
+        """Set the force ``Re sum U_k exp(j k omega t)`` that orbits are sought under."""
+        A = float(abs(U[1]))
         self._acquaint(A, omega)
         self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
-        self.drive = harmonic_drive([[0.0, A]], omega)
+        self.drive = harmonic_drive([U], omega)
         self._unit = self._motion(A, omega)
 
     def _hmax(self, orders):
@@ -250,11 +255,15 @@ class OrbitSearch:
     def _span(self, periods):
         return self.period / 2 if self.mirrored else periods * self.period
 
-    def _periodic(self, state, periods=1, orders=9):
-        """Newton on the shot; (state, mismatch) of an attracting orbit, or None; its integrals are kept."""
+    def _periodic(self, state, periods=1, orders=9, *, repelling=False, near=False):
+        """Newton on the shot; (state, mismatch) of an attracting orbit, or None; its integrals are kept.
+
+        With `repelling` any orbit will do; one that is `near` the last one begins with its Jacobian.
+        """
         state, shot = state.copy(), self.shot
         spectrum = np.zeros((self.row + 1, orders + 1), complex)
-        shot.jacobian[:] = np.nan
+        if not near:
+            shot.jacobian[:] = np.nan
         shot.clock[2] = _START * self.period
         outcome, miss = close_orbit(
             shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, RTOL, self.atol,
@@ -265,7 +274,7 @@ class OrbitSearch:
         self._raise_if_raised()
         if outcome == SPENT or outcome == shooting.FAILED:
             raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
-        if outcome != CLOSED:
+        if outcome != CLOSED and not (repelling and outcome == UNSTABLE):
             return None
         if not self.mirrored:
             self._check_free_speed(shot.trial[1])
@@ -279,8 +288,7 @@ class OrbitSearch:
         spectrum = np.zeros((self.row + 1, orders + 1), complex)
         end = state.copy()
         self._shoot(end, rtol, periods, spectrum)
-        if not self.mirrored:
-            self._check_free_speed(self.symmetries.transform @ (end.x - state.x))
+        self._check_free_speed(self.symmetries.transform @ (end.x - state.x))
         self._keep(spectrum)
 
     def _keep(self, spectrum):
@@ -288,7 +296,12 @@ class OrbitSearch:
         self.kinds, self.still = int(self.shot.tally[2]), bool(self.shot.tally[5])
 
     def _check_free_speed(self, step):
-        """Raise where a speed that nothing ties to the ground has changed: something pushes the mechanism."""
+        """Raise where a speed that nothing ties to the ground has changed: something pushes the mechanism.
+
+        The force itself does so where it has a mean.
+        """
+        if self.mirrored or self.drive.harmonics[0, 0] != 0:
+            return
         gained = np.abs(step[self.symmetries.inertial])
         if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
             raise OutOfWork(Status.DIVERGED)
@@ -337,6 +350,43 @@ class OrbitSearch:
             spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
             if abs(early) > 1e-3 and abs(late / early - 1) < 1e-3 and spread < 0.5 * abs(early / half):
                 raise OutOfWork(Status.DIVERGED)
+
+    # --- what was found -------------------------------------------------------------------------------
+
+    def coefficients(self):
+        """Return the Fourier coefficients Y_k of the orbit of one period that was found last."""
+        return self._turned(self._coefficients(self.integrals, self.ends, 1, self.mirrored))
+
+    def _coefficients(self, integrals, ends, periods, mirrored, omega=None):
+        """Fourier coefficients from the integrals of a shot, free of a steady drift and of a free mean.
+
+        The last axis of `integrals` are the harmonics, that of `ends` the start and the end; `omega`, the one
+        aimed at by default, may belong to many shots.
+        """
+        omega = np.asarray(self.omega if omega is None else omega)[..., None]
+        period, k = 2 * np.pi / omega, np.arange(integrals.shape[-1])
+        if mirrored:
+            y = 4 / period * integrals
+            center = ends.mean(axis=-1)
+            # the integral of a constant over half a period is 2 / (j k omega)
+            y[..., 1::2] -= 4 / period * 2 * center[..., None] / (1j * k[1::2] * omega)
+            y[..., 0::2] = 0.0
+            y[..., 0] = center
+        else:
+            y = integrals * 2 / (periods * period)
+            drift = ends[..., 1] - ends[..., 0]
+            y[..., 0] = y[..., 0] / 2 - drift / 2
+            y[..., 1:] -= 1j * drift[..., None] / (np.pi * k[1:] * periods)
+        if self.free_row:
+            y[..., 0] = 0.0
+        return y
+
+    def _turned(self, y, omega=None):
+        """Delays turn the phase of every harmonic."""
+        omega = np.asarray(self.omega if omega is None else omega)[..., None]
+        y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay)
+        y[..., 0] += 0.0 if self.free_row else self.offset
+        return y
 
     # --- how a search can fail ------------------------------------------------------------------------
 

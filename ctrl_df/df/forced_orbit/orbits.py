@@ -342,37 +342,6 @@ class OrbitSolver(OrbitSearch):
 
     # --- what was found -------------------------------------------------------------------------------
 
-    def _coefficients(self, integrals, ends, periods, mirrored, omega=None):
-        """Fourier coefficients from the integrals of a shot, free of a steady drift and of a free mean.
-
-        The last axis of `integrals` are the harmonics, that of `ends` the start and the end; `omega`, the one
-        aimed at by default, may belong to many shots.
-        """
-        omega = np.asarray(self.omega if omega is None else omega)[..., None]
-        period, k = 2 * np.pi / omega, np.arange(integrals.shape[-1])
-        if mirrored:
-            y = 4 / period * integrals
-            center = ends.mean(axis=-1)
-            # the integral of a constant over half a period is 2 / (j k omega)
-            y[..., 1::2] -= 4 / period * 2 * center[..., None] / (1j * k[1::2] * omega)
-            y[..., 0::2] = 0.0
-            y[..., 0] = center
-        else:
-            y = integrals * 2 / (periods * period)
-            drift = ends[..., 1] - ends[..., 0]
-            y[..., 0] = y[..., 0] / 2 - drift / 2
-            y[..., 1:] -= 1j * drift[..., None] / (np.pi * k[1:] * periods)
-        if self.free_row:
-            y[..., 0] = 0.0
-        return y
-
-    def _turned(self, y, omega=None):
-        """Delays turn the phase of every harmonic."""
-        omega = np.asarray(self.omega if omega is None else omega)[..., None]
-        y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay)
-        y[..., 0] += 0.0 if self.free_row else self.offset
-        return y
-
     def _finished(self, y, name):
         return np.full(len(y), np.nan + 0j) if name == "stuck" else self._turned(y) / self.A
 

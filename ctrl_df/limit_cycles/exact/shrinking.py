@@ -2,7 +2,8 @@
 
 ``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1. At
 share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns back to 1
-first, the orbit and its neighbour have merged (a fold): there is none near.
+first, the orbit and its neighbour have merged (a fold); where the lap grows out of all bounds on the way, it
+ends at rest: either way there is none near.
 
 References
 ----------
@@ -20,11 +21,11 @@ from .symmetry import shift_directions
 
 _MOST_STEPS = 120
 _SHORTEST = 1e-5  # step, relative to the first mismatch, at which the curve is taken to have a corner
-_FAR = 2.0  # change of a state, in sizes of the orbit, beyond which the curve is given up
+_FAR = 2.0  # change of a state, in sizes of the orbit, or of the logarithm of the period: given up beyond
 
 
 class Merged(NoClosure):
-    """What is missing to a closed lap cannot be made to vanish: the orbit has merged with a neighbour."""
+    """What is missing to a closed lap cannot be made to vanish: merged with a neighbour, or with rest."""
 
 
 def trace(closing: Closing, x0, period: float) -> Orbit:
@@ -33,7 +34,7 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
     Raises
     ------
     Merged
-        The curve turns back.
+        The curve turns back, or leads to rest.
     NoClosure
         It could not be followed.
     """
@@ -47,7 +48,10 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
     border = tangent(J, -np.eye(n + 2)[-1])
     step, least = 0.1 * min(1.0, scale), 1.0
     for _ in range(_MOST_STEPS):
-        met = curve.onto(y + step * border, border)
+        ahead = y + step * border
+        met = curve.onto(ahead, border)
+        if met is not None and np.linalg.norm(met[0] - ahead) > step:
+            met = None  # farther across the curve than along it: another one, as that of laps without length
         turned = None if met is None else tangent(met[1], border)
         if met is not None and turned is not None and turned @ border >= 0.8:
             y, border = met[0], turned
@@ -66,6 +70,12 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
             raise Merged(
                 f"what is missing to a closed lap falls to {least:.0%} of {scale:.1g} and grows again: "
                 "the orbit and its neighbour have merged",
+                least * scale,
+            )
+        if y[n] > _FAR:
+            raise Merged(
+                f"what is missing to a closed lap falls to {least:.1%} of {scale:.1g} only as the lap grows "
+                f"to {np.exp(y[n]):.0f} times its period: the orbit has merged with rest",
                 least * scale,
             )
         if np.max(np.abs(y[: n + 1])) > _FAR:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...blocks.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
+from ...df.forced_orbit.waveform import WaveformOrbit
 from ...df.methods import ElementIntegrals, Method
-from .waveform import WaveformOrbit
 
 SAMPLES = 2048
 STATIC_HARMONICS, DYNAMIC_HARMONICS = 63, 21

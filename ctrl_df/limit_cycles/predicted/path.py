@@ -223,7 +223,7 @@ class _Curve:
         z, Y, J = found
         border = tangent(J, border)
         motion = self.motion
-        step, share, folds = _FIRST, 0.0, 0
+        step, share, folds, differenced = _FIRST, 0.0, 0, False
         reason = End.STOPPED
         for _ in range(_MOST_STEPS):
             ahead = z + step * border
@@ -253,17 +253,19 @@ class _Curve:
                 if step < _SHORTEST:
                     break
                 self.motion = motion  # what was tried may have led to another one
+                if differenced:  # Newton's matrix is that of this point already
+                    continue
                 fresh, _ = self.defect(z)
                 J = J if fresh is None else self.jacobian(z, fresh)
                 if J is None:
                     reason = End.UNANSWERED
                     break
-                border = tangent(J, border)
+                border, differenced = tangent(J, border), True
                 continue
             if turned[-1] * border[-1] < 0.0:
                 folds += 1
             z, Y, J = found
-            border, motion = turned, self.motion
+            border, motion, differenced = turned, self.motion, False
             share = max(share, float(z[-1]))
             step = min(1.6 * step, _LONGEST)
             if (np.abs(z[:2] - self.first) > _REACH).any():
