@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -85,10 +86,11 @@ def _side_by_side(names):
 
 
 def _start(name):
+    """Begin a step in a process that imports this very package, whatever folder it is started in."""
     code = f"from ctrl_df.warm import step; step({name!r})"
-    paths = os.pathsep.join(p for p in sys.path if p)
+    paths = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
     return subprocess.Popen(
-        [sys.executable, "-c", code],
+        [sys.executable, "-P", "-c", code],
         env={**os.environ, "PYTHONPATH": paths},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

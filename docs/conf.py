@@ -65,6 +65,8 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
     "show_signature": False,
     "image_scrapers": ("matplotlib",),
+    "capture_repr": ("_repr_html_",),  # tables are shown, addresses of objects are not
+    "default_thumb_file": str(HERE / "images" / "missing.png"),  # of examples that ask for data
     "abort_on_example_error": True,
     "plot_gallery": "True",
 }

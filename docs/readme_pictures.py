@@ -39,9 +39,7 @@ def readme():
 def swings(loop, start, seconds):
     """Return times and the greatest excursion [mm] around each of them, from a push of `start` [mm]."""
     t = np.arange(0, seconds, 2e-3)
-    state = np.zeros(loop.nstates)
-    state[[k for k, name in enumerate(loop.state_labels) if name.endswith("x")]] = 1e-3 * start
-    x = 1e3 * np.abs(np.asarray(cdf.event_response(loop, t, 0, state).outputs)[0])
+    x = 1e3 * np.abs(np.asarray(cdf.event_response(loop, t, 0, {"x": 1e-3 * start}).outputs)[0])
     parts = x[: x.size // 300 * 300].reshape(-1, 300)
     return 0.6 * np.arange(len(parts)), parts.max(axis=1)
 

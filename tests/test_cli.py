@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import pytest
 
+from ctrl_df import warm
 from ctrl_df.cli import main
 from ctrl_df.model_file import EXAMPLE, read_model
 
@@ -144,3 +145,12 @@ def test_a_missing_file_is_named(capsys):
     assert main(["limit-cycles", "nowhere.toml"]) == 2
     said = capsys.readouterr().err
     assert "nowhere.toml: no such file" in said and "Errno" not in said
+
+
+def test_what_is_compiled_ahead_is_this_package(tmp_path, monkeypatch):
+    """Also in a folder with another one: sources beside which the package is installed."""
+    (tmp_path / "ctrl_df").mkdir()
+    (tmp_path / "ctrl_df" / "__init__.py").write_text("raise ImportError('another one')")
+    monkeypatch.chdir(tmp_path)
+    process = warm._start("laws")
+    assert process.communicate()[1].decode() == "" and process.returncode == 0

@@ -50,6 +50,7 @@ def pictures(record):
         "hysteresis": turned.plot,
         "gap": gap.plot,
         "hunting": hunting.plot,
+        "with exact orbits": lambda **k: hunting.plot(exact=[stick], **k),
         "rattle": rattle.plot,
         "stick": stick.plot,
         "comparison": seen.plot,
@@ -105,6 +106,25 @@ def test_a_nyquist_picture_in_a_column():
     plt.figure(figsize=(3.3, 2.8))
     drawn = cdf.describing_function_plot(ct.tf([8], [1, 2, 2, 1]), cdf.saturation(1), np.linspace(1, 4, 20))
     assert illegible(drawn.figure) == ([], [])
+    plt.close("all")
+
+
+def test_exact_orbits_stand_beside_predictions():
+    plt.close("all")
+    response = cdf.describing_function_response(ct.tf([8], [1, 2, 2, 1]), cdf.saturation(1), [1.1, 5])
+    check = cdf.verify(response)
+    ax = response.plot(exact=check).axes[0, 0]
+    stars = [line for line in ax.lines if line.get_marker() == "*"]
+    orbit = check.orbits[0]
+    assert stars[0].get_xdata()[0] == pytest.approx((8 / np.polyval([1, 2, 2, 1], 1j * orbit.omega)).real)
+    assert f"{orbit.amplitude:.2g}" in " ".join(t.get_text() for t in ax.texts)
+    plt.close("all")
+
+
+def test_an_unreliable_prediction_is_not_drawn_as_stable(pictures):
+    plt.close("all")
+    said = [t.get_text() for t in pictures["hunting"]().axes[0, 0].get_legend().get_texts()]
+    assert "prediction, unreliable" in said and "predicted cycle, stable" not in said
     plt.close("all")
 
 

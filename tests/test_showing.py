@@ -41,10 +41,36 @@ def _cells(html):
 def test_nothing_shows_its_fields_at_length(response, check):
     orbit = check.orbits[0]
     event = cdf.event_response(DRIVE, [0, 0.5, 1.0], 20.0)
-    for thing in (response, response.limit_cycles[0], check, orbit, event, DRIVE, response.family):
+    for thing in (
+        response,
+        response.limit_cycles[0],
+        check,
+        check.rows[0],
+        orbit,
+        event,
+        DRIVE,
+        response.family,
+    ):
         assert len(repr(thing)) < 200 and "\n" not in repr(thing) and "0x" not in repr(thing)
     assert repr(check).startswith("<Check: ") and repr(orbit).startswith("<Orbit: ")
     assert "1 s, 3 times" in repr(event)
+
+
+def test_where_no_orbit_is_there_is_nothing_to_draw():
+    answer = cdf.find_limit_cycle(cdf.closed_loop(cdf.pid(2000, 0, 130), DRIVE))
+    assert not answer and len(repr(answer)) < 80 and "comes to rest" in _cells(answer._repr_html_())
+    with pytest.raises(AttributeError, match="no orbit was found"):
+        answer.plot()
+
+
+def test_states_are_given_by_name():
+    loop = cdf.closed_loop(GAINS, DRIVE)
+    named = cdf.event_response(loop, [0, 0.1], 0, {"x": 1e-3})
+    listed = cdf.event_response(loop, [0, 0.1], 0, [0, 1e-3, 0])
+    assert named.outputs[0, 0] == 1e-3 and (named.outputs == listed.outputs).all()
+    assert (cdf.event_response(loop, [0, 0.1], 0, {"plant_x": 1e-3}).outputs == listed.outputs).all()
+    with pytest.raises(ValueError, match="controller_x"):
+        cdf.event_response(loop, [0, 0.1], 0, {"y": 1e-3})
 
 
 def test_blocks_print_signals_and_parameters():

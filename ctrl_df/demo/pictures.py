@@ -80,7 +80,10 @@ def _figure_7(_):
         plant = backlash_plant(restitution)
         family = describing_function_family(plant, np.geomspace(10, 100, 40), np.geomspace(5, 60, 40))
         plot_family(family, ax=ax, title=f"restitution {restitution}")
-    figure.suptitle("Fig. 7: -1/N(a, ω) of two masses with backlash", fontsize="medium")
+    figure.suptitle(
+        "Fig. 7: -1/N(a, ω) of two masses with backlash (zigzag: averages over irregular motion)",
+        fontsize="medium",
+    )
     return figure
 
 
@@ -94,7 +97,10 @@ def _figure_8(_):
     axes[0].set_ylabel(r"$|X_k|\,/\,a$ [m/N]")
     axes[1].set_ylabel("")
     axes[0].set_ylim(bottom=1e-8)
-    figure.suptitle("Fig. 8: harmonic content of the load's position, a = 20 N", fontsize="medium")
+    figure.suptitle(
+        "Fig. 8: harmonic content of the load's position, a = 20 N (jagged: averages over irregular motion)",
+        fontsize="medium",
+    )
     return figure
 
 
@@ -104,7 +110,7 @@ def _figure_9(findings):
     return loop_response_plot(
         run,
         window=(0, 6),
-        title="Fig. 9: backlash, restitution 0.2: settles to "
+        title="Fig. 9: backlash, restitution 0.2: the first seconds on the way to "
         f"{end.omega:.3f} rad/s, x1 {1e3 * end.position:.2f} mm",
     ).figure
 
@@ -144,6 +150,7 @@ def _crossings(key):
         figure, ax = plt.subplots(figsize=(7.4, 5), layout="constrained")
         describing_function_plot(
             findings[key].response, ax=ax, label="PID", point_label="%.4g N @ %.4g rad/s",
+            exact=findings[key].check,
             title=f"PID and -1/N(a, ω): {findings[key].loop.title}",
         )  # fmt: skip
         return figure

@@ -17,7 +17,7 @@ _HEAD = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Row:
     """One cycle: predicted, exact, simulated.
 
@@ -46,6 +46,10 @@ class Row:
     verdict: str
     why: str = ""
     motion: Orbit | None = None
+
+    def __repr__(self) -> str:
+        """Return the verdict, the prediction and the orbit."""
+        return f"<Row: {self.verdict}, {self.predicted or 'not predicted'}, {self.exact or 'no orbit'}>"
 
     @property
     def omega_error(self) -> float:

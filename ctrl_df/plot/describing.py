@@ -9,6 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 
+from ..limit_cycles.predicted.grade import UNRELIABLE
+from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
 from .curves import (
     draw_curves,
@@ -24,7 +26,7 @@ from .curves import (
     view_of,
 )
 from .family import keys
-from .page import CROSSING_COLOR, NYQUIST_COLOR, OMEGA_COLOR, in_lines, legend_above, page, style
+from .page import CROSSING_COLOR, EXACT_COLOR, NYQUIST_COLOR, OMEGA_COLOR, in_lines, legend_above, page, style
 
 _ANALYSIS = (
     "refine",
@@ -43,15 +45,18 @@ _ANALYSIS = (
 _POINT_LABEL = "%5.2g @ %-5.2g"  # python-control's
 
 
-def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **kwargs) -> ct.ControlPlot:
+def describing_function_plot(
+    *sysdata, point_label=_POINT_LABEL, label=None, exact=None, **kwargs
+) -> ct.ControlPlot:
     """Nyquist plot of H with the -1/N curves of the block; crossings carry amplitude and frequency.
 
     Called as ``describing_function_plot(response)`` or ``describing_function_plot(H, F, A[, omega])``; the
     second form runs `describing_function_response`. A memoryless block has one -1/N curve, drawn over
     python-control's Nyquist plot. A block with dynamics has a family: solid at constant amplitude, dashed at
     constant frequency; H is then drawn over the frequencies scanned (continuous Nyquist contours clip and
-    shift what an improper H has to show). Crossings are dots, filled where the cycle is predicted stable; an
-    open diamond is a solution on a motion of the block that N does not name, see `LimitCycle.branch`.
+    shift what an improper H has to show). Crossings are dots, filled where the cycle is predicted stable,
+    pale where the prediction calls itself unreliable; an open diamond is a solution on a motion of the block
+    that N does not name, see `LimitCycle.branch`. Exact orbits are stars, filled where they are stable.
 
     Parameters
     ----------
@@ -62,6 +67,8 @@ def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **k
         python-control's, for a mechanism with units and more digits.
     label : str, False or None
         Name of the Nyquist curve.
+    exact : Check or sequence of Orbit, optional
+        What `verify` or `find_limit_cycle` found, to be marked at H(j omega) of each orbit.
     ax, title
         As in ``ct.nyquist_plot``.
     width
@@ -111,11 +118,20 @@ def describing_function_plot(*sysdata, point_label=_POINT_LABEL, label=None, **k
         if keyword in kwargs:
             raise TypeError(f"unexpected keyword argument '{keyword}'")
     if memoryless(response.family):
-        return _over_nyquist(response, point_label, label, kwargs)
-    return _family_picture(response, point_label, label, kwargs)
+        return _over_nyquist(response, point_label, label, _placed(response, exact), kwargs)
+    return _family_picture(response, point_label, label, _placed(response, exact), kwargs)
 
 
-def _over_nyquist(response, point_label, label, kwargs):
+def _placed(response, exact) -> list:
+    """Return where each orbit stands on the curve of H, of those within the frequencies scanned."""
+    orbits = getattr(exact, "orbits", exact) or ()
+    low, high = response.family.omega.min(), response.family.omega.max()
+    H = LinearPart(response.H)
+    seen = [orbit for orbit in orbits if low <= orbit.omega <= high]
+    return [(complex(H.clamped(np.array([orbit.omega]))[0][0]), orbit) for orbit in seen]
+
+
+def _over_nyquist(response, point_label, label, exact, kwargs):
     """python-control's Nyquist plot with the single -1/N curve of a memoryless block."""
     reach = max([15.0, *(3 * abs(p) for p in response.positions)])
     kwargs.setdefault("max_curve_magnitude", reach)  # its default would bend the curve where the crossing is
@@ -130,19 +146,20 @@ def _over_nyquist(response, point_label, label, kwargs):
     lines = np.empty(2, dtype=object)
     lines[0] = np.concatenate(cplt.lines.flatten()).tolist()
     curve = np.asarray(response.N_vals)
-    if response.positions:
-        _keep_in_view(ax, response.positions)
+    places = [*response.positions, *(place for place, _ in exact)]
+    if places:
+        _keep_in_view(ax, places)
     amplitudes = response.family.amplitudes
     curve = curve[-amplitudes.size :]
     with plt.rc_context(style(width)):
         lines[1] = [draw_single(ax, amplitudes, curve, color=OMEGA_COLOR)]
         labels = labels_of(ax, [*lines[0], *lines[1]])
-        _mark(labels, response, point_label)
+        _mark(labels, response, point_label, exact)
         name_amplitudes(labels, amplitudes, curve, OMEGA_COLOR)
     return ct.ControlPlot(lines, cplt.axes, cplt.figure)
 
 
-def _family_picture(response, point_label, label, kwargs):
+def _family_picture(response, point_label, label, exact, kwargs):
     title = kwargs.pop("title", None)
     family, H = response.family, response.response
     with page(0.72, narrow=0.95, width=kwargs.pop("width", None), ax=kwargs.pop("ax", None)) as drawn:
@@ -150,7 +167,7 @@ def _family_picture(response, point_label, label, kwargs):
         w = np.abs(np.imag(H.contour)) if not H.dt else np.angle(H.contour) / H.dt
         seen = (w >= family.omega.min() * (1 - 1e-9)) & (w <= family.omega.max() * (1 + 1e-9))
         curve = np.asarray(H.response)[seen]
-        include = response.positions or ()
+        include = [*response.positions, *(place for place, _ in exact)]
         z = family.minus_inverse.ravel()
         set_view(ax, view_of(z if include else np.concatenate([z, curve]), include))
         solid, dashed, names = draw_curves(ax, family)
@@ -159,11 +176,11 @@ def _family_picture(response, point_label, label, kwargs):
         finish(ax, units(family)[2])
         named = label if isinstance(label, str) else "H(jω)"
         handles = [Line2D([], [], color=nyquist[0].get_color(), lw=2.0, label=named), *keys()]
-        handles += _kinds(response)
+        handles += _kinds(response, exact)
         title = _title(response) if title is None else title
         legend_above(ax, title, handles=handles, columns=3)
         labels = labels_of(ax, [*nyquist, *solid, *dashed])
-        _mark(labels, response, point_label)
+        _mark(labels, response, point_label, exact)
         name_curves(labels, names)
         return ct.ControlPlot(_two(nyquist, solid + dashed), np.array([[ax]]), drawn.figure)
 
@@ -184,48 +201,72 @@ def _two(first, second):
 def _look(cycle) -> dict:
     """Return how a crossing is drawn: filled where Loeb calls the cycle stable, open otherwise.
 
-    Open diamonds stand on a motion that N does not name; the curves drawn do not pass through them.
+    Pale where the prediction is unreliable: there may be no orbit, or one of other stability. Open diamonds
+    stand on a motion that N does not name; the curves drawn do not pass through them.
     """
     fill = CROSSING_COLOR if cycle.stable and not cycle.branch else "white"
+    fill = _PALE if cycle.grade == UNRELIABLE and not cycle.branch else fill
     return dict(
         marker="D" if cycle.branch else "o", ms=6, mfc=fill, mec=CROSSING_COLOR, mew=1.4, ls="none", zorder=6
     )
 
 
-def _kinds(response) -> list[Line2D]:
+def _look_exact(orbit) -> dict:
+    """Return how an exact orbit is drawn: a star, filled where it is stable."""
+    fill = EXACT_COLOR if orbit.stable else "white"
+    return dict(marker="*", ms=11, mfc=fill, mec=EXACT_COLOR, mew=1.0, ls="none", zorder=8)
+
+
+def _kinds(response, exact) -> list[Line2D]:
     """Return what the legend says of the crossings there are."""
     handles = {}
     for cycle in response.limit_cycles:
         kind = (
             "cycle on another motion of the block" if cycle.branch
+            else "prediction, unreliable" if cycle.grade == UNRELIABLE
             else "predicted cycle, stable" if cycle.stable
             else "predicted cycle, unstable" if cycle.stable is not None
             else "predicted cycle, stability open"
         )  # fmt: skip
-        handles[kind] = Line2D([], [], label=kind, **_look(cycle))
+        handles[kind] = Line2D([], [], label=kind, **{**_look(cycle), "ms": 5})
+    for _, orbit in exact:
+        words = {True: "exact orbit, stable", False: "exact orbit, unstable", None: "exact motion, irregular"}
+        kind = words[orbit.stable]
+        handles[kind] = Line2D([], [], label=kind, **{**_look_exact(orbit), "ms": 7})
     return list(handles.values())
 
 
-def _mark(labels, response, point_label):
-    """Mark the crossings and write amplitude and frequency beside each."""
+def _mark(labels, response, point_label, exact):
+    """Mark the crossings and the exact orbits, and write amplitude and frequency beside each."""
     ax, force = labels.ax, units(response.family)[0]
     if force and point_label == _POINT_LABEL:
         point_label = f"%.4g{force} @ %.4g rad/s"
     for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
         ax.plot(position.real, position.imag, **{**_look(cycle), "ms": 7})
-    labels.block_points([(p.real, p.imag) for p in response.positions], 7)
+    for place, orbit in exact:
+        ax.plot(place.real, place.imag, **_look_exact(orbit))
+    places = [*response.positions, *(place for place, _ in exact)]
+    labels.block_points([(p.real, p.imag) for p in places], 7)
     if not point_label:
         return
     for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
         labels.write(
             (point_label % (cycle.amplitude, cycle.omega)).strip() + _standing(cycle),
             [(position.real, position.imag)],
-            offsets=_away(ax, position, response.positions),
+            offsets=_away(ax, position, places),
             must=True, avoid=False, color=CROSSING_COLOR, fontweight="normal" if cycle.branch else "bold",
             bbox=dict(boxstyle="round,pad=0.1", fc="white", ec="none", alpha=0.85), zorder=7,
         )  # fmt: skip
 
+    for place, orbit in exact:
+        labels.write(
+            (point_label % (orbit.amplitude, orbit.omega)).strip(), [(place.real, place.imag)],
+            offsets=_away(ax, place, places), must=True, avoid=False, color=EXACT_COLOR,
+            bbox=dict(boxstyle="round,pad=0.1", fc="white", ec="none", alpha=0.85), zorder=7,
+        )  # fmt: skip
 
+
+_PALE = "#ecc9d1"  # of the crossings' colour
 _ASIDE = np.array(
     [(7, 5), (7, -5), (-7, 5), (-7, -5), (0, 9), (0, -9), (10, 13), (10, -13), (-10, 13), (-10, -13)]
 )

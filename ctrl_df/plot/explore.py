@@ -30,12 +30,11 @@ from .curves import (
     units,
     view_of,
 )
-from .page import AMPLITUDE_COLOR, CROSSING_COLOR, NYQUIST_COLOR, style
+from .page import AMPLITUDE_COLOR, CROSSING_COLOR, EXACT_COLOR, NYQUIST_COLOR, style
 
 _OWNER = "explore"
 _SHOWN = (48, 64)  # amplitudes and frequencies of the curves drawn
 _AROUND = (4.0, 2.5)  # factors of amplitude and frequency about the cycles, within which curves are drawn
-_EXACT_COLOR = "#1b7837"
 _NARROW = 5.0  # [in] below which fewer curves are drawn, in smaller letters
 _ROW = 0.26  # [in] of a slider
 _MARK, _RIM = 8.0, 4.0  # [points] about a mark, beyond the right rim, that labels may not, may reach
@@ -214,7 +213,7 @@ class Explorer:
             fill = CROSSING_COLOR if cycle.stable else "white"
             ax.plot(place.real, place.imag, "o", ms=7, mfc=fill, mec=CROSSING_COLOR, mew=1.6, zorder=6)
         if orbit is not None:
-            ax.plot(marked[-1].real, marked[-1].imag, "*", ms=13, mfc=_EXACT_COLOR, mec="white", zorder=7)
+            ax.plot(marked[-1].real, marked[-1].imag, "*", ms=13, mfc=EXACT_COLOR, mec="white", zorder=7)
         finish(ax, units(self._family)[2])
         ax.set_title(self._told(orbit))
         ax.tick_params(labelsize=plt.rcParams["xtick.labelsize"])

@@ -23,6 +23,7 @@ NARROW = 4.5
 """Width below which a figure is a column's [in]: panels stand one below the other, letters are smaller."""
 
 AMPLITUDE_COLOR, OMEGA_COLOR, NYQUIST_COLOR, CROSSING_COLOR = "#1f5a99", "#b3541e", "#222222", "#a3123a"
+EXACT_COLOR = "#1b7837"
 MEASURED, MODEL, ERROR, OTHER, QUIET = "0.6", "#1f4e9c", "#b3402a", "#9db4d8", "0.75"
 """Colours that keep apart in grey (their lightness differs) and for the colour-blind (blue and orange)."""
 

@@ -108,11 +108,12 @@ def event_response(
     inputs : float, (nt,) or (ninputs, nt) array, list, or callable
         A constant, samples at `timepts`, or a function of time (called with t, returning a number or one for
         each input).
-    initial_state : float or (nstates,) array
-        State at the first time, in the order of ``sys.state_labels``; a scalar fills all. A pure delay
-        (input_delay, sensor_delay) runs exactly; before the first time its input is taken to have always been
-        what it is then (its own entry here is for ordinary solvers and has no effect). To see a step arrive
-        late, begin the times before the step.
+    initial_state : float, (nstates,) array or mapping
+        State at the first time, in the order of ``sys.state_labels``; a scalar fills all. A mapping gives
+        some by name, the others being zero: ``{"plant_x": 1e-3}``, or ``{"x": 1e-3}`` where one alone ends
+        so. A pure delay (input_delay, sensor_delay) runs exactly; before the first time its input is taken
+        to have always been what it is then (its own entry here is for ordinary solvers and has no effect).
+        To see a step arrive late, begin the times before the step.
     params : dict
         Parameters that differ from those of the block, or of the one block in an interconnection that has
         them.
@@ -304,6 +305,11 @@ def checked_times(owner: str, timepts) -> np.ndarray:
 
 def _initial(system, initial_state):
     n = system.nstates or 0
+    if isinstance(initial_state, Mapping):
+        x0 = np.zeros(n)
+        for name, value in initial_state.items():
+            x0[_place(system, name)] = number("event_response", f"initial_state[{name!r}]", value)
+        return x0
     x0 = real_array("event_response", "initial_state", initial_state)
     if x0.ndim == 0:
         return np.full(n, float(x0))
@@ -313,6 +319,20 @@ def _initial(system, initial_state):
             f"{x0.shape}. Give the states in that order."
         )
     return x0.ravel()
+
+
+def _place(system, name) -> int:
+    """Return which state has a name, or alone has it as its last part (``x`` of ``plant_x``)."""
+    labels = list(system.state_labels)
+    if name in labels:
+        return labels.index(name)
+    found = [k for k, label in enumerate(labels) if label.endswith(f"_{name}")]
+    if len(found) != 1:
+        raise ValueError(
+            f"initial_state names {name!r}, which {'no state has' if not found else 'several states have'}. "
+            f"The states are {', '.join(labels)}."
+        )
+    return found[0]
 
 
 def _drive(inputs, nr, times, hold):

@@ -11,6 +11,7 @@ import numpy as np
 from ...drawing import draw
 from ...simulate.engine import Event
 from ...status import Status
+from ...table import Table
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ class Try(NamedTuple):
     outcome: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class NoOrbit:
     """The answer of a search that found no periodic orbit; false where a truth value is asked.
 
@@ -133,6 +134,19 @@ class NoOrbit:
     def __bool__(self) -> bool:
         """Return False."""
         return False
+
+    def __getattr__(self, name: str):
+        """Say that there is no orbit to be asked."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise AttributeError(f"no orbit was found, so there is no {name!r}; .status and .tried tell more")
+
+    def __repr__(self) -> str:
+        """Return the status and the number of tries."""
+        return f"<NoOrbit: {self.status.name.lower().replace('_', ' ')}, {len(self.tried)} starts tried>"
+
+    def _repr_html_(self) -> str:
+        return Table(("no orbit found from", "what came of it"), self.tried)._repr_html_()
 
     def __str__(self) -> str:
         """Return the status, then a line for each try."""
