@@ -183,7 +183,7 @@ BOXES = {_friction: ((5.8, 60), (5, 40)), _gap: ((5, 60), (8, 60)), _relay: ((0.
 @pytest.mark.parametrize("make", BOXES)
 @pytest.mark.parametrize(
     "units",
-    [(1e-9, 1, 1), (1e9, 1, 1), (1, 1e-9, 1), (1, 1e9, 1), (1, 1, 1e-9), (1, 1, 1e9), (1e6, 1e-5, 1e-6)],
+    [(1e-9, 1, 1e9), (1, 1e9, 1e-9), (1e6, 1e-5, 1e-6)],
 )
 def test_predictions_orbits_verdicts_and_fates_in_other_units(make, units):
     force, _, time = units
