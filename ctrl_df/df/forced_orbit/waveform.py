@@ -84,7 +84,7 @@ class WaveformOrbit:
                 yield self.motion, dict(periods=20)
                 return
         n = search.engine.nstates
-        if gap == 0:
+        if core is None or gap == 0:
             for periods in (3, 30):
                 yield search.engine.start(np.zeros(n)), dict(periods=periods)
             return
