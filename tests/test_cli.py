@@ -6,8 +6,8 @@ import struct
 import numpy as np
 import pytest
 
-from ctrl_df.cli import main
 import ctrl_df as cdf
+from ctrl_df.cli import main
 from ctrl_df.model_file import EXAMPLE, read_model
 
 FIGURES = ("fig3", "fig4", "fig5", "fig7", "fig8", "fig9", "fig10")
