@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .blocks.effect import Effect, effect_class
+from .blocks.massless import Massless
 from .blocks.mechanism import Mass, Mechanism, TwoMass
 from .blocks.pid import pid
 from .blocks.rotary import Inertia, TwoInertias
@@ -57,6 +58,7 @@ MOST_POINTS = 1_000_000
 _GAINS = ("kp", "ki", "kd", "tf", "dt")
 _PLANTS: dict[str, type[Mechanism]] = {
     "mass": Mass, "two_mass": TwoMass, "inertia": Inertia, "two_inertias": TwoInertias,
+    "massless": Massless,
 }  # fmt: skip
 _SECTIONS = ("plant", "effects", "controller", "box", "data")
 _COLUMNS = ("time", "input", "output", "outputs", "velocity", "channels", "delimiter", "decimal")

@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import pytest
 
+import ctrl_df as cdf
 from ctrl_df import warm
 from ctrl_df.cli import main
 from ctrl_df.model_file import EXAMPLE, read_model
@@ -33,6 +34,12 @@ def test_list_of_effects_is_the_same_model(tmp_path, model):
     listed = EXAMPLE.replace("[effects.coulomb] ", '[[effects]]\nid = "coulomb"\n')
     other.write_text(listed.replace("[effects.viscous]", '[[effects]]\nid = "viscous"'))
     assert read_model(other).plant == read_model(model).plant
+
+
+def test_a_block_without_mass(tmp_path):
+    path = tmp_path / "damper.toml"
+    path.write_text('[plant]\nkind = "massless"\n[effects.coulomb]\nlevel = 3.0\n')
+    assert read_model(path).plant == cdf.Massless([cdf.Coulomb(3.0)])
 
 
 def test_limit_cycles_as_text_and_json(model, capsys):
