@@ -1,7 +1,8 @@
 """The one way up: results draw themselves and go on by name, and what does it is imported only then.
 
 Every other import of the package runs downwards. A result knows what its picture is called; which function
-draws it stands here, so that no computation depends on matplotlib.
+draws it stands here, so that no computation depends on matplotlib. So does an element that is asked for its
+describing function, as python-control asks its own.
 """
 
 from __future__ import annotations
@@ -27,10 +28,11 @@ PICTURES = {
 
 
 STEPS = {
-    "next experiment": "experiment.next_experiment",
-    "report": "report.write_report",
+    "describing function": "df.describing.describing_function",
+    "next experiment": "identify.experiment.next_experiment",
+    "report": "identify.report.write_report",
 }
-"""What a result of identification may be asked for besides, and the function of `ctrl_df.identify`."""
+"""What a result or an element may be asked for besides, and the function that has the answer."""
 
 
 def draw(picture: str, result, **keywords) -> Any:
@@ -55,5 +57,5 @@ def draw(picture: str, result, **keywords) -> Any:
 
 def go_on(step: str, result, *arguments) -> Any:
     """Ask a result for more: `step`, a key of `STEPS`; `arguments`: further ones of its function."""
-    module, function = STEPS[step].split(".")
-    return getattr(importlib.import_module(f"ctrl_df.identify.{module}"), function)(result, *arguments)
+    module, _, function = STEPS[step].rpartition(".")
+    return getattr(importlib.import_module(f"ctrl_df.{module}"), function)(result, *arguments)

@@ -2,11 +2,10 @@
 
 import ast
 import dataclasses
-import functools
 from pathlib import Path
 
 import pytest
-import rigs
+from units_apart import SCALES, alike, diagnosed
 from user_copies import copied
 
 import ctrl_df as cdf
@@ -59,34 +58,20 @@ def test_no_id_of_an_effect_stands_as_a_string():
     assert not found, "\n".join(found)
 
 
-@functools.cache
-def rig_of(hidden):
-    # of seed 21 the ripple is none that fits can follow
-    rig = rigs.draw(hidden, 6001 if hidden == "position_ripple" else 21, excitation="multisine", n=2500)
-    return rig, rig.train[0].measurement(), rig.holdout[0].measurement()
-
-
-def found_by(hidden, cls):
-    rig, train, held = rig_of(hidden)
-    free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
-    return cdf.diagnose(rig.baseline, train, holdout=held, free=free, candidates=[cls])
-
-
 @pytest.mark.parametrize(
-    "hidden",
+    ("hidden", "scale"),
     [
-        *(pytest.param(e, marks=pytest.mark.quick) for e in FAST),
-        *(pytest.param(e, marks=pytest.mark.slow) for e in SLOW),
+        *(pytest.param(e, SCALES[0], marks=pytest.mark.quick) for e in FAST),
+        *(pytest.param(e, SCALES[i % 3], marks=pytest.mark.slow) for i, e in enumerate(SLOW)),
     ],
 )
-def test_a_copy_is_found_as_the_original_is(hidden, tmp_path):
-    original = found_by(hidden, effect_class(hidden))
+def test_a_copy_in_other_units_is_found_as_the_original_is(hidden, scale, tmp_path):
+    original = diagnosed(hidden, [hidden])
     with copied(effect_class(hidden), tmp_path) as own:
-        copy = found_by(hidden, own)
-    assert original.verdict == copy.verdict == "effect"
-    assert original.best.id == hidden and copy.best.id == own.id == f"own_{hidden}"
-    assert copy.best.evidence == pytest.approx(original.best.evidence, rel=1e-6)
-    assert dict(copy.best.parameters) == pytest.approx(dict(original.best.parameters), rel=1e-6)
+        copy = diagnosed(hidden, [own], *scale)
+    assert original.verdict == "effect" and original.best.id == hidden
+    assert copy.best.id == own.id == f"own_{hidden}"
+    alike(original, copy, scale)
 
 
 def test_the_copies_stand_for_every_role():

@@ -13,7 +13,18 @@ ELSEWHERE = {
     "_SPEEDS",  # where laws are probed
 }
 
-ROOMS = ("", "datasets", "estimation", "planning", "residuals", "results", "selection", "starting", "tables")
+ROOMS = (
+    "",
+    "datasets",
+    "estimation",
+    "planning",
+    "residuals",
+    "results",
+    "selection",
+    "smoothing",
+    "starting",
+    "tables",
+)
 
 
 def numbers_of(path):
@@ -30,16 +41,7 @@ def test_they_stand_in_one_place():
     root = Path(ctrl_df.__file__).parent / "identify"
     found = [
         f"{path.relative_to(root)}: {name}"
-        for room in (
-            "",
-            "datasets",
-            "estimation",
-            "planning",
-            "residuals",
-            "results",
-            "selection",
-            "starting",
-        )
+        for room in ROOMS
         for path in sorted((root / room).glob("*.py"))
         for name in numbers_of(path)
         if path.name != "thresholds.py" and name not in ELSEWHERE
@@ -50,6 +52,8 @@ def test_they_stand_in_one_place():
 def test_what_follows_follows():
     chance = thresholds.SHAPES * math.exp(-thresholds.SIGNIFICANT)
     assert 0.1 * thresholds.FALSE_ALARM < chance < thresholds.FALSE_ALARM
+    assert abs(math.log(thresholds.GROWTH) - 3 / math.sqrt(100)) < 5e-3
+    assert abs(math.log(thresholds.NOISIER) - 3 / math.sqrt(80)) < 5e-3
     assert abs(thresholds.FLOOR - 1 - 1 / math.sqrt(2 * 500)) < 2e-3
     bump = math.exp(-((thresholds.PASSED / 1e-3) ** 2))
     assert 0.009 < bump < 0.01

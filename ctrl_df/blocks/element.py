@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -13,6 +12,7 @@ import numpy as np
 from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonlinearity
 
 from ..checks import known_name, mapping, shown, system_name
+from ..drawing import go_on
 from .linearization import warn_of_element
 from .parameter import Parameter
 
@@ -145,8 +145,8 @@ class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
 
     def describing_function(self, A, omega=None):
         """Return N at amplitude `A` >= 0; `omega` [rad/s] matters to a rate limiter only."""
-        # The drop-in contract wants the method here; the mathematics lives one layer up, in ctrl_df.df.
-        return importlib.import_module("ctrl_df.df.describing").describing_function(self, A, omega)
+        # the drop-in contract wants the method here; the mathematics lives above
+        return go_on("describing function", self, A, omega)
 
     def _primitive_for(self, params) -> Any:
         changed = (

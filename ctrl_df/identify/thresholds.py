@@ -1,8 +1,10 @@
 """Every tuned number of identification, with what it follows from, or the benchmark that chose it.
 
-``rigs``: `benchmarks/diagnosis.py`, single effects, ladders, rigs with nothing or something unknown
-hidden. ``records``: `benchmarks/studies.py`. ``tables``: `tests/test_frequency.py`. Numbers of one effect
-stand in its class, tolerances of one formula beside it.
+``rigs``: `benchmarks/diagnosis.py`, single effects, ladders, rigs with nothing or something unknown hidden.
+``records``: `benchmarks/studies.py`. ``tables``: `tests/test_frequency.py`. A number that names one of
+these was chosen by hand on it; no scan of other values is on record, so that none is the best there is. The
+ratio of two rms of n effective samples each has a logarithm of standard deviation 1/sqrt(n). Numbers of one
+effect stand in its class, tolerances of one formula beside it.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ SIGNIFICANT_TABLE = 12.0
 """Evidence an effect needs on the points of a table: a hundred shapes, a false alarm of 6e-4."""
 
 SIGNIFICANT_TABLE_HELD = 2.0
-"""Evidence it needs on the points held out, of which there are few (tables)."""
+"""Evidence it needs on the points held out: odds of 7 to 1, as a third of the points can hardly give more
+(tables)."""
 
 REFUTED = SIGNIFICANT
 """Evidence of held-out data against a candidate that puts it last."""
@@ -45,18 +48,20 @@ TOLD_APART = 6.0
 """Log likelihood ratio that tells two candidates apart: odds of 400 to 1."""
 
 STOPPED_EARLY = 3 * SIGNIFICANT
-"""Evidence by which candidates may differ because their fits stopped early (rigs)."""
+"""Evidence by which candidates may differ because their fits stopped early: thrice what makes an effect,
+which fits gained on the rigs when brought to their end. More costs time, less the right one now and then."""
 
 ANGLE_WORTH = 50.0
 """Log likelihood ratio, for white noise, that a record's own angle must bring: coloured residuals make tens
 of it by chance (rigs with ripples)."""
 
 PROMISING = 0.2
-"""Share of the best one's evidence, at the first look, from which a candidate is confirmed (rigs)."""
+"""Share of the best one's evidence, at the first look, from which a candidate is confirmed: there records are
+thinned fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
 
-HOPELESS_ON_TABLE = -20.0
-"""Evidence on a few points of a table below which a candidate is not confirmed: all of them will not speak
-for it (tables)."""
+HOPELESS_ON_TABLE = -SIGNIFICANT
+"""Evidence on a few points of a table below which a candidate is not confirmed: as much as makes an effect,
+but against it."""
 
 # --- ratios of errors -------------------------------------------------------------------------------
 
@@ -65,14 +70,16 @@ PROCESS_NOISE = 50.0
 that is missing (between the rigs and the recorded machines)."""
 
 HOPELESS = 3.0
-"""Error over the best candidate's beyond which another try is not worth it (rigs)."""
+"""Error over the best candidate's beyond which another try is not worth it: nine times its power, which no
+last step of a fit removes (rigs). Only work depends on it."""
 
 PROMISES = 0.25
 """Share of the squared error the best candidate explains that an effect has to explain for one that contains
 it to be tried: the special case of a right law is right over a part of the motion."""
 
 STILL_POSSIBLE = 1.5
-"""Error over the best candidate's up to which another may yet turn out to be the right one (rigs)."""
+"""Error over the best candidate's up to which another may yet turn out to be the right one: a bit more than
+twice its power, left by a fit that ended beside its minimum (rigs)."""
 
 BETTER = 0.99
 """Error over the one before that counts as a better minimum."""
@@ -86,13 +93,15 @@ FLOOR = 1.03
 an rms over 500 effective samples, 1 + 1/sqrt(1000)."""
 
 GROWTH = 1.35
-"""Best error over segments four times as long that still counts as the same (rigs)."""
+"""Best error over segments four times as long that still counts as the same: three standard deviations for
+100 effective samples, exp(3 / sqrt(100))."""
 
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 """Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
 
 LEFT = 0.2
-"""Share of the structure (rms) that the best candidate may leave: 4 % of its power (rigs)."""
+"""Share of the structure (rms) that the best candidate may leave: 4 % of its power. Rigs with something
+unknown hidden leave more to whatever stands in for it, those of the library less."""
 
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
@@ -102,10 +111,12 @@ UNMOVED = 0.5
 stands still at a fitted place and speed errs by as much over half a turn of a sine."""
 
 NOISIER = 1.4
-"""Error on held-out segments over that on fitted ones that may be chance (rigs)."""
+"""Error on held-out segments over that on fitted ones that may be chance: three standard deviations for 80
+effective samples, exp(3 / sqrt(80))."""
 
 GROWN = 2.0
-"""Error over the least that the shortest segments leave, up to which it may be noise (rigs)."""
+"""Error over the least that the shortest segments leave, up to which it may be noise: slow noise of thrice
+the power of the fast one, the only one that short segments do not absorb (rigs with coloured noise)."""
 
 OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
 """Error of a segment over the good quarter's, and over the noise, from which its start is sought anew."""
@@ -113,11 +124,12 @@ OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
 GOOD = 0.25
 """Share of the segments that are taken to be right when others are compared with them."""
 
-HOPELESS_START = 3.0
-"""Error of a start on a table over that of the model itself from which it is none (tables)."""
+HOPELESS_START = HOPELESS
+"""Error of a start on a table over that of the model itself from which it is none."""
 
 GROSS = 0.02
-"""Share of the points of a table expected to err by as much as N itself: motions coexist (tables)."""
+"""Share of the points of a table expected to err by as much as N itself, as motions coexist: one in 50, fewer
+than one of the tables of `tests/test_frequency.py`, so that a second such point has to show itself."""
 
 COARSE = 0.4
 """rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
@@ -142,6 +154,10 @@ EXACT = 10 * NOISE_FREE
 
 PARAMETER_RANGE = 12.0
 """Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
+
+SIZE_PRIOR = 3.0
+"""Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
+and a half lies `PARAMETER_RANGE`."""
 
 PASSED = 2.15e-3
 """Speed, over the typical one, at which a bump of friction is gone to 1 % that only breaking away shows: a
@@ -281,6 +297,11 @@ TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 BEGINNINGS = (16, 8, 4, 2)
 """Shares of a segment over which the state that it begins in is found first, each twice the last."""
 
+BALANCE_SAMPLES, BALANCE_PERIODS, BALANCE_ROUNDS = 48, 3, 4
+"""Of the sines along which forces are balanced: samples a period, of which the ninth harmonic has five;
+periods, hidden states settling over the first ones; rounds of Gauss and Newton for parameters that are not
+linear."""
+
 BALANCED_STARTS = 2
 """Starts of an effect on a table from which its forces are balanced: sizes apart may balance alike."""
 
@@ -314,6 +335,12 @@ SMOOTHER_ESTIMATED = 6
 
 SMOOTHER_STILL = 0.05
 """Change of the force from round to round, in its standard deviations, that nobody would see."""
+
+SMOOTHER_RTOL = 1e-6
+"""Tolerance of its runs: the noise of a record is larger."""
+
+SMOOTHER_NUDGE = 1e-3
+"""Of parameters and forces, relative to their size, where runs are differenced: the square root of that."""
 
 SMOOTHER_LEAK = 0.1
 """Of the sensor's noise: what continuity of the position may give way over a whole record."""

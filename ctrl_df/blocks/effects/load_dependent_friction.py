@@ -45,3 +45,10 @@ class LoadDependentFriction(Effect):
     def law(moving, direction, speed, base, p, x, drive, load):
         """Return the level [N]."""
         return base + p[0] * abs(p[1] * drive + (1.0 - p[1]) * load)
+
+    @classmethod
+    def suggest(cls, screen):
+        """Return small and large ones; where something besides the drive pushes, of several shares."""
+        loaded = any(e.role == "force" and not e.place_free for e in screen.block.effects)
+        shares = (1.0, 0.5, 0.0) if loaded else (1.0,)
+        return [cls(size, share) for share in shares for size in (0.02, 0.1, 0.4)]

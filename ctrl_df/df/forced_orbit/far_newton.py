@@ -20,6 +20,8 @@ POOR = 1e-3  # the same where rounding forbids more: the residual says so
 NEUTRAL = 1e-6  # by how much a multiplier may exceed one: central differences are that good
 _STEP = 2e-5  # of differences, relative
 _ITERATIONS = 40
+_SETTLED = 1e-5, 0.3  # a step so short that shrinks no more than so far is what rounding leaves
+_LEAST_SHARE = {True: 1e-3, False: 0.3}  # of a Newton step that is tried, by patience
 
 
 def close_far(
@@ -64,7 +66,7 @@ def close_far(
                 return None
             if best is None or now < error:
                 best, error = y, now
-            if now < 1e-3 * GOOD or (now < 1e-5 and now > 0.3 * last):  # rounding rules
+            if now < 1e-3 * GOOD or (now < _SETTLED[0] and now > _SETTLED[1] * last):  # rounding rules
                 break
             last = now
             share = 1.0
@@ -80,7 +82,7 @@ def close_far(
                 if ahead is not None and _length(ahead, size[free]) <= (1 - 0.25 * share) * now:
                     break
                 share *= 0.5 if share > 0.1 else 0.25
-                if share < (1e-3 if patient else 0.3):
+                if share < _LEAST_SHARE[patient]:
                     trial = None
                     break
             if trial is None:

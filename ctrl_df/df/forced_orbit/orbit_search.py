@@ -25,6 +25,13 @@ _BINS = 2  # decades of force and of frequency: within them sizes, up to A / ome
 _COARSE = 1e-7  # tolerance while a transient is followed
 _AT_ONCE = 64  # shots between two chances to interrupt them
 _START = 0.02  # of a period: first step of a shot
+_WITHIN = 0.3  # of a gap, off its faces and its middle: where a motion from rest begins
+_NUDGE = 1e-3  # of the size of each coordinate: far above rounding, within the reach of Newton's method
+_KNOCKS = ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2))
+# Face of a gap to begin at, and speed to leave it with over that which crosses it in a radian: none, and some
+# below and above; one that stays in touch is enough
+_PUSHED = 1e-6  # speed gained in a period, over that of a free inertia: beyond the error of a closed orbit
+_LINEAR = 1e-3  # change of a speed's growth from the one half to the other that is steady
 LONGEST = 12  # periods of a subharmonic motion that is recognised
 BLOCKS = 8  # an average's spread is estimated from that many parts
 BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
@@ -187,7 +194,7 @@ class OrbitSearch:
         y = np.zeros(n)
         for node in self.mechanisms:
             if self.engine.program.ints[node[layout.AUX]] == 2:
-                y[node[layout.X] + 2] = 0.3 * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
+                y[node[layout.X] + 2] = _WITHIN * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
         state = self._state(y)
         self._resize(A)
         return state
@@ -210,7 +217,7 @@ class OrbitSearch:
     def _nudged(self, state):
         """Return the state a little off: no motion stays on a repelling orbit by the grace of rounding."""
         y = self.symmetries.transform @ state.x
-        y[self.symmetries.free] += 1e-3 * self.shot.size[self.symmetries.free]
+        y[self.symmetries.free] += _NUDGE * self.shot.size[self.symmetries.free]
         return self._state(y, state.mode)
 
     def _follow(self, state, periods, rtol=_COARSE):
@@ -303,7 +310,7 @@ class OrbitSearch:
         if self.mirrored or self.drive.harmonics[0, 0] != 0:
             return
         gained = np.abs(step[self.symmetries.inertial])
-        if np.max(gained, initial=0.0) > 1e-6 * self.A / (self.inertia * self.omega):
+        if np.max(gained, initial=0.0) > _PUSHED * self.A / (self.inertia * self.omega):
             raise OutOfWork(Status.DIVERGED)
 
     def _touching(self, orders):
@@ -316,7 +323,7 @@ class OrbitSearch:
         node = next(m for m in self.mechanisms if prog.par[m[layout.PAR] + layout.P_GAP] > 0)
         at, gap = node[layout.X], prog.par[node[layout.PAR] + layout.P_GAP]
         speed = gap * self.omega + self.A / (prog.par[node[layout.PAR] + layout.P_M0 + 1] * self.omega)
-        for face, leaving in ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2)):
+        for face, leaving in _KNOCKS:
             self.mirrored = self.symmetric
             y = np.zeros(self.engine.nstates)
             y[at + 2], y[at + 3] = face * gap, leaving * speed
@@ -348,7 +355,7 @@ class OrbitSearch:
                 continue
             early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
             spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
-            if abs(early) > 1e-3 and abs(late / early - 1) < 1e-3 and spread < 0.5 * abs(early / half):
+            if abs(early) > _LINEAR and abs(late / early - 1) < _LINEAR and spread < 0.5 * abs(early / half):
                 raise OutOfWork(Status.DIVERGED)
 
     # --- what was found -------------------------------------------------------------------------------

@@ -198,7 +198,8 @@ def fit_records(
     block = first.block if not start else simulator_of(model, records[0]).block
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
-    problem = Problem(model, records, names, budget)
+    begun = {k: p.value for k, p in block.parameters.items()} if names else {}
+    problem = Problem(model, records, names, budget, about=begun)
     theta = problem.start()
     if coarse is None:
         coarse = start is None
@@ -226,6 +227,7 @@ def fit_segments(
     tolerance: float = 1e-3,
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
+    about: Mapping[str, float] | None = None,
     errors: bool = False,
     error_filter: NoiseModel | None = None,
     begins: str = FREE,
@@ -250,6 +252,8 @@ def fit_segments(
         As for `fit_records`.
     limits : mapping or None
         Least and largest values of some parameters, within their ranges.
+    about : mapping or None
+        What some of them are about (see `SIZE_PRIOR`).
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
     error_filter : NoiseModel or None
@@ -268,7 +272,9 @@ def fit_segments(
     -------
     FitResult
     """
-    problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
+    problem = Problem(
+        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about
+    )
     problem.stage(list(segments), thin, starts, rtol)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

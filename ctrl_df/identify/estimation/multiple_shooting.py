@@ -24,7 +24,7 @@ from .sensed import sensed
 from .sensitivity import OutputSensitivity
 from .simulator import Simulator, feasible
 from .simulators import simulator_of
-from .variables import step_of_sensor, variables_of
+from .variables import beforehand, step_of_sensor, variables_of
 
 Signals = list[np.ndarray]
 
@@ -46,6 +46,7 @@ class Problem:
         error_filter=None,
         begins=FREE,
         hopeless=(math.inf, 0),
+        about=None,
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
@@ -53,6 +54,7 @@ class Problem:
         self.block = simulator_of(model, records[0]).block
         self.known = [facts_of(self.block, r) for r in records]
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
+        self.about, self.precision = beforehand(self.variables, about or {})
         self.steps = np.full(len(names), 1e-3)
         self.nfev = 0
         self.converged = False
@@ -227,16 +229,20 @@ class Problem:
             if trusts is not None:
                 weights = [w * t for w, t in zip(weights, trusts, strict=True)]
             cost = self.cost(residual, nuisance, weights)
+            # counts as much as one sample off by the error there is: parameters that the data leave open stay
+            known = self.precision * 2 * cost / sum(map(len, residual))
+            cost += 0.5 * float(known @ (theta - self.about) ** 2)
             base = [m - e for m, e in zip(self.measured, residual, strict=True)]
             self.slopes = jp, js = self.jacobian(theta, nuisance, base)
             gain, accepted = 0.0, False
             for _attempt in range(6):
                 h, g, back = self.normal(jp, js, residual, weights, nuisance, damping)
-                step = self._step(h, g, theta, damping)
+                step = self._step(h + np.diag(known), g - known * (theta - self.about), theta, damping)
                 trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
                 trial_nuisance = back(trial_theta - theta)
                 trial = self.residual(trial_theta, trial_nuisance)
                 trial_cost = self.cost(trial, trial_nuisance, weights)
+                trial_cost += 0.5 * float(known @ (trial_theta - self.about) ** 2)
                 if trial_cost < cost:
                     gain, accepted = 1 - trial_cost / cost, True
                     theta, nuisance, residual = trial_theta, trial_nuisance, trial

@@ -136,13 +136,14 @@ class SegmentedData:
     thin: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
+    about: Mapping[str, float]  # what these are about, before any data
     filtered: RecordScales  # of effects
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
     begins: str = FREE  # how segments begin
     robust: bool = False  # whether errors far beyond the usual one count linearly only
-    rtol: float = RTOL  # of the simulations
+    rtol: float = RTOL  # of the simulations, where laws are smooth
 
     def level(self, factor: int) -> SegmentedData:
         """Return the same data in segments `factor` times as many as the longest."""
@@ -264,7 +265,7 @@ class SegmentedData:
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
         return simulator_of(
-            block, record, thin=self.thin, begins=self.begins, rtol=self.rtol, **keywords
+            block, record, thin=self.thin, begins=self.begins, rtol=self.rtol_of(block), **keywords
         )  # fmt: skip
 
     def carries(self, block) -> bool:
@@ -287,10 +288,14 @@ class SegmentedData:
         view = view or self.train
         return fit_segments(
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
+            tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
             error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
-            robust=self.robust, rtol=self.rtol,
+            robust=self.robust, rtol=self.rtol_of(block),
         )  # fmt: skip
+
+    def rtol_of(self, block) -> float:
+        """Return the tolerance of a model's simulations: events that come and go want the finest."""
+        return RTOL if any(e.nonsmooth for e in block.effects) else self.rtol
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
         """Return least and largest values: the model's own, and what the records show of its effects."""
@@ -364,7 +369,8 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
     )  # fmt: skip
-    return SegmentedData(learn, judge, 1, scales, limits, seen).coarse(thin, step)
+    about = {k: p.value for k, p in block.parameters.items()}
+    return SegmentedData(learn, judge, 1, scales, limits, about, seen).coarse(thin, step)
 
 
 def _within(own, shown) -> tuple[float, float]:

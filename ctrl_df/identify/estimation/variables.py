@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...units import dimension, size
+from ..thresholds import SIZE_PRIOR
 from .segments import Facts, facts
 from .sensed import POSITION, sensed
 
@@ -127,6 +129,21 @@ def variables_of(block, names, records, known: Facts, limits=None) -> list[Varia
             low, high = proved.get(variable.name, (-math.inf, math.inf))
             variable.lower, variable.upper = max(variable.lower, low), min(variable.upper, high)
     return found
+
+
+def beforehand(variables, about: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is known of scaled parameters before any data: about where they lie, one over variance.
+
+    `about`: values by name; of others nothing is known, and their variance is infinite.
+    """
+    means, precisions = np.zeros(len(variables)), np.zeros(len(variables))
+    for i, v in enumerate(variables):
+        value = about.get(v.name)
+        if value is not None and (value > 0 or not v.log):
+            means[i] = v.q(value)
+            spread = math.log(SIZE_PRIOR) if v.log else SIZE_PRIOR * max(abs(value), v.natural) / v.scale
+            precisions[i] = 1 / spread**2
+    return means, precisions
 
 
 def natural_scale(unit: str, known: Facts) -> float:

@@ -20,6 +20,7 @@ from ..results.diagnosis import (
     rivals,
 )
 from ..results.explain import explain, explain_so_far, falls_behind, undetermined
+from ..thresholds import FLOOR
 from .lasting import lasting
 from .search import Remainder, Search
 
@@ -144,8 +145,11 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     """Whether the data fitted speak for an effect, and those held out by themselves too.
 
     On data held out the errors of all parameters show, and an idle effect may make up for them by chance:
-    those fitted have to speak for themselves.
+    those fitted have to speak for themselves. Whitened residuals may speak for an effect that makes slow
+    errors larger: the plain error held out must not grow.
     """
+    if first.nrmse_holdout > FLOOR * search.errors(search.base)[1]:
+        return False
     return (
         first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
     )

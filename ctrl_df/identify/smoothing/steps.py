@@ -18,10 +18,7 @@ from ..estimation import initial_states
 from ..estimation.segments import facts_of
 from ..estimation.sensed import POSITION
 from ..estimation.simulator import Simulator
-from ..thresholds import UNPLACED
-
-RTOL = 1e-6  # of the runs: the noise of a record is larger
-NUDGE = 1e-3  # of parameters and forces, relative to their size
+from ..thresholds import SMOOTHER_NUDGE, SMOOTHER_RTOL, UNPLACED
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ class Steps:
 
     def __init__(self, block, record: Measurement, every: int):
         model = block.with_effects([*block.effects, Disturbance(0.0)])
-        self.simulator = Simulator(model, record, rtol=RTOL)
+        self.simulator = Simulator(model, record, rtol=SMOOTHER_RTOL)
         self.part = self.simulator._prepare(None)
         self.record = record
         self.edges = np.append(np.arange(0, len(record) - 1, every), len(record) - 1)
@@ -181,7 +178,7 @@ class Steps:
         speed = int(np.flatnonzero(self.free == 2 * self.core.driven + 1)[0])
         parameters = self.simulator.block.parameters
         mine = [k for k, p in parameters.items() if p.free and k != self._name]
-        pushed = NUDGE * self.known.force
+        pushed = SMOOTHER_NUDGE * self.known.force
         base = self.run(mean[:-1], every)[0][:, speed]
         up = mean[:-1].copy()
         up[:, -1] += pushed
@@ -189,7 +186,7 @@ class Steps:
         gain = np.where(gain > 0.1 * np.max(gain), gain, np.inf)  # what sticks is moved by no force
         for name in mine:
             value = parameters[name].value
-            nudge = NUDGE * (abs(value) or pushed)
+            nudge = SMOOTHER_NUDGE * (abs(value) or pushed)
             try:
                 moved = self.run(mean[:-1], every, {name: value + nudge})[0][:, speed] - base
             except (ValueError, KeyError):  # taken out of the engine, or bound by another
@@ -224,7 +221,7 @@ class Steps:
         result = run_many(
             groups, x0, every[first], every[first + count - 1], every,
             sampled_drives(part.drive_time, part.drive_value[None, None], part.hold or record.input_hold),
-            first=first, count=count, order=5, rtol=RTOL, max_steps=60 * count + 20_000,
+            first=first, count=count, order=5, rtol=SMOOTHER_RTOL, max_steps=60 * count + 20_000,
         )  # fmt: skip
         for error in result.errors.values():
             raise error

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ...blocks.core import level
@@ -46,7 +44,7 @@ def own_columns(block, u, x, v) -> Columns:
     return tuple(found)
 
 
-def allowed(block, columns: Columns, weights) -> Mapping[str, float]:
+def allowed(block, columns: Columns, weights) -> dict[str, float]:
     """Return the parameters that weights of `own_columns` stand for, where they lie in their ranges."""
     table, values = block.parameters, {}
     for (name, _), weight in zip(columns, weights, strict=True):

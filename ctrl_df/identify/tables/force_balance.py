@@ -16,10 +16,8 @@ from ...simulate.imposed import imposed_forces, path_of
 from ...simulate.imposed_response import imposable
 from ..estimation.segmented import Scales
 from ..estimation.simulator import feasible
+from ..thresholds import BALANCE_PERIODS, BALANCE_ROUNDS, BALANCE_SAMPLES
 from .fit import Points
-
-_SAMPLES, _PERIODS = 48, 3  # samples a period; hidden states settle over the first ones
-_ROUNDS = 4  # of Gauss and Newton, for the parameters that are not linear
 
 
 def can_be_imposed(block) -> bool:
@@ -45,13 +43,13 @@ class ForceBalance:
         self.weight = moved.weight
         self.applied = np.exp(-1j * np.angle(moved.N))  # over A, where the motion is a cosine
         self.amplitude = moved.A
-        angle = 2 * np.pi * np.arange(_SAMPLES * _PERIODS + 1) / _SAMPLES
+        angle = 2 * np.pi * np.arange(BALANCE_SAMPLES * BALANCE_PERIODS + 1) / BALANCE_SAMPLES
         self.paths = [
             path_of(angle / w, x * np.cos(angle), -x * w * np.sin(angle))
             for x, w in zip(moved.A * np.abs(moved.N), moved.omega, strict=True)
         ]
-        last = slice(-_SAMPLES - 1, -1)
-        self._last, self._wave = last, 2 / _SAMPLES * np.exp(-1j * angle[last])
+        last = slice(-BALANCE_SAMPLES - 1, -1)
+        self._last, self._wave = last, 2 / BALANCE_SAMPLES * np.exp(-1j * angle[last])
 
     def forces(self, blocks: Sequence) -> np.ndarray:
         """Return first harmonics of the forces over A, (blocks, points)."""
@@ -70,7 +68,7 @@ class ForceBalance:
     def solved(self, block, names, scales: Scales):
         """Return a block with the named parameters balanced; as it is where that does not help."""
         best = (float(self.error([block])[0]), block)
-        for _ in range(_ROUNDS):
+        for _ in range(BALANCE_ROUNDS):
             moved = self._step(best[1], names, scales)
             if moved is None:
                 break

@@ -20,6 +20,9 @@ from .orbit import Orbit
 from .symmetry import shift_directions
 
 _MOST_STEPS = 120
+_FIRST, _LONGEST, _LONGER = 0.1, 0.2, 1.5  # steps along the curve, in sizes of the orbit; their growth
+_BEND = 0.8  # cosine of the angle between the tangents at its ends from which a step is short enough
+_ACROSS = 1e-3  # step across a corner, over the first mismatch
 _SHORTEST = 1e-5  # step, relative to the first mismatch, at which the curve is taken to have a corner
 _FAR = 2.0  # change of a state, in sizes of the orbit, or of the logarithm of the period: given up beyond
 
@@ -46,23 +49,23 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
     y[-1] = 1.0
     _, J = curve.equations(y)
     border = tangent(J, -np.eye(n + 2)[-1])
-    step, least = 0.1 * min(1.0, scale), 1.0
+    step, least = _FIRST * min(1.0, scale), 1.0
     for _ in range(_MOST_STEPS):
         ahead = y + step * border
         met = curve.onto(ahead, border)
         if met is not None and np.linalg.norm(met[0] - ahead) > step:
             met = None  # farther across the curve than along it: another one, as that of laps without length
         turned = None if met is None else tangent(met[1], border)
-        if met is not None and turned is not None and turned @ border >= 0.8:
+        if met is not None and turned is not None and turned @ border >= _BEND:
             y, border = met[0], turned
         else:
             step *= 0.5
             if step > _SHORTEST * scale:
                 continue
-            beyond = curve.round_corner(y, border, 1e-3 * scale)
+            beyond = curve.round_corner(y, border, _ACROSS * scale)
             if beyond is None:
                 break
-            (y, border), step = beyond, 1e-3 * scale
+            (y, border), step = beyond, _ACROSS * scale
         least = min(least, float(y[-1]))
         if y[-1] <= 0.0:
             return closing.close(curve.state(y), period * float(np.exp(y[n])))
@@ -80,7 +83,7 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
             )
         if np.max(np.abs(y[: n + 1])) > _FAR:
             break
-        step = min(1.5 * step, 0.2)
+        step = min(_LONGER * step, _LONGEST)
     raise NoClosure("what is missing to a closed lap could not be followed to zero", least * scale)
 
 

@@ -28,6 +28,11 @@ _CLOSED = 1e-7  # defect, relative to the fundamental, of a point on the curve
 _NUDGE = 1e-5  # of the difference quotients; all unknowns are relative
 _LONGEST, _SHORTEST, _FIRST = 0.25, 1e-3, 0.1  # steps along the curve
 _MOST_STEPS = 80
+# A step is halved where the tangents at its ends differ by more than 37 degrees (cosine), or the corrector
+# moves by more than that share of it; else the next one is longer.
+_BEND, _ASTRAY, _LONGER = 0.8, 0.3, 1.6
+_SLOW = 0.5, 0.9  # defect over the one before from which Newton's matrix is taken anew, or the search is over
+_PROBE = 0.05 * np.exp(0.7j)  # third harmonic, relative, that asks for oddness: small, of no special phase
 _NAMED = 0.01  # |1 + N H| of a motion that is taken for the one of the prediction
 _REACH = np.log([30.0, 10.0])  # in amplitude and frequency, beyond which a curve is given up
 _ODD = 1e-7  # even harmonics and mean of the answer to an odd waveform, below which a block is odd
@@ -132,7 +137,7 @@ class _Curve:
             H = self.linear.clamped(np.array([omega]))[0][0]
             nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), _NAMED)
         motion = self.motion
-        U[3] = 0.05 * amplitude * np.exp(0.7j)
+        U[3] = _PROBE * amplitude
         Y = self.respond(U, omega)
         if Y is not None and np.abs(Y[0::2]).max() < _ODD * np.abs(Y).max():
             self.kept = np.arange(3, self.harmonics + 1, 2)
@@ -246,8 +251,8 @@ class _Curve:
             if (
                 found is None
                 or turned is None
-                or turned @ border < 0.8
-                or np.abs(found[0] - ahead).max() > 0.3 * step
+                or turned @ border < _BEND
+                or np.abs(found[0] - ahead).max() > _ASTRAY * step
             ):
                 step *= 0.5
                 if step < _SHORTEST:
@@ -267,7 +272,7 @@ class _Curve:
             z, Y, J = found
             border, motion, differenced = turned, self.motion, False
             share = max(share, float(z[-1]))
-            step = min(1.6 * step, _LONGEST)
+            step = min(_LONGER * step, _LONGEST)
             if (np.abs(z[:2] - self.first) > _REACH).any():
                 reason = End.LEFT
                 break
@@ -285,8 +290,8 @@ class _Curve:
             size = float(np.abs(r).max())
             if size < _CLOSED:
                 return z, Y, J
-            if size > 0.5 * before:
-                if fresh and size > 0.9 * before:
+            if size > _SLOW[0] * before:
+                if fresh and size > _SLOW[1] * before:
                     return (z, Y, J) if size < 100 * _CLOSED else None
                 J = self.jacobian(z, r)
                 fresh = True
