@@ -15,8 +15,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import ctrl_df as cdf
-from ctrl_df.units import size
+from ctrl_df.units import size, turning
 
+NOISE = 2e-5  # of a record [m, rad]
 BLACK, ACCENT, GREY = "#1f2933", "#c8501e", "#8a94a0"
 STYLE = {
     "font.size": 9,
@@ -49,11 +50,13 @@ ROLES = {
 
 
 def machine(turning=False):
-    """Return the machine that every effect is added to: friction, and a spring that keeps it in place."""
+    """Return the machine that every effect is added to: friction, and a spring that keeps it in place.
+
+    About an axis the spring is soft: over small angles what goes with their sine is a spring as well.
+    """
     body = cdf.Inertia(2.0) if turning else cdf.Mass(2.0)
-    return (
-        body.with_effect(cdf.Viscous(4.0)).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.LinearSpring(60.0))
-    )
+    spring = cdf.LinearSpring(6.0 if turning else 60.0)
+    return body.with_effect(cdf.Viscous(4.0)).with_effect(cdf.Coulomb(1.0)).with_effect(spring)
 
 
 def typical(cls):
@@ -70,8 +73,8 @@ def typical(cls):
 def with_effect(effect):
     """Return a machine without and with the effect, on a line if it can be, else about an axis."""
     errors = []
-    for turning in (False, True):
-        base = machine(turning)
+    for about in (False, True):
+        base = machine(about)
         own = [e for e in base.effects if e.id == effect.id]
         bare = base.without_effect(effect.id) if own else base
         try:
@@ -84,28 +87,33 @@ def with_effect(effect):
 # --- pictures -----------------------------------------------------------------------------------------------
 
 
-def law_curves(effect):
+def law_curves(effect, words):
     """Return the curves of a plain law as (label, abscissa, force), over speed and place; or []."""
     law, p = effect.law, np.array(effect.values)
-    v, x = np.linspace(-1, 1, 801), np.linspace(-0.2, 0.2, 801)
+    reach = max(0.2, 0.5 * getattr(effect, "wavelength", 0.0))
+    v, x = np.linspace(-1, 1, 801), np.linspace(-reach, reach, 801)
+    over_speed, over_place = (
+        f"{name} [{words.unit_of(unit)}]" for name, unit in ((words.velocity, "m/s"), (words.position, "m"))
+    )
     if law is None or effect.states or effect.role not in ("force", "friction"):
         return []
     try:
         if effect.role == "friction":
             level = [math.copysign(law(1.0, math.copysign(1, s), abs(s), 1.0, p), s) for s in v]
-            return [("speed [m/s]", v, -np.array(level))]
+            return [(over_speed, v, -np.array(level))]
         dz = np.zeros(1)
         over_v = np.array([law(0.0, 0.0, s, dz, p, dz) for s in v])
         over_x = np.array([law(0.0, s, 0.0, dz, p, dz) for s in x])
     except Exception:  # a law with other arguments is shown by what it does
         return []
-    curves = [("speed [m/s]", v, over_v), ("position [m]", x, over_x)]
+    curves = [(over_speed, v, over_v), (over_place, x, over_x)]
     return [c for c in curves if np.ptp(c[2]) > 0] or curves[:1]
 
 
 def characteristic(effect, bare, full, path):
     """Draw the law; where the engine itself knows it, what the machine does under a slowly swelling force."""
-    curves = law_curves(effect)
+    words = full.coordinates
+    curves = law_curves(effect, words)
     figure, axes = plt.subplots(
         1, max(len(curves), 1), figsize=(6.6, 2.6), layout="constrained", squeeze=False
     )
@@ -113,15 +121,16 @@ def characteristic(effect, bare, full, path):
         ax.axhline(0, color=GREY, lw=0.5)
         ax.plot(at, force, color=ACCENT, lw=1.6)
         ax.set_xlabel(label)
-        ax.set_ylabel("force on the body [N]")
+        ax.set_ylabel(f"{words.force} on the body [{words.force_unit}]")
     if not curves:
         t = np.linspace(0, 10, 4001)
         force = 6 * np.sin(2 * np.pi * 0.2 * t) * np.minimum(t / 5, 1)
         for block, color, label in ((bare, GREY, "without"), (full, ACCENT, "with the effect")):
             x = np.asarray(cdf.event_response(block, t, force).outputs)[0]
             axes[0, 0].plot(force, 1e3 * x, color=color, lw=1.1, label=label)
-        axes[0, 0].set_xlabel("force, slow [N]")
-        axes[0, 0].set_ylabel("position shown [mm]")
+        units = dict.fromkeys(b.signals[b.input_labels[0]] for b in (bare, full))
+        axes[0, 0].set_xlabel(f"{words.force}, slow [{' or '.join(units)}]")
+        axes[0, 0].set_ylabel(f"{words.position} shown [m{words.unit}]")
         axes[0, 0].legend()
     figure.savefig(path, dpi=110)
     plt.close(figure)
@@ -132,11 +141,13 @@ def on_plane(bare, full, path):
     A, omega = np.array([3.0, 6.0, 18.0]), np.geomspace(1.5, 30, 40)
     N0, N1 = (cdf.describing_function_family(b, A, omega).N for b in (bare, full))
     ratio = np.where(np.abs(N1) > 1e-3 * np.abs(N0), N1 / N0, np.nan)  # at less the body does not move
+    words = full.coordinates
     figure, axes = plt.subplots(1, 2, figsize=(6.6, 2.6), layout="constrained")
     for k, (a, style) in enumerate(zip(A, (":", "--", "-"), strict=True)):
         axes[0].semilogx(
-            omega, 20 * np.log10(np.abs(ratio[k])), color=ACCENT, ls=style, lw=1.3, label=f"{a:g} N"
-        )
+            omega, 20 * np.log10(np.abs(ratio[k])), color=ACCENT, ls=style, lw=1.3,
+            label=f"{a:g} {words.force_unit}",
+        )  # fmt: skip
         axes[1].semilogx(omega, np.degrees(np.angle(ratio[k])), color=ACCENT, ls=style, lw=1.3)
     for ax, title, unit in zip(
         axes, ("gain, with over without", "phase, with less without"), ("dB", "deg"), strict=True
@@ -149,7 +160,7 @@ def on_plane(bare, full, path):
         ax.set_ylabel(unit)
         low, high = ax.get_ylim()
         ax.set_ylim(min(low, -0.1), max(high, 0.1))
-    axes[0].legend(title="force")
+    axes[0].legend(title=words.force)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -163,10 +174,10 @@ def on_residual(bare, full, path):
         + 4 * np.sin(2 * np.pi * 2.3 * t)
     )
     x = np.asarray(cdf.event_response(full, t, force, input_hold="zoh").outputs)[0]
-    noisy = x + 2e-5 * np.random.default_rng(1).standard_normal(t.size)
-    turning = isinstance(full, cdf.Inertia | cdf.TwoInertias)
-    units = dict(input_unit="N m", output_unit="rad") if turning else {}
-    fit = cdf.refit(bare, cdf.Measurement(t, force, noisy, **units))
+    noisy = x + NOISE * np.random.default_rng(1).standard_normal(t.size)
+    words = full.coordinates
+    record = cdf.Measurement(t, force, noisy, input_unit=words.force_unit, output_unit=words.unit)
+    fit = cdf.refit(bare, record)
     row = fit.comparison.records[0] if hasattr(fit.comparison, "records") else fit.comparison[0]
     residual, v = 1e3 * row.residual, np.gradient(x, t)
     figure, axes = plt.subplots(
@@ -174,13 +185,19 @@ def on_residual(bare, full, path):
     )
     axes[0].plot(t, residual, color=ACCENT, lw=0.9)
     axes[0].set_xlabel("time [s]")
-    axes[0].set_ylabel("residual [mrad]" if turning else "residual [mm]")
-    for ax, at, label in ((axes[1], 1e3 * x, "position [mm]"), (axes[2], v, "speed [m/s]")):
+    axes[0].set_ylabel(f"residual [m{words.unit}]")
+    for ax, at, name, unit in (
+        (axes[1], 1e3 * x, words.position, f"m{words.unit}"),
+        (axes[2], v, words.velocity, words.unit_of("m/s")),
+    ):
         ax.plot(at, residual, ".", color=ACCENT, ms=1.5)
-        ax.set_xlabel(label)
+        ax.set_xlabel(f"{name} [{unit}]")
     figure.savefig(path, dpi=110)
     plt.close(figure)
-    return row.nrmse
+    left = f" Here {100 * row.nrmse:.2g} % of the motion (rms)"
+    if row.rmse < 1.5 * NOISE:
+        left += ", which is the noise: the model's other parameters take the place of the effect"
+    return left + "."
 
 
 # --- the page -----------------------------------------------------------------------------------------------
@@ -228,8 +245,9 @@ def parameters(cls) -> str:
         spec = field.metadata.get("parameter")
         if spec:
             default = "" if field.default is dataclasses.MISSING else f"{field.default:g}"
+            unit = turning(spec["unit"]) if cls.turns else spec["unit"]
             rows.append(
-                f"| `{field.name}` | {spec['unit'] or '–'} | {bounds(spec)} | {default} | {spec['meaning']} |"
+                f"| `{field.name}` | {unit or '–'} | {bounds(spec)} | {default} | {spec['meaning']} |"
             )
     return "| parameter | unit | range | default | meaning |\n|---|---|---|---|---|\n" + "\n".join(rows)
 
@@ -248,7 +266,8 @@ def page(job) -> tuple[str, str]:
     try:
         effect = typical(cls)
         bare, full = with_effect(effect)
-        text += f"The pictures show `{effect!r}` on a body of 2 kg with a spring and a little friction.\n"
+        body = f"a body of 2 {full.coordinates.unit_of('kg')}".replace("^2", "²")
+        text += f"The pictures show `{effect!r}` on {body} with a spring and a little friction.\n"
     except Exception as error:
         return key, _finish(folder, key, text, f"{type(error).__name__}: {error}")
     for name, title, draw in PICTURES:
@@ -258,8 +277,7 @@ def page(job) -> tuple[str, str]:
             with plt.rc_context(STYLE), np.errstate(all="ignore"):
                 args = (effect, bare, full, path) if name == "characteristic" else (bare, full, path)
                 left = draw(*args)
-            if left is not None:
-                says += f" Here {100 * left:.2g} % of the motion (rms)."
+            says += left or ""
             text += f"\n## {title}\n\n{says}\n\n![{title} of {cls.__name__}]({path.name})\n"
         except Exception as error:
             plt.close("all")

@@ -42,7 +42,7 @@ def test_initial_states_carried_from_short_segments_to_long_ones_find_the_truth(
 def test_segments_nest_and_hold_every_sample_once():
     rig = rigs.draw_none(4, excitation="chirp")
     train, _ = of(rig)
-    data = prepare(rig.baseline, [train])
+    data = prepare(rig.baseline, [train]).fine
     learn, judge = (view.segments[0].samples for view in (data.train, data.validation))
     assert np.array_equal(np.sort(np.concatenate([learn, judge])), np.arange(len(train)))
     short = data.level(16)

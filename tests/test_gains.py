@@ -176,6 +176,13 @@ def test_sides_do_not_speak_for_each_other():
     assert border(places, places[:, 0] > 0.3, [True, True])[:, 0].tolist() == [False, True]
 
 
+def test_gains_without_integral_action_do_not_speak_for_others(hunting):
+    """With static friction any integral action ends in hunting; without it the axis stays where it sticks."""
+    assert hunting.at(kp=2000, ki=0).verdict == "rests"
+    for kp, ki in ((1500, 20), (3000, 800), (2000, 3000)):
+        assert "cycles" in hunting.at(kp=kp, ki=ki).verdict
+
+
 @pytest.mark.parametrize(
     ("keywords", "error"),
     [
@@ -222,9 +229,26 @@ def test_tuned_stiction_hunts_least():
     assert tuned.simulated.orbit.output_amplitude < soft.output_amplitude
 
 
-def test_nothing_to_tune_in_the_large_is_refused():
-    with pytest.raises(ValueError, match="keeps its gain"):
-        cdf.tune_pid(cdf.relay(1.0), bandwidth=1.0, plant=LAG)
+def test_a_saturated_loop_is_tuned_below_its_limits():
+    """There it is linear: margins are those of the loop without the saturation."""
+    plant = ct.tf([1], [1, 1, 0])
+    tuned = cdf.tune_pid(cdf.saturation(1), bandwidth=1, kp=1.5, ki=0, kd=1, plant=plant, tf=0.01)
+    L = tuned.controller * plant
+    response = np.squeeze(L(1j * np.geomspace(0.01, 100, 4000)))
+    assert tuned.max_sensitivity == pytest.approx(1 / np.abs(1 + response).min(), rel=1e-3)
+    assert tuned.bandwidth == pytest.approx(ct.margin(L)[3], rel=1e-3)
+    assert tuned.feasible and tuned.verdict == "rests"
+    limited = cdf.Mass(9).with_effect(cdf.Viscous(3)).with_effect(cdf.InputSaturation(50))
+    found = cdf.tune_pid(limited, bandwidth=12, ki=0)
+    assert found.feasible and found.verdict == "rests" and 12 <= found.bandwidth <= 18
+
+
+def test_what_is_linear_nowhere_is_refused():
+    for block in (cdf.relay(1.0), cdf.relay_with_hysteresis(1.0, 0.1)):
+        with pytest.raises(ValueError, match="keeps its gain"):
+            cdf.tune_pid(block, bandwidth=1.0, plant=LAG)
+    with pytest.raises(ValueError, match="without the limit"):
+        cdf.tune_pid(FRICTION.with_effect(cdf.InputSaturation(50)), bandwidth=12)
     with pytest.raises(ValueError, match="bandwidth"):
         cdf.tune_pid(FRICTION, bandwidth=-1.0)
 

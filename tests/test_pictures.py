@@ -4,7 +4,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from legible import illegible
+from legible import boxes, illegible
 
 import ctrl_df as cdf
 
@@ -77,6 +77,19 @@ def test_every_label_can_be_read(pictures, width):
     plt.close("all")
     assert wrong == {}
     assert dict(plt.rcParams) == before
+
+
+def test_a_title_of_the_user_takes_the_place_of_ours(pictures):
+    for name in ("hunting", "missing force", "ladder", "relay", "diagnosis"):
+        plt.close("all")
+        drawn = pictures[name](width=3.3)
+        ax = np.ravel(drawn.axes)[0]
+        ours = ax.get_title()
+        ax.set_title("Run 3, after greasing")
+        words = [text for text, _ in boxes(drawn.figure)]
+        assert ours and ours not in words and "Run 3, after greasing" in words
+        assert illegible(drawn.figure) == ([], []), name
+    plt.close("all")
 
 
 def test_a_picture_takes_an_empty_figure_as_it_is(pictures):

@@ -99,7 +99,7 @@ def test_rigorous_bound_holds_the_exact_cycle(responses):
     assert a_low < problem.cycle[0] < a_high and w_low < problem.cycle[1] < w_high
     assert "proven" in cycle.why
     (other,) = responses["relay, integrator and double lag"].limit_cycles
-    assert other.bound is None and "no rigorous bound" in other.why
+    assert other.bound is None and "bound" not in other.why  # a relay: the theorem is not about such loops
 
 
 def test_second_friction_prediction_is_called_spurious(responses):
@@ -301,7 +301,7 @@ def test_pictures_of_families():
     assert len(cplt.lines[0]) == 5 and len(cplt.lines[1]) == 5
     cplt = family.plot_harmonics(amplitude=10)
     assert cplt.lines.shape == (1, 2) and len(cplt.lines[0, 0]) == 3  # 1, 3, 5: even ones are absent
-    assert "harmonics 2, 4: none" in cplt.axes[0, 0].get_title(loc="left")
+    assert "harmonics 2, 4: none" in cplt.axes[0, 0].get_title()
     single = describing_function_family(relay(1), np.geomspace(0.1, 10, 30)).plot()
     assert len(single.lines[0]) == 1
     with pytest.raises(AttributeError):

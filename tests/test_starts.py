@@ -13,6 +13,7 @@ from ctrl_df.identify.estimation.simulator import Simulator, free_run
 from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.selection.rounding import rounding_evidence
 from ctrl_df.identify.starting.extend import applicable
+from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
 from ctrl_df.identify.thresholds import LOAD_SHARES
@@ -101,3 +102,26 @@ def test_an_offset_of_the_sensor_needs_a_law_of_the_place():
     assert not applicable(cdf.SensorOffset, PLAIN)
     assert applicable(cdf.SensorOffset, PLAIN.with_effect(cdf.LinearSpring(20.0)))
     assert not applicable(cdf.Bristle, cdf.Mass(2.0)) and applicable(cdf.Bristle, PLAIN)
+
+
+def test_a_pendulum_starts_from_its_own_inertia():
+    # without gravity in the model a slow swing takes it for inertia: both are sought together
+    t = np.arange(0, 12, 5e-3)
+    torque = 0.5 * np.sin(1.5 * t) + 0.5 * np.sin(5 * t + 1)
+    true = cdf.Inertia(0.01, [cdf.Gravity(0.5), cdf.Coulomb(0.05), cdf.Viscous(0.02)])
+    y = np.asarray(cdf.event_response(true, t, torque, input_hold="zoh").outputs)[0]
+    run = cdf.Measurement(
+        t, torque, y + 1e-4 * np.random.default_rng(0).normal(size=t.size), input_unit="N m",
+        output_unit="rad",
+    )  # fmt: skip
+    bare = cdf.Inertia(0.01, [cdf.Coulomb(0.05), cdf.Viscous(0.02)])
+    data = prepare(bare, [run]).segmentations[0]
+    screen = Screen(data.fit(bare, default_free(bare)), data)
+    begun = next(s for s in regressed(cdf.Gravity, screen))
+    assert begun.effect.torque == pytest.approx(0.5, rel=0.05)
+    assert dict(begun.values)["inertia"] == pytest.approx(0.01, rel=0.15)
+
+    # the laws that a model has already take their share of the force
+    fit = force_fit(motion_of(data.train, data.thin, true), data.scales, true, [])
+    assert fit.values["gravity.torque"] == pytest.approx(0.5, rel=0.05)
+    assert fit.values["inertia"] == pytest.approx(0.01, rel=0.15)

@@ -98,6 +98,9 @@ class Effect:
         Whether a point of a table N(A, omega) takes many times as long with it as with others.
     table_starts : int
         Starts on a table from which it is fitted.
+    generalizes : effect class or None
+        One that it contains as a special case, and that takes less to try: a diagnosis tries that one first,
+        and this one where that one has come near the best of all.
 
     Examples
     --------
@@ -127,6 +130,7 @@ class Effect:
     divides: ClassVar[bool] = False
     costly: ClassVar[bool] = False
     table_starts: ClassVar[int] = 3
+    generalizes: ClassVar[type[Effect] | None] = None
     law: ClassVar[Callable | None] = None
 
     def __init_subclass__(cls, **kwargs):

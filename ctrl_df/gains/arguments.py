@@ -13,6 +13,8 @@ from ..df.dispatch import translated
 from ..units import over
 from .controller import GAINS
 
+_OFF = 0.02  # of the range of ki: how near to zero the loop is asked; below, hunting takes ever so long
+
 
 @dataclass(frozen=True, eq=False)
 class Box:
@@ -31,6 +33,10 @@ class Box:
     free: tuple[str, str]
     fixed: dict[str, float]
     axes: tuple[np.ndarray, np.ndarray]
+
+    @property
+    def _both(self):
+        return tuple(zip(self.free, self.axes, strict=True))
 
     @property
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -52,6 +58,25 @@ class Box:
         """Free gains at places of the unit square (..., 2)."""
         (x0, x1), (y0, y1) = self.ranges
         return x0 + unit[..., 0] * (x1 - x0), y0 + unit[..., 1] * (y1 - y0)
+
+    def side(self, poles, gains) -> np.ndarray:
+        """Return on which side of the lines gains lie that `Border` knows of, given the poles to the right.
+
+        0 and 1 are stable and unstable in the large; -1 is the rim without integral action, where the loop is
+        of lower order than with ever so little of it.
+        """
+        rim = np.equal(gains["ki"], 0) & ("ki" in self.free)
+        return np.where(rim, -1, np.greater(poles, 0))
+
+    def off_the_rim(self, unit) -> np.ndarray:
+        """Return points of the unit square (n, 2), moved away from the rim without integral action."""
+        away = np.array([name == "ki" and axis[0] == 0 for name, axis in self._both])
+        return np.where(away, np.maximum(unit, _OFF), unit)
+
+    def rim(self) -> np.ndarray:
+        """Return the ends of that rim, in the unit square, (2, 2), or no point."""
+        ends = np.array([[0.0, 0.0], [0.0, 1.0] if self.free[0] == "ki" else [1.0, 0.0]])
+        return ends if any(name == "ki" and axis[0] == 0 for name, axis in self._both) else ends[:0]
 
     def corners(self) -> list[dict[str, float]]:
         """All gains at the corners of the box, in the middles of its sides and in its middle."""

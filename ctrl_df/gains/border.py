@@ -45,15 +45,15 @@ def deep_points(predicted) -> np.ndarray:
 class Border:
     """Answers at points of the unit square, and what they say between.
 
-    A line across which everything may change is known beforehand: the sides of it never speak for each other.
+    Lines across which everything may change are known beforehand: their sides never speak for each other.
 
     Parameters
     ----------
     points : ndarray, shape (n, 2)
     answers : ndarray, shape (n, k)
         Booleans; the first column is the one whose border is sought.
-    side : ndarray of bool, shape (n,)
-        On which side of the line a point lies.
+    side : ndarray of int, shape (n,)
+        On which side of these lines a point lies; -1: on a line itself, apart from all beside it.
     predicted : ndarray of bool, shape (n,)
         What a model says in the place of the first answer: where it is right all around, it also tells where
         between the points the answer changes.
@@ -61,9 +61,10 @@ class Border:
 
     def __init__(self, points, answers, side, predicted):
         self.points, self.answers = np.asarray(points, float), np.asarray(answers, float)
-        self.side, self.predicted = np.asarray(side, bool), np.asarray(predicted, bool)
+        self.side, self.predicted = np.asarray(side, int), np.asarray(predicted, bool)
         self.right = self.predicted == (self.answers[:, 0] > 0.5)
-        self.mesh = Delaunay(self.points, qhull_options="QJ")
+        self.inner = np.flatnonzero(self.side >= 0)
+        self.mesh = Delaunay(self.points[self.inner], qhull_options="QJ")
 
     def __call__(self, places, side, predicted) -> np.ndarray:
         """Return the answers at places (m, 2), given their sides and predictions (m,), as booleans (m, k).
@@ -72,33 +73,34 @@ class Border:
         them; else linear between those on the same side; where none is, the answers of the nearest point that
         lies there, or of the nearest of all.
         """
-        places = np.clip(np.atleast_2d(places), 0.0, 1.0)
+        places = np.clip(np.atleast_2d(places), self.mesh.min_bound, self.mesh.max_bound)
         simplex = self.mesh.find_simplex(places, tol=1e-9)
         lost = simplex < 0  # on the rim, by rounding
         if lost.any():
             simplex[lost] = self.mesh.find_simplex(0.5 + (places[lost] - 0.5) * (1 - 1e-6), tol=1e-6)
-        turn, corners = self.mesh.transform[simplex], self.mesh.simplices[simplex]
+        turn, corners = self.mesh.transform[simplex], self.inner[self.mesh.simplices[simplex]]
         share = np.einsum("nij,nj->ni", turn[:, :2], places - turn[:, 2])
         share = np.column_stack([share, 1 - share.sum(axis=1)])
         own = self.side[corners] == side[:, None]
         alike = (self.answers[corners] == self.answers[corners][:, :1]).all(axis=(1, 2))
-        share = np.where(own | alike[:, None], np.maximum(share, 1e-12), 0.0)
+        share = np.where(own | (alike & (side >= 0))[:, None], np.maximum(share, 1e-12), 0.0)
         weight = share.sum(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             out = np.einsum("nc,nck->nk", share, self.answers[corners]) / weight[:, None] > 0.5
-        for here in (False, True):
+        for here in np.unique(side):
             mine = np.flatnonzero((weight == 0) & (side == here))
             known = np.flatnonzero(self.side == here)
             known = known if known.size else np.arange(self.side.size)
             if mine.size:
                 out[mine] = self.answers[known[KDTree(self.points[known]).query(places[mine])[1]]] > 0.5
         trusted = self.right[corners].all(axis=1) & np.ptp(self.answers[corners, 0], axis=1).astype(bool)
+        trusted &= side >= 0
         out[trusted, 0] = np.asarray(predicted, bool)[trusted]
         return out
 
     def worst_edges(self, count: int) -> np.ndarray:
         """Middles of the edges most worth a further question, far from each other, (<= count, 2)."""
-        tri = self.mesh.simplices
+        tri = self.inner[self.mesh.simplices]
         edges = np.concatenate([tri[:, [0, 1]], tri[:, [1, 2]], tri[:, [2, 0]]])
         one, other = np.unique(np.sort(edges, axis=1), axis=0).T
         length = np.linalg.norm(self.points[one] - self.points[other], axis=1)

@@ -51,7 +51,8 @@ def limit_cycle_map(
 
     A share of the gains is simulated from twelve starts each, half of them spread evenly, the others where
     what the loop does changes: so the map is right also where the describing function is not (friction whose
-    static level lies above the kinetic one hunts where it predicts nothing).
+    static level lies above the kinetic one hunts where it predicts nothing). Gains with ki = 0 are answered
+    apart; between there and a fiftieth of the range of ki the answer is the one at that fiftieth.
 
     Parameters
     ----------
@@ -128,7 +129,8 @@ def limit_cycle_map(
     if checks:
         border, found, agreement = _checked(plane, box, predicted.words, checks, seed, progress)
         unit = box.to_unit(x, y).reshape(-1, 2)
-        verdict = corrected(border, unit, (poles > 0).ravel(), verdict.ravel()).reshape(poles.shape)
+        words = corrected(border, unit, box.side(poles, gains).ravel(), (poles > 0).ravel(), verdict.ravel())
+        verdict = words.reshape(poles.shape)
     curves = folds(plane, box.free, box.fixed, box.axes)
     output_amplitude = predicted.amplitude / np.abs(structure.loop_gain(gains, predicted.omega))
     return LimitCycleMap(
@@ -152,11 +154,11 @@ def limit_cycle_map(
 
 def _checked(plane, box, predicted, budget, seed, progress):
     """Simulate at points spread and at points where the answer changes; see `border.refined`."""
-    even = spread_points(max(int(_SPREAD * budget), 4), seed)
+    even = box.off_the_rim(spread_points(max(int(_SPREAD * budget), 4), seed))
     deep = [
         d for d in deep_points(predicted)[: budget // 8] if np.linalg.norm(even - d, axis=1).min() > _APART
     ]
-    first = np.concatenate([even, *(d[None] for d in deep)])
+    first = np.concatenate([even, *(d[None] for d in deep), box.rim()])
     found: list[Simulated] = []
     with progress_bar(budget, progress, "simulating gains", "point") as bar:
 
@@ -170,10 +172,10 @@ def _checked(plane, box, predicted, budget, seed, progress):
             gains = (box.every(float(x), float(y)) for x, y in zip(*box.from_unit(unit), strict=True))
             return np.array([any(c.stable for c in at_one(plane, g, box.free[1])) for g in gains])
 
-        def grows(unit):
+        def side_of(unit):
             gains = box.every(*box.from_unit(unit))
-            return unstable_poles(plane, *(gains[name] for name in GAINS)) > 0
+            return box.side(unstable_poles(plane, *(gains[name] for name in GAINS)), gains)
 
-        border = refined(first, budget, ask, predict, grows)
+        border = refined(first, budget, ask, predict, side_of)
     right = predict(even) == np.array([s.cycles for s in found[: len(even)]])
     return border, found, float(right.mean())

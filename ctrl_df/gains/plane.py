@@ -45,7 +45,7 @@ class Plane:
     Z : ndarray of complex, shape (na, nw)
         -1/(N P); NaN where the block has no periodic answer, or one that is an average over irregular motion.
     far : ndarray of complex, shape (nw,)
-        Z for large amplitudes.
+        Z where the loop is linear: for large amplitudes, unless another one was asked for.
     method : Method
     scale : float
         Amplitude at the block's input at which its nonlinearity matters.
@@ -104,7 +104,9 @@ class Plane:
         return size, phase, known
 
 
-def plane_of(structure: Structure, corners, amplitude=None, omega=None, progress=None) -> Plane:
+def plane_of(
+    structure: Structure, corners, amplitude=None, omega=None, linear_at=None, progress=None
+) -> Plane:
     """Compute the plane for a box of gains.
 
     Parameters
@@ -114,6 +116,8 @@ def plane_of(structure: Structure, corners, amplitude=None, omega=None, progress
         Gains at the corners of the box and in its middle: they tell which frequencies matter.
     amplitude, omega : (low, high) or None
         What is looked at; None: chosen.
+    linear_at : float or None
+        Amplitude at which the loop is taken for linear; None: a large one.
     progress : bool or None
     """
     block = structure.block
@@ -131,7 +135,8 @@ def plane_of(structure: Structure, corners, amplitude=None, omega=None, progress
     P = structure.beside(w)
     N = np.broadcast_to(family.N, (a.size, w.size))
     wild = np.broadcast_to(noisy(family.regime, family.residual), N.shape)
-    far = method.harmonics(LARGE * a[-1:], w, 1)[0][0, :, 1]
+    large = LARGE * a[-1] if linear_at is None else linear_at
+    far = method.harmonics(np.array([large]), w, 1)[0][0, :, 1]
     far = np.broadcast_to(far, w.shape)
     Z = _needed(N, P, wild)
     Zfar = _needed(far, P, False)

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 from scipy.optimize import NonlinearConstraint, OptimizeResult, differential_evolution
 
-from ..checks import number, positive, unknown_keywords
+from ..checks import number, positive, shown, unknown_keywords
 from ..df.dispatch import method_for
 from ..df.work import progress_bar
 from ..limit_cycles.check import Check
@@ -28,7 +28,7 @@ from .stability import far_loop, unstable_poles
 _OWNER = "tune_pid"
 _WIDER = 1.5  # times the least bandwidth: the greatest, where only one is given
 _INTEGRAL = (0.02, 1.0)  # integral action looked among, ki / (kp bandwidth)
-_LARGE = 1e9  # an amplitude at which every block is linear, in whatever unit
+_EXTREME = 1e9  # an amplitude at which a block is linear that is so in the large; one over it: in the small
 _MEMBERS, _GENERATIONS = 6, 12  # of the search: six members a gain
 _DECADES = 100.0  # frequencies looked at, beyond the bandwidth, either way
 _POINTS = 600  # frequencies at which margins are read
@@ -47,7 +47,8 @@ class TunedPID:
     loop : ct.InterconnectedSystem
         The closed loop.
     bandwidth : float
-        Crossover frequency [rad/s] of the loop in the large, where friction, gap and the like are negligible.
+        Crossover frequency [rad/s] of the loop where it is linear: in the large, where friction, gap and the
+        like are negligible; of a saturation below its limits.
     max_sensitivity : float
         Its largest ``|1/(1 + L)|``: the modulus margin is the inverse.
     phase_margin : float
@@ -146,11 +147,14 @@ def tune_pid(
 ) -> TunedPID:
     """Choose the gains of a PID by what the loop really does: no limit cycle, or the smallest one.
 
-    Among the gains whose loop in the large (where friction, gap and the like are negligible) is stable,
-    crosses over within `bandwidth` and keeps its sensitivity below `max_sensitivity`, differential evolution
-    looks for those without a limit cycle and, among these, for the greatest stiffness against slow forces,
-    kp + ki / bandwidth; where every loop cycles, for the smallest cycle. Each is judged by simulations from
-    twelve starts, not by the describing function, which is blind to the hunting that static friction causes.
+    Among the gains whose loop, where it is linear, is stable, crosses over within `bandwidth` and keeps its
+    sensitivity below `max_sensitivity`, differential evolution looks for those without a limit cycle and,
+    among these, for the greatest stiffness against slow forces, kp + ki / bandwidth; where every loop cycles,
+    for the smallest cycle. Each is judged by simulations from twelve starts, not by the describing function,
+    which is blind to the hunting that static friction causes.
+
+    A loop is linear in the large if its block keeps its gain there (friction, gaps, dead zones are
+    negligible then), else in the small (a saturation below its limits). A relay is linear nowhere.
 
     Parameters
     ----------
@@ -178,8 +182,8 @@ def tune_pid(
     Raises
     ------
     TypeError, ValueError
-        A bandwidth or sensitivity out of range, gains that are no number and no range; what `closed_loop`
-        refuses.
+        A bandwidth or sensitivity out of range, gains that are no number and no range, a block that is linear
+        nowhere (a relay); what `closed_loop` refuses.
 
     Examples
     --------
@@ -202,10 +206,11 @@ def tune_pid(
     if plant is not None:
         require_linear(plant)
     structure = Structure(block, tf, plant, output)
-    need = np.abs(_need_in_the_large(structure, np.array(band)))
+    linear_at, N = _where_linear(structure, np.array(band))
+    need = np.abs(1 / (N * structure.beside(np.array(band))))
     ranges = _ranges(structure, band, need, {"kp": kp, "ki": ki, "kd": kd})
     omega = band[0] / _DECADES, band[1] * _DECADES
-    plane = plane_of(structure, _corners(ranges), omega=omega, progress=progress)
+    plane = plane_of(structure, _corners(ranges), omega=omega, linear_at=linear_at, progress=progress)
     free = [name for name in GAINS if ranges[name][0] < ranges[name][1]]
     search = _Search(plane, ranges, free, band, limit, float(need[0]))
     if free:
@@ -296,21 +301,26 @@ def _corners(ranges):
     return [{name: r[0] for name, r in ranges.items()}, middle, {name: r[1] for name, r in ranges.items()}]
 
 
-def _need_in_the_large(structure: Structure, omega) -> np.ndarray:
-    """Return the controller that balances the block for large amplitudes, at some frequencies."""
-    large = np.array([_LARGE, 10 * _LARGE])
-    N, further = method_for(structure.block, structure.output).harmonics(large, omega, 1)[0][..., 1]
-    if not (np.abs(further) > 0.5 * np.abs(N)).all():
-        raise ValueError(
-            f"{_OWNER} needs a block that keeps its gain for large amplitudes, by which bandwidth and margin "
-            "are judged; that of this one (a relay, a saturation) falls with the amplitude. Map its gains "
-            "with limit_cycle_map."
-        )
-    return -1 / (np.broadcast_to(N, omega.shape) * structure.beside(omega))
+def _where_linear(structure: Structure, omega) -> tuple[float, np.ndarray]:
+    """Return an amplitude at which the block is linear, and N there at some frequencies."""
+    method = method_for(structure.block, structure.output)
+    for at, further in ((_EXTREME, 10 * _EXTREME), (1 / _EXTREME, 0.1 / _EXTREME)):
+        by_size = np.sort([at, further])
+        N = method.harmonics(by_size, omega if method.needs_omega else None, 1)[0][..., 1]
+        with np.errstate(invalid="ignore"):
+            same = (np.abs(N[1] - N[0]) < 0.5 * np.abs(N[0])).all()
+        if same:
+            return at, np.broadcast_to(N[int(by_size[1] == at)], omega.shape)
+    raise ValueError(
+        f"{_OWNER} needs a block that keeps its gain for large or for small amplitudes: there the loop is "
+        f"linear, which bandwidth and margin are judged by. {shown(structure.block)} keeps none. Map the "
+        "gains of a relay with limit_cycle_map; tune a machine with friction and a limited input without "
+        "the limit (block.without_effect), and verify with it."
+    )
 
 
 def _margins(plane: Plane, gains) -> tuple[float, float, float]:
-    """Crossover frequency [rad/s], largest sensitivity, phase margin [rad] of the loop in the large."""
+    """Crossover frequency [rad/s], largest sensitivity, phase margin [rad] of the loop where it is linear."""
     q = np.linspace(plane.log_w[0], plane.log_w[-1], _POINTS)
     L = far_loop(plane, gains, q)
     size = np.log(np.abs(L))

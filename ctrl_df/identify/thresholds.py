@@ -73,6 +73,10 @@ HOPELESS = 3.0
 """Error over the best candidate's beyond which another try is not worth it: nine times its power, which no
 last step of a fit removes (rigs). Only work depends on it."""
 
+PROMISES = 0.25
+"""Share of the squared error the best candidate explains that an effect has to explain for one that contains
+it to be tried: the special case of a right law is right over a part of the motion."""
+
 STILL_POSSIBLE = 1.5
 """Error over the best candidate's up to which another may yet turn out to be the right one: a bit more than
 twice its power, left by a fit that ended beside its minimum (rigs)."""
@@ -196,6 +200,11 @@ SCREEN_SAMPLES = 2500
 """Steps of the input to which a record is thinned while candidates are screened: a quarter of those
 of the rigs' records."""
 
+RTOL, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
+"""Relative tolerance of simulations: at the full rate; at most, while candidates are screened, where it is
+that share of the sensors' noise over the motion. Derivatives are differences over which the output moves by
+0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
+
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""
 
@@ -234,6 +243,10 @@ that begin, and from how many these are chosen."""
 ANGLES = 6
 """Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
 
+STRONG = 0.5
+"""Share of the mean squared force that is missing up to which a single law leaves: it takes more of it than
+all that is left, and the model's own parameters are bent by it."""
+
 # --- where fits begin again -------------------------------------------------------------------------
 
 RESTART_FACTORS = (0.6, 0.8, 1.25, 1.6)
@@ -270,9 +283,9 @@ FINER = 3
 REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 """Travel after a reversal [typical positions] over which a force may build up."""
 
-HIDDEN_RTOL = 1e-6
-"""Tolerance of hidden states under an imposed motion: far below a load cell's noise, and three times as
-fast as seven digits."""
+HIDDEN_RTOL = 1e-4
+"""Tolerance of hidden states under an imposed motion: of steps no longer than a sample it leaves errors of
+some 1e-6 of the force, and is twice as fast as 1e-6 (records)."""
 
 TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 """Sizes of an effect of which nothing is known, over those of the table."""

@@ -126,7 +126,10 @@ def _regions(ax, regions, rows):
         ax.plot([expected, expected], [i - 0.18, i + 0.18], color="black", lw=1.5)
         words = f"{_KINDS.get(region.kind, region.kind.replace('_', ' '))}: {region.label}"
         words = "\n".join(textwrap.wrap(words, 36))
-        ax.text(0, i + 0.22, words, fontsize=plt.rcParams["legend.fontsize"], va="bottom", linespacing=0.95)
+        ax.annotate(
+            words, (0, i + 0.22), xytext=(2, 0), textcoords="offset points", va="bottom", linespacing=0.95,
+            fontsize=plt.rcParams["legend.fontsize"],
+        )  # fmt: skip
     ax.set_yticks([])
     ax.set_ylim(min(len(shown), 5) - 5.6, len(shown) - 0.1)  # few bars stay slim, at the top
     ax.set_xlim(0, max(1.25 * max(share), 1.05 * max(100 * r.expected_share for r in shown)))

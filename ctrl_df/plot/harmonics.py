@@ -83,7 +83,7 @@ def _draw_harmonics(ax, x, y, orders, where, kwargs):
         places.append((k, x[live], values[live], shade))
     none = f"harmonics {', '.join(map(str, silent))}: none" if silent else ""
     note = ", ".join(text for text in (where, none) if text)
-    ax.set_title(note, loc="left", color="0.3")
+    ax.set_title(note)
     ax.grid(True, which="major")
     ax.margins(x=0.08)
     log_ticks(ax.xaxis, x.min(), x.max())

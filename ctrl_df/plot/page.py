@@ -36,7 +36,7 @@ def style(width: float) -> dict:
         "legend.fontsize": letters - 1, "legend.frameon": False, "legend.handlelength": 1.8,
         "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7,
         "axes.grid": False, "grid.color": "0.92", "grid.linewidth": 0.6, "lines.linewidth": 1.4,
-        "xtick.major.width": 0.7, "ytick.major.width": 0.7, "axes.titlelocation": "left",
+        "xtick.major.width": 0.7, "ytick.major.width": 0.7,
         "axes.formatter.use_mathtext": True, "axes.formatter.limits": (-4, 4),
     }  # fmt: skip
 
@@ -52,18 +52,24 @@ def legend_above(ax, title="", *, handles=None, columns=4):
     handles = ax.get_legend_handles_labels()[0] if handles is None else handles
     size = ax.xaxis.label.get_size()
     room = ax.figure.get_figwidth() * 72 * ax.get_position().width
-    title = in_lines(title, ax.figure.get_figwidth(), max(ax.get_position().width + 0.04, 0.3))
+    ax.set_title(in_lines(title, ax.figure.get_figwidth(), max(ax.get_position().width + 0.04, 0.3)))
     if not handles:
-        ax.set_title(title)
         return
     longest = max(len(h.get_label()) for h in handles)
     columns = max(1, min(columns, len(handles), int(room / ((0.55 * longest + 4.5) * (size - 1)))))
     ax.legend(
-        handles=handles, ncols=columns, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.15,
+        handles=handles, ncols=columns, loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.15,
         borderpad=0.1, columnspacing=1.2, handletextpad=0.5, labelspacing=0.25, fontsize=size - 1,
     )  # fmt: skip
-    rows = -(-len(handles) // columns)
-    ax.set_title(title, pad=4 + 1.45 * (size - 1) * rows)
+    # titles, ours or one set later, are kept above axes within axes: unseen ones lie where the legend is
+    ax.inset_axes((0, 1, 1, 0)).set(visible=False, axes_locator=lambda _, renderer: _place(ax, renderer))
+
+
+def _place(ax, renderer):
+    """Return where the legend of some axes stands, in shares of the figure."""
+    legend = ax.get_legend()
+    box = ax.bbox if legend is None else legend.get_window_extent(renderer)
+    return box.transformed(ax.figure.transSubfigure.inverted())
 
 
 @dataclass

@@ -37,7 +37,7 @@ def table_comparison_plot(
         top, below, plane = found["n"], found["p"], found["e"]
         below.sharex(top)
         dots, lines = _over_frequency(top, below, data, chosen, curves)
-        legend_above(top, f"error {chosen.nrmse:.2%} of |N| (dots measured, lines model)")
+        legend_above(top, f"error {100 * chosen.nrmse:.3g} % of |N| (dots measured, lines model)")
         cells = error_plane(drawn.figure, plane, data, np.abs(chosen.relative))
         plane.set_title("error over the plane")
         drawn.keep = [top, below, plane]
@@ -131,10 +131,10 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **key
         data = diagnosis.before.records[i].record
         error_plane(drawn.figure, left, data, before, limits, bar=drawn.narrow)
         error_plane(drawn.figure, right, data, after, limits)
-        left.set_title(f"model refitted, {diagnosis.nrmse:.2%}")
+        left.set_title(f"model refitted, {100 * diagnosis.nrmse:.3g} %")
         name = diagnosis.ranking[0].id.replace("_", " ") if diagnosis.ranking else "nothing"
         error = diagnosis.ranking[0].nrmse if diagnosis.ranking else diagnosis.nrmse
-        right.set_title(f"with {name}, {error:.2%}")
+        right.set_title(f"with {name}, {100 * error:.3g} %")
         if not drawn.narrow:
             right.set_ylabel("")
         ax.set_xlabel("held-out error, rms over |N| [%]")

@@ -54,10 +54,15 @@ class Gravity(Effect):
         return block.coordinates.position == "angle"
 
     @classmethod
+    def regress(cls, screen):
+        """Yield the pendulum that hangs where sine and cosine of the angle in the force say."""
+        x = screen.motion.x
+        fit = screen.force_fit([np.sin(x), np.cos(x)])
+        if fit.sensible:
+            yield cls(math.hypot(*fit.weights), math.atan2(-fit.weights[1], fit.weights[0])), fit.values
+            yield cls(math.hypot(*fit.weights)), fit.values
+
+    @classmethod
     def suggest(cls, screen):
-        """Return pendulums that hang where the force regressed on sine and cosine of the angle says."""
-        m, s = screen.motion, screen.scales
-        columns = [m.a, m.v, np.sign(m.v), np.sin(m.x), np.cos(m.x)]
-        weights = np.linalg.lstsq(np.column_stack(columns), m.u, rcond=None)[0]
-        size, angle = math.hypot(*weights[3:]), math.atan2(-weights[4], weights[3])
-        return [cls(f * size, a) for f in (1.0, 0.3) for a in (angle, 0.0)] + [cls(0.1 * s.force)]
+        """Return pendulums of shares of the force."""
+        return [cls(f * screen.scales.force) for f in (0.1, 0.4)]

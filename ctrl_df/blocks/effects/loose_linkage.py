@@ -7,6 +7,7 @@ from typing import ClassVar
 from ..core import is_kinetic
 from ..effect import Effect, register_effect
 from ..parameter import parameter
+from .bristle import Bristle
 
 
 @register_effect
@@ -54,6 +55,7 @@ class LooseLinkage(Effect):
     role: ClassVar[str] = "presliding"
     states: ClassVar[int] = 1
     multimodal: ClassVar[bool] = True
+    generalizes: ClassVar[type[Effect] | None] = Bristle
     nonsmooth: ClassVar[bool] = True
     table_starts: ClassVar[int] = 2
     shows: ClassVar[str] = (

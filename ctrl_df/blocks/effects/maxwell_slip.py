@@ -7,6 +7,7 @@ from typing import ClassVar
 from ..core import is_kinetic
 from ..effect import Effect, register_effect
 from ..parameter import parameter
+from .bristle import Bristle
 
 ELEMENTS = 4
 
@@ -46,6 +47,7 @@ class MaxwellSlip(Effect):
     role: ClassVar[str] = "presliding"
     states: ClassVar[int] = ELEMENTS
     multimodal: ClassVar[bool] = True
+    generalizes: ClassVar[type[Effect] | None] = Bristle
     table_starts: ClassVar[int] = 2
     shows: ClassVar[str] = (
         "error around every reversal, where the real friction builds up fast at first, then over a long "

@@ -32,7 +32,7 @@ def _first(block, kind) -> str | None:
     return None
 
 
-def _unit(effect):
+def unit_of(effect):
     """Return the effect with its first parameter at one."""
     return effect.replace(**{next(iter(effect.parameters)): 1.0})
 
@@ -40,12 +40,12 @@ def _unit(effect):
 def _is_dry(effect) -> bool:
     if not is_kinetic(effect):
         return False
-    one = _unit(effect)
+    one = unit_of(effect)
     return all(level([one], 1.0, way, v) == 1.0 for v in _SPEEDS for way in (1.0, -1.0))
 
 
 def _is_viscous(effect) -> bool:
     if effect.role != "force" or not effect.place_free or effect.states:
         return False
-    law, p, none = type(effect).law, _unit(effect).values, np.zeros(1)
+    law, p, none = type(effect).law, unit_of(effect).values, np.zeros(1)
     return all(law(0.0, 0.0, way * v, none, p, none.copy()) == -way * v for v in _SPEEDS for way in (1, -1))

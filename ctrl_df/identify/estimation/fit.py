@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..data.measurement import Measurement
+from ..thresholds import RTOL
 from .covariance import covariance_of
 from .initial_states import FREE
 from .multiple_shooting import Problem
@@ -230,6 +231,7 @@ def fit_segments(
     begins: str = FREE,
     hopeless: float = math.inf,
     outlook: int = 0,
+    rtol: float = RTOL,
 ) -> FitResult:
     """Fit the named parameters over given segments in one stage.
 
@@ -259,13 +261,15 @@ def fit_segments(
         at the pace of its last steps.
     outlook : int
         Iterations that are to follow in other fits.
+    rtol : float
+        Relative tolerance of the simulations.
 
     Returns
     -------
     FitResult
     """
     problem = Problem(model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook))
-    problem.stage(list(segments), thin, starts)
+    problem.stage(list(segments), thin, starts, rtol)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)
     if not errors or problem.slopes is None or not names:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...simulate.crew import check
-from ..thresholds import GOOD
+from ..thresholds import GOOD, RTOL
 from .initial_states import FREE
 from .noise_model import power
 from .restarts import restart_segments, scan_gap_state
@@ -75,9 +75,11 @@ class Problem:
         given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
         return feasible(self.block, given) if given else None
 
-    def stage(self, segments: list[Segments], thin, starts=None):
+    def stage(self, segments: list[Segments], thin, starts=None, rtol=RTOL):
         """Set the segments; initial states begin at `starts` (corrections) or at what the data say."""
-        self.simulators = [simulator_of(self.model, r, thin=thin, begins=self.begins) for r in self.records]
+        self.simulators = [
+            simulator_of(self.model, r, thin=thin, begins=self.begins, rtol=rtol) for r in self.records
+        ]
         self.segments = segments
         self.measured = [sensed(r).within(w.samples) for r, w in zip(self.records, segments, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]

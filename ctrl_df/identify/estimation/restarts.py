@@ -90,7 +90,7 @@ def _shift(held, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(len(segments)), np.zeros(len(segments))
     count = segments.sums(seen)
     shift = segments.sums(e * seen) / count
-    return shift, shift**2 * (count / (segments.outputs * (segments.ends - segments.begins)))
+    return shift, shift**2 * (count / (segments.outputs * segments.counts))
 
 
 def _slacks(problem, k) -> list[tuple[float, float]]:

@@ -20,6 +20,9 @@ from ..thresholds import (
     NOISE_FREE,
     PARAMETER_RANGE,
     PROCESS_NOISE,
+    RTOL,
+    RTOL_COARSE,
+    RTOL_OVER_NOISE,
     SCREEN_SAMPLES,
     SEGMENT_LEAST,
     SHORTEST,
@@ -67,6 +70,10 @@ class SegmentedRecords:
         return SegmentedRecords(
             self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.segments)
         )
+
+    def thinned(self, step: int) -> SegmentedRecords:
+        """Return the same segments, of which every `step`-th sample counts."""
+        return replace(self, segments=tuple(w.every(step) for w in self.segments))
 
     @property
     def outputs(self) -> list[np.ndarray]:
@@ -135,6 +142,7 @@ class SegmentedData:
     error_filter: NoiseModel | None = None  # of errors that forces make which no model has, beyond the noise
     begins: str = FREE  # how segments begin
     robust: bool = False  # whether errors far beyond the usual one count linearly only
+    rtol: float = RTOL  # of the simulations
 
     def level(self, factor: int) -> SegmentedData:
         """Return the same data in segments `factor` times as many as the longest."""
@@ -185,7 +193,7 @@ class SegmentedData:
         ]
         best = int(np.argmin(noise))
         return replace(
-            self._only(held.quantities[best]),
+            self._only(held.quantities[best])._sampled_by(1),
             error_filter=acceleration_filter(step, held.columns[best]),
             thin=thin,
             begins=MEASURED,
@@ -228,11 +236,36 @@ class SegmentedData:
     def fine(self) -> SegmentedData:
         """The same at the records' full rate, or as many steps of a longer one as do."""
         longest = max(len(r) for view in (self.train, self.validation) for r in view.records)
-        return replace(self, thin=min(max(1, round(longest / FULL_SAMPLES)), self.thin), step=self.thin)
+        thin = min(max(1, round(longest / FULL_SAMPLES)), self.thin)
+        return replace(self._sampled_by(1), thin=thin, step=self.thin, rtol=RTOL)
+
+    def coarse(self, thin: int, step: int) -> SegmentedData:
+        """Return the same with `thin` samples a step of the input, and every `step`-th one of the output.
+
+        A filter of errors sees all samples. Simulations need not err less than the sensors by more than
+        derivatives ask for.
+        """
+        rtol = RTOL
+        if self.error_filter is None:
+            known = [facts(r) for r in self.train.records]
+            rtol = min(max(RTOL_OVER_NOISE * min(k.noise / k.spread for k in known), RTOL), RTOL_COARSE)
+        else:
+            step = 1
+        return replace(self._sampled_by(step), thin=thin, rtol=rtol)
+
+    def _sampled_by(self, step: int) -> SegmentedData:
+        train, validation, *whole = [
+            view.thinned(step) for view in (self.train, self.validation, *(self.whole or ()))
+        ]
+        return replace(
+            self, train=train, validation=validation, whole=(whole[0], whole[1]) if whole else None
+        )
 
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
-        return simulator_of(block, record, thin=self.thin, begins=self.begins, **keywords)
+        return simulator_of(
+            block, record, thin=self.thin, begins=self.begins, rtol=self.rtol, **keywords
+        )  # fmt: skip
 
     def carries(self, block) -> bool:
         """Whether the block has hidden states that go on from segment to segment."""
@@ -256,7 +289,7 @@ class SegmentedData:
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), errors=self.step > 0,
             error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
-            robust=self.robust,
+            robust=self.robust, rtol=self.rtol,
         )  # fmt: skip
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
@@ -289,15 +322,17 @@ class SegmentedData:
 
     def _ran(self, model, name) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""
-        rough, view = replace(self, thin=self.step or self.thin), getattr(self, name)
-        short = getattr(self.level(SHORTEST), name)
+        thin = self.step or self.thin
+        rough, view = self.coarse(thin, thin), getattr(self, name)
+        short = getattr(rough.level(SHORTEST), name)
         near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
         if name == "validation" and view.records is not self.train.records:
             near = reestimated_per_record(
                 near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
             )
             model = near.model
-        near = rough.fit(model, (), view=view, starts=same_begins(near, view.segments), iterations=3)
+        starts = same_begins(near, view.segments)
+        near = rough.fit(model, (), view=getattr(rough, name), starts=starts, iterations=3)
         return self.fit(model, (), view=view, starts=near.starts, iterations=1)
 
 
@@ -319,6 +354,7 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    step = thin
     while thin > 1 and any(_rough(r, thin) for r in (*records, *validation)):
         thin //= 2
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
@@ -328,7 +364,7 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
     )  # fmt: skip
-    return SegmentedData(learn, judge, thin, scales, limits, seen)
+    return SegmentedData(learn, judge, 1, scales, limits, seen).coarse(thin, step)
 
 
 def _within(own, shown) -> tuple[float, float]:

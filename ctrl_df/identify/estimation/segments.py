@@ -126,6 +126,8 @@ class Segments:
         How far they may be off.
     outputs : int
         How many outputs the record holds: signals have them one after the other.
+    step : int
+        Every how many samples of a segment count, from its first on.
     """
 
     begins: np.ndarray
@@ -136,6 +138,7 @@ class Segments:
     x_error: np.ndarray
     v_error: np.ndarray
     outputs: int = 1
+    step: int = 1
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -148,15 +151,19 @@ class Segments:
 
     @cached_property
     def samples(self) -> np.ndarray:
-        """Numbers of the record's samples within the segments, (n,)."""
-        if np.array_equal(self.begins[1:], self.ends[:-1]):
-            return np.arange(self.begins[0], self.ends[-1])
-        return np.concatenate([np.arange(i, j) for i, j in zip(self.begins, self.ends, strict=True)])
+        """Numbers of the record's samples that count, (n,)."""
+        pairs = zip(self.begins, self.ends, strict=True)
+        return np.concatenate([np.arange(i, j, self.step) for i, j in pairs])
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """How many samples of each segment count, (nw,)."""
+        return -(-(self.ends - self.begins) // self.step)
 
     @cached_property
     def slices(self) -> list[slice]:
         """Each segment as a slice of a signal: those of the first output, then those of the next."""
-        at = np.concatenate(([0], np.cumsum(np.tile(self.ends - self.begins, self.outputs))))
+        at = np.concatenate(([0], np.cumsum(np.tile(self.counts, self.outputs))))
         return [slice(int(i), int(j)) for i, j in zip(at[:-1], at[1:], strict=True)]
 
     @cached_property
@@ -170,18 +177,18 @@ class Segments:
     @cached_property
     def blocks(self) -> list[slice]:
         """Each output as a slice of a signal."""
-        n = int(np.sum(self.ends - self.begins))
+        n = int(np.sum(self.counts))
         return [slice(i * n, (i + 1) * n) for i in range(self.outputs)]
 
     def sums(self, x) -> np.ndarray:
         """Return the sum over each segment, all outputs together, of a signal (n,) or of several (n, m)."""
-        lengths = np.tile(self.ends - self.begins, self.outputs)
+        lengths = np.tile(self.counts, self.outputs)
         sums = np.add.reduceat(x, np.concatenate(([0], np.cumsum(lengths)[:-1])), axis=0)
         return sums if self.outputs == 1 else sums.reshape(self.outputs, len(self), *x.shape[1:]).sum(axis=0)
 
     def means(self, x) -> np.ndarray:
         """Return the mean over each segment, all outputs together, of a signal (n,)."""
-        return self.sums(x) / (self.outputs * (self.ends - self.begins))
+        return self.sums(x) / (self.outputs * self.counts)
 
     def centred(self, x) -> np.ndarray:
         """Return a signal (n,) less the mean of each output."""
@@ -189,12 +196,16 @@ class Segments:
 
     def spread(self, values) -> np.ndarray:
         """Return the signal (n,) that has one of the values (nw,) throughout each segment."""
-        return np.tile(np.repeat(values, self.ends - self.begins), self.outputs)
+        return np.tile(np.repeat(values, self.counts), self.outputs)
 
     def only(self, which) -> Segments:
         """Return some of the segments; `which` a boolean array (nw,)."""
-        arrays = (n for n in self.__dataclass_fields__ if n != "outputs")
-        return Segments(*(getattr(self, name)[which] for name in arrays), outputs=self.outputs)
+        arrays = (n for n in self.__dataclass_fields__ if n not in ("outputs", "step"))
+        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
+
+    def every(self, step: int) -> Segments:
+        """Return the same segments, of which every `step`-th sample counts."""
+        return self if step == self.step else replace(self, step=step)
 
 
 def usual_segment(record: Measurement) -> float:
@@ -225,7 +236,7 @@ def split(record: Measurement, segments: Segments, factor: int, least: int) -> S
         edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
         begins.append(edges[:-1])
         ends.append(edges[1:])
-    return _between(record, np.concatenate(begins), np.concatenate(ends))
+    return _between(record, np.concatenate(begins), np.concatenate(ends)).every(segments.step)
 
 
 def _between(record, begins, ends) -> Segments:

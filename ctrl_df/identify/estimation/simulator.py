@@ -17,6 +17,7 @@ from ...simulate.groups import grouped
 from ...simulate.loop import closed_loop
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
+from ..thresholds import RTOL
 from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
@@ -60,7 +61,7 @@ class Simulator:
         record: Measurement,
         *,
         thin: int = 1,
-        rtol: float = 1e-8,
+        rtol: float = RTOL,
         force: np.ndarray | None = None,
         begins: str = initial_states.FREE,
     ):
@@ -212,15 +213,14 @@ class Simulator:
         return outputs
 
     def _alike(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
-        counts = [len(segments) for segments, _, _ in asked]
-        edges = np.concatenate(([0], np.cumsum(counts)))
+        edges = np.cumsum([0, *(len(segments) for segments, _, _ in asked)])
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
         x0, begins, lengths, drive = [], [], [], []
         drives: dict[int, int] = {}  # parts have one each, shared by all segments
         for part, (segments, _, start) in zip(parts, asked, strict=True):
             x0.append(self._starts(part, segments, start))
             begins.append(self.record.t[segments.begins] - self._late(part))
-            lengths.append(segments.ends - segments.begins)
+            lengths.append(segments.counts)
             drive.append(np.full(len(segments), drives.setdefault(id(part), len(drives))))
         length = np.concatenate(lengths)
         first = np.concatenate(([0], np.cumsum(length)[:-1]))

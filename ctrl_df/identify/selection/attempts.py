@@ -23,7 +23,7 @@ from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import BEGUN, HOPELESS, JOINTS, KEPT, LOAD_SHARES
+from ..thresholds import BEGUN, HOPELESS, JOINTS, KEPT, LOAD_SHARES, PROMISES
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def tried(
         Error of a model that is known: all begin at the nominal values, too, what cannot come near it is left
         where that shows, and joints are not sought over the plane.
     """
-    near, known = HOPELESS * reached, math.isfinite(reached)
+    known = math.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
 
     def run(function: Callable, jobs: list) -> list:
@@ -125,27 +125,51 @@ def tried(
     resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in begun for a in found]
-    # those of few steps first: what they come to tells of the others which need no long look
-    short = [a for a in attempts if not a.multimodal]
-    begun = run(_first, [(a, near) for a in short])
-    least = min((a.error for a in begun), default=np.inf)
-    least = min(least, screen.base.rmse, reached)
-    begun += run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
-    begun = [a for a in begun if itself(a.trial, span)]
-    kept = _best(begun, 1 if known else KEPT)
-    # few steps from where the user begins tell little: the baseline may have ended in another minimum
-    own = _best([a for a in begun if a.nominal], 1)
-    begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
-    ahead = _best(begun, 1)[:2]
-    found = run(_finish, [(a, screen.data, near) for a in ahead])
-    least = min([least, *(t.train.rmse for t in found)])
-    rest = [a for a in begun if not any(a is o for o in ahead)]
-    found += run(_finish, [(a, screen.data, HOPELESS * least) for a in rest])
-    best = {}
-    for t in found:
-        if itself(t, span) and (t.key not in best or t.train.rmse < best[t.key].train.rmse):
-            best[t.key] = t
-    return [best[c.id] for c in kinds if c.id in best]
+    course = _Course(run, screen, span, 1 if known else KEPT, HOPELESS * reached)
+    later = {c.id: c.generalizes for c in kinds if c.generalizes in kinds}
+    course.fit([a for a in attempts if a.key not in later], min(screen.base.rmse, reached))
+    again = [a for a in attempts if a.key in later and course.promises(later[a.key].id)]
+    course.fit(again, course.least)
+    return [course.best[c.id] for c in kinds if c.id in course.best]
+
+
+class _Course:
+    """Fits of many effects against each other: `best` of each, the `least` error of all."""
+
+    def __init__(self, run, screen: Screen, span: float, kept: int, near: float):
+        self.run, self.screen, self.span, self.kept, self.near = run, screen, span, kept, near
+        self.best: dict[str, CandidateFit] = {}
+        self.least = math.inf
+
+    def promises(self, key: str) -> bool:
+        """Whether an effect has come so near that one which contains it may be the right one."""
+        if key not in self.best:
+            return False
+        error, base = self.best[key].train.rmse, self.screen.base.rmse
+        explained, most = base**2 - error**2, base**2 - self.least**2
+        return error < HOPELESS * self.least and explained > PROMISES * most
+
+    def fit(self, attempts: list[Attempt], least: float) -> None:
+        """Bring the attempts that have a chance against an error of `least` to their end."""
+        # those of few steps first: what they come to tells of the others which need no long look
+        begun = self.run(_first, [(a, self.near) for a in attempts if not a.multimodal])
+        least = min([least, *(a.error for a in begun)])
+        begun += self.run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
+        begun = [a for a in begun if itself(a.trial, self.span)]
+        kept = _best(begun, self.kept)
+        # few steps from where the user begins tell little: the baseline may have ended in another minimum
+        own = _best([a for a in begun if a.nominal], 1)
+        begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
+        ahead = _best(begun, 1)[:2]
+        found = self.run(_finish, [(a, self.screen.data, self.near) for a in ahead])
+        least = min([least, *(t.train.rmse for t in found)])
+        rest = [a for a in begun if not any(a is o for o in ahead)]
+        found += self.run(_finish, [(a, self.screen.data, HOPELESS * least) for a in rest])
+        for t in found:
+            known = self.best.get(t.key)
+            if itself(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
+                self.best[t.key] = t
+        self.least = min([least, *(t.train.rmse for t in found)])
 
 
 def _screened(begun, screen: Screen) -> list[CandidateFit]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from ...blocks.massless import without_answer
+from ..thresholds import FLOOR
 from .structure_search import StructureSearch
 
 
@@ -12,11 +14,13 @@ class ImposedSearch(StructureSearch):
     """The fits of one diagnosis in force.
 
     Whatever force is missing stands in the residual as it is: nothing integrates it, so that disturbance
-    forces are noise like any other.
+    forces are noise like any other. What is hidden goes on over the whole record: segments tell which samples
+    count, nothing begins anew in them, and their length makes no difference.
     """
 
     def _look_at(self, data, which):
-        super()._look_at(replace(data, robust=True), which)
+        super()._look_at(replace(data, robust=True), 1)
+        self.segmentations = 3 * [self.data]
 
     def disturbs(self, error, data):
         """Whether disturbance forces make an error of the output that hides all else: none does here."""
@@ -30,3 +34,8 @@ class ImposedSearch(StructureSearch):
     def measure(self) -> str:
         """What errors are of."""
         return "force"
+
+    def _stages(self, fits):
+        """Return the fits over all segments, once."""
+        there = self._stage(self.data, fits, fits, math.inf)
+        return [there], FLOOR * min(f.rmse for f in there if f is not None)

@@ -97,17 +97,15 @@ def _sentences(left: Remainder, missed: list[MissingForce], where, measure: str)
 def find_regions(tried, view):
     """Return the regions of error of a fitted candidate on its longest record."""
     i = max(range(len(view.records)), key=lambda k: len(view.records[k]))
-    record, inside = view.records[i], view.segments[i].samples
-    residual = np.asarray(tried.train.residual[i])[view.segments[i].blocks[0]]
+    record, segments = view.records[i], tried.train.segments[i]
+    inside, residual = segments.samples, np.asarray(tried.train.residual[i])[segments.blocks[0]]
     if not np.all(np.isfinite(residual)):
         return None
     error_filter = tried.train.error_filter
     if error_filter is not None:
-        segments = view.segments[i].slices
-        inside, residual = (
-            inside[error_filter.rows(segments)],
-            error_filter.filtered(residual, segments) / tried.train.unit,
-        )
+        parts = segments.slices
+        inside = inside[error_filter.rows(parts)]
+        residual = error_filter.filtered(residual, parts) / tried.train.unit
     known = facts(record)
     return error_regions(
         record.t[inside], residual, position=known.place[inside], velocity=known.velocity[inside],

@@ -148,9 +148,8 @@ class Search(ABC):
         """Return a model and the records that it is to predict; None where there is nothing to predict."""
         return None
 
-    @property
-    def at_first(self) -> Remainder:
-        """What the refitted model leaves, as far as is known before anything is confirmed."""
+    def so_far(self, judged) -> Remainder:
+        """Return what a model leaves, as far as that is known at a glance."""
         return Remainder(0.0, 0.0, False)
 
     @abstractmethod

@@ -19,7 +19,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.segments import facts
 from ..estimation.sensed import POSITION, sensed
 from ..estimation.simulator import feasible
-from ..starting.regression import force_regression, heavy, motion_of
+from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (
     CONFIRMED,
@@ -89,8 +89,9 @@ class StructureSearch(Search):
         shortest, data = self.segmentations[:2]
         begins = [block]
         names = (inertia(block), dry_level(block), viscous_slope(block))
-        w, _ = force_regression(motion_of(data.train, data.thin, block), data.scales, heavy=heavy(block))
-        guess = {k: float(v) for k, v in zip(names, w, strict=True) if k and k in self.free and v > 0}
+        plain, own, *_ = force_regression(motion_of(data.train, data.thin, block), data.scales, block)
+        guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
+        guess = {k: v for k, v in guess.items() if k in self.free}
         if guess:
             begins.append(block.with_parameters(feasible(block, guess)))
         found = []
@@ -225,7 +226,9 @@ class StructureSearch(Search):
             # would pass for it.
             levels[0] = levels[0].continued
             short = levels[0]
-            stages[0] = side_by_side(lambda f: short.moved(f) if short.carries(f.model) else f, stages[0])
+            stages[0] = side_by_side(
+                lambda f: short.moved(f) if f is not None and short.carries(f.model) else f, stages[0]
+            )
             at = _longest_coherent(stages)
         if found and rounds(found[0]) and not self.data.disturbed:
             # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
@@ -367,10 +370,9 @@ class StructureSearch(Search):
             return judged.validation.model, held
         return judged.block, held or fitted
 
-    @property
-    def at_first(self):
-        """Noise of the sensor, and what the refitted model errs by beyond it."""
-        noise, error = self.data.noise, self.base.train.rmse
+    def so_far(self, judged):
+        """Return the noise of the sensor, and what a model errs by beyond it."""
+        noise, error = self.data.noise, judged.train.rmse
         if self.data.disturbed:
             return Remainder(0.0, error, False)
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
@@ -381,7 +383,7 @@ class StructureSearch(Search):
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
-        left = remainder(self.base, best, self.data, self.noise, self.floor, self.significant)
+        left = remainder(self.base, best, self.data.fine, self.noise, self.floor, self.significant)
         if self.data.disturbed and not significant and self.nearest.nrmse > UNMOVED:
             # accelerations that are mostly noise do not speak for a model that does not even move
             return replace(left, unexplained=True)
@@ -390,7 +392,7 @@ class StructureSearch(Search):
     def located(self, best, remainder, unknown):
         """Return where the error is."""
         return located(
-            self.base, best, self.data, self.noise, remainder, unknown=unknown,
+            self.base, best, self.data.fine, self.noise, remainder, unknown=unknown,
             significant=self.significant, measure=self.measure,
         )  # fmt: skip
 

@@ -55,16 +55,19 @@ class _Asked:
         self.search, self.began, self.limits = search, began, limits
 
     def so_far(self, found: Sequence) -> Diagnosis:
-        """Return the diagnosis as it stands with these candidates, best first."""
+        """Return the diagnosis as it stands with these candidates, best first; it names no effect."""
+        search = self.search
         chosen = [t for t in found if t.confirmed]
-        answer = self.answer(chosen, found, UNDER_WAY) if chosen else self._screened(found)
-        return replace(answer, explanation=explain_so_far(answer, self.search.words))
+        weights = dict(zip((t.key for t in chosen or found), _probabilities(chosen or found), strict=True))
+        ranking = [_entry(t, search, weights.get(t.key, 0.0), ()) for t in found]
+        told = bool(ranking) and ranking[0].evidence > search.significant
+        verdict = NONE if search.exact() else AMBIGUOUS if told else UNKNOWN
+        best = chosen[0] if chosen else search.base
+        result, _ = self._made(verdict, ranking, search.so_far(best), best, self._base(), UNDER_WAY)
+        return replace(result, explanation=explain_so_far(result, search.words))
 
-    def answer(self, chosen: Sequence, found: Sequence, status: str = COMPLETE) -> Diagnosis:
-        """Return what confirmed candidates amount to, `found` beside them.
-
-        Only a complete answer looks at long stretches; any other names no effect.
-        """
+    def answer(self, chosen: Sequence, found: Sequence) -> Diagnosis:
+        """Return what confirmed candidates amount to, `found` beside them."""
         search = self.search
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
@@ -85,29 +88,16 @@ class _Asked:
             open_ones = rivals(ranking)
             verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
         base, doubts = self._base(), ()
-        if verdict == EFFECT and status != COMPLETE:
-            verdict = AMBIGUOUS
-        elif verdict == EFFECT:
+        if verdict == EFFECT:
             search.course.stage("free prediction over long stretches")
             verdict, ranking, doubts = doubted(ranking, base, search.significant)
-        result, note = self._made(verdict, ranking, remainder, best, base, status, doubts)
+        result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         return replace(result, explanation=explain(result, search.words) + note)
 
     def _base(self) -> Baseline:
         search = self.search
         errors, predicted = search.errors(search.base), search.predicted(search.base)
         return Baseline(search.base.block, *errors, predicted=predicted)
-
-    def _screened(self, found: Sequence) -> Diagnosis:
-        """Return what candidates amount to of which none is confirmed."""
-        search = self.search
-        ranking = [_entry(t, search, p, ()) for t, p in zip(found, _probabilities(found), strict=True)]
-        if search.exact():
-            verdict = NONE
-        else:
-            told = bool(ranking) and ranking[0].evidence > search.significant
-            verdict = AMBIGUOUS if told else UNKNOWN
-        return self._made(verdict, ranking, search.at_first, search.base, self._base(), UNDER_WAY)[0]
 
     def _made(
         self, verdict, ranking, remainder: Remainder, best, base: Baseline, status, doubts=()

@@ -16,30 +16,38 @@ from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.segmented import Scales
 from ..estimation.segments import facts, load_of
+from ..thresholds import STRONG
+from .extend import extended
+from .own_laws import Columns, allowed, own_columns
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of all records: force u [N], place x [m], smoothed v [m/s] and a [m/s^2]."""
+    """Samples of all records: force u [N], place x [m], smoothed v [m/s] and a [m/s^2].
+
+    `own`: what the laws of the model take of the force, beside its inertia and plain friction.
+    """
 
     u: np.ndarray
     x: np.ndarray
     v: np.ndarray
     a: np.ndarray
     dt: float  # between samples of the records [s]
+    own: Columns = ()
 
 
 def motion_of(view, thin: int, block) -> Motion:
-    """Return every `thin`-th sample within the segments; the force as the drive of a block makes it."""
+    """Return every `thin`-th sample of the segments; the force as the drive of a block makes it."""
     parts = []
     for record, segments in zip(view.records, view.segments, strict=True):
         known = facts(record)
         acceleration = np.gradient(known.velocity, record.t)
-        some = segments.samples[::thin]
+        some = segments.every(thin).samples
         parts.append(
             [np.asarray(c)[some] for c in (load_of(block, record), known.place, known.velocity, acceleration)]
         )
-    return Motion(*(np.concatenate(c) for c in zip(*parts, strict=True)), dt=view.records[0].dt)
+    u, x, v, a = (np.concatenate(c) for c in zip(*parts, strict=True))
+    return Motion(u, x, v, a, view.records[0].dt, own_columns(block, u, x, v))
 
 
 @dataclass(frozen=True)
@@ -79,20 +87,43 @@ class ForceFit:
 def regressed(cls, screen) -> Iterator[Start]:
     """Yield the start values that a class takes from the force; only a single body makes them possible."""
     if screen.block.core.bodies == 1:
-        for effect, values in cls.regress(screen):
+        for effect, values in (*cls.regress(screen), *_strong(cls, screen)):
             yield Start(effect, 0.0, tuple(values.items()))
 
 
+def _strong(cls, screen) -> Iterator[tuple[Effect, dict[str, float]]]:
+    """Yield an effect proportional to its first parameter that takes most of the force that is missing.
+
+    A baseline without one so strong is bent far from the truth: a pendulum without gravity loses its inertia.
+    """
+    if not cls.proportional or cls.regress.__func__ is not Effect.regress.__func__:
+        return
+    try:
+        one = cls(1.0)
+    except (TypeError, ValueError):
+        return
+    block, motion = extended(screen.block, one), screen.motion
+    columns = () if block is None else own_columns(block, motion.u, motion.x, motion.v)
+    name = "" if block is None else f"{block.newest}.{next(iter(one.parameters))}"
+    column = dict(columns).get(name)
+    if column is None:
+        return
+    fit = screen.force_fit([column])
+    if fit.sensible and fit.left < STRONG * screen.force_fit([]).left:
+        p = next(iter(one.parameters.values()))
+        if p.lower <= fit.weights[0] <= p.upper:
+            yield cls(fit.weights[0]), fit.values
+
+
 def force_fit(motion: Motion, scales: Scales, block, columns) -> ForceFit:
-    """Regress the force on the model's own inertia and friction, and on further columns."""
-    dry, viscous = dry_level(block), viscous_slope(block)
-    weights, left = force_regression(
-        motion, scales, columns, heavy=heavy(block), dry=dry is not None, viscous=viscous is not None
-    )
-    values = own_values(block, weights[:3], scales)
+    """Regress the force on the model's own laws, and on further columns."""
+    dry = dry_level(block)
+    plain, own, weights, left = force_regression(motion, scales, block, columns)
+    values = own_values(block, plain, scales)
+    sensible = values is not None
     return ForceFit(
-        tuple(map(float, weights[3:])), left, (values or {}).get(dry or "", 0.0), values or {},
-        values is not None,
+        tuple(map(float, weights)), left, (values or {}).get(dry or "", 0.0),
+        {**values, **own} if sensible else {}, sensible,
     )  # fmt: skip
 
 
@@ -111,26 +142,32 @@ def heavy(block) -> bool:
     return any(mass > 0 for mass in block.core.masses)
 
 
-def force_regression(motion: Motion, scales: Scales, extra=(), *, heavy=True, dry=True, viscous=True):
-    """Regress the force on acceleration, direction, speed and further columns where the mass moves.
+def force_regression(motion: Motion, scales: Scales, block, extra=()):
+    """Regress the force on a model's own laws and on further columns, where the mass moves.
 
     Returns
     -------
+    plain : (3,) array
+        mass [kg], Coulomb level [N], viscous coefficient [N s/m]; 0 for what the model has not.
+    own : mapping of str to float
+        Parameters of its other laws that are proportional to one.
     weights : array
-        mass [kg], Coulomb level [N], viscous coefficient [N s/m], then of the columns; 0 for a mass
-        (`heavy`), a `dry` level or `viscous` friction that is left out.
+        Of the further columns.
     left : float
         Mean squared force that remains [N^2].
     """
     moving = np.abs(motion.v) > 0.03 * scales.speed
     v, force = motion.v[moving], motion.u[moving]
     matrix = np.column_stack([
-        motion.a[moving] * heavy,
-        np.sign(v) * dry,
-        v * viscous,
+        motion.a[moving] * heavy(block),
+        np.sign(v) * (dry_level(block) is not None),
+        v * (viscous_slope(block) is not None),
         *(column[moving] for column in extra),
+        *(column[moving] for _, column in motion.own),
     ])  # fmt: skip
     size = np.linalg.norm(matrix, axis=0)
     size[size == 0] = 1.0
     weights = np.linalg.lstsq(matrix / size, force, rcond=None)[0] / size
-    return weights, float(np.mean((force - matrix @ weights) ** 2))
+    plain, others, own = np.split(weights, [3, len(weights) - len(motion.own)])
+    left = float(np.mean((force - matrix @ weights) ** 2))
+    return plain, allowed(block, motion.own, own), others, left

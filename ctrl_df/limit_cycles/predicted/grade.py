@@ -74,7 +74,9 @@ class LimitCycle:
     corrected : tuple of float or None
         (amplitude, omega) with the fed-back harmonics taken into account, where that path leads so far.
     bound : tuple or None
-        ((a low, a high), (omega low, omega high)) proven after Mees & Bergen, where the theorem applies.
+        ((a low, a high), (omega low, omega high)) proven to hold a cycle, after Mees & Bergen, whose theorem
+        is about odd memoryless blocks of bounded slope and a continuous, strictly proper H. None for other
+        loops, and where it proves nothing, which `why` then says.
     branch : str
         Empty where N is the describing function; else the motion of the block it stands for, one that the
         describing function does not name there (it repels, or another one attracts beside it).

@@ -268,9 +268,8 @@ def _status(scan: Scan, cycles, A, w, zeros) -> str:
     if scan.missing:
         parts.append(f"{scan.missing} grid points have no periodic answer and were skipped")
     if scan.unresolved:
-        parts.append(
-            f"{scan.unresolved} sign changes hold no solution (N jumps there, or the curves only come near)"
-        )
+        changes = "1 sign change holds" if scan.unresolved == 1 else f"{scan.unresolved} sign changes hold"
+        parts.append(f"{changes} no solution (N jumps there, or the curves only come near)")
     if scan.truncated:
         parts.append("the search stopped at its bound on work: narrow the box or the step")
     return "; ".join(parts)

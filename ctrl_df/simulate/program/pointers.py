@@ -52,6 +52,7 @@ _CALLBACKS = {
 }
 
 _compiled: weakref.WeakKeyDictionary[Callable, tuple[Any, object]] = weakref.WeakKeyDictionary()
+_one_at_a_time = threading.Lock()  # laws may be compiled in one thread while another looks through them
 raised: list[BaseException] = []
 """Exceptions of laws called back in Python, newest last; the engine sees them as NaN."""
 gave_nan: list[str] = []
@@ -62,16 +63,19 @@ def address(law: Callable, kind: str) -> int:
     """Return the machine address of a law of the given kind (a key of `SIGNATURES`)."""
     known = _compiled.get(law)
     if known is None:
-        known = _compiled[law] = _compile(law, kind)
+        known = _compile(law, kind)
+        with _one_at_a_time:
+            known = _compiled.setdefault(law, known)
     return known[0]  # pyright: ignore[reportReturnType]
 
 
 def calls_python(address: int) -> bool:
     """Whether a law's address leads back into Python, because numba could not compile the law."""
-    return any(
-        place == address and not isinstance(kept, CFunc)  # pyright: ignore[reportGeneralTypeIssues]
-        for place, kept in _compiled.values()
-    )
+    with _one_at_a_time:
+        return any(
+            place == address and not isinstance(kept, CFunc)  # pyright: ignore[reportGeneralTypeIssues]
+            for place, kept in _compiled.values()
+        )
 
 
 def _compile(law, kind):

@@ -1,0 +1,73 @@
+"""What the laws of a model make of a motion: the columns of a regression of the force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...blocks.core import level
+from ..estimation.common_friction import dry_level, unit_of, viscous_slope
+
+Columns = tuple[tuple[str, np.ndarray], ...]
+"""Force [N] that a law takes, each with the parameter that it is proportional to; "" where there is none."""
+
+
+def own_columns(block, u, x, v) -> Columns:
+    """Return what a block's laws take of the force besides plain dry and viscous friction.
+
+    A law that is proportional to its first parameter is taken for a parameter of one. Laws with states of
+    their own, joints and contacts are left out: the motion alone does not tell of them.
+
+    Parameters
+    ----------
+    block : Mechanism
+    u, x, v : (n,) arrays
+        Force of the drive, place, speed.
+    """
+    found = []
+    plain = (dry_level(block), viscous_slope(block))
+    load = -sum((_force(e, x, v) for e in block.effects if _tells(e)), np.zeros(len(v)))
+    chain = sorted((e for e in block.effects if e.role == "friction"), key=lambda e: e.rank)
+    for key, effect in block.named_effects.items():
+        name = f"{key}.{next(iter(effect.parameters), '')}"
+        if name in plain:
+            continue
+        one = unit_of(effect) if effect.proportional else effect
+        if _tells(effect):
+            column = -_force(one, x, v)
+        elif effect.role == "friction":
+            before = chain[: chain.index(effect)]
+            column = np.sign(v) * (_level([*before, one], u, x, v, load) - _level(before, u, x, v, load))
+        else:
+            continue
+        if np.any(column):
+            found.append((name if effect.proportional else "", column))
+    return tuple(found)
+
+
+def allowed(block, columns: Columns, weights) -> Mapping[str, float]:
+    """Return the parameters that weights of `own_columns` stand for, where they lie in their ranges."""
+    table, values = block.parameters, {}
+    for (name, _), weight in zip(columns, weights, strict=True):
+        if name and table[name].lower <= weight <= table[name].upper and weight != 0:
+            values[name] = float(weight)
+    return values
+
+
+def _tells(effect) -> bool:
+    """Whether the force of an effect is a function of the motion alone."""
+    return effect.role == "force" and effect.states == 0
+
+
+def _force(effect, x, v) -> np.ndarray:
+    """Return the force of an effect along +x, (n,)."""
+    law, p, none = type(effect).law, effect.values, np.zeros(1)
+    return np.array([law(0.0, *at, none, p, none) for at in zip(x.tolist(), v.tolist(), strict=True)])
+
+
+def _level(chain, u, x, v, load) -> np.ndarray:
+    """Return the level of friction effects that slip, (n,)."""
+    signals = (np.sign(v), np.abs(v), x, u, load)
+    rows = zip(*(s.tolist() for s in signals), strict=True)
+    return np.array([level(chain, 1.0, *row) for row in rows])
