@@ -1,6 +1,6 @@
 """Machine code is made once, before the workers start; tests that take long are marked slow by a list.
 
-`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a second of processor time. The
+`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than half a second of processor. The
 list is made of a whole run, ``CTRL_DF_TIMES=times.txt pytest``, by ``python tests/tiers.py times.txt``.
 """
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from conftest import SLOW
 
-LONG = 1.0  # [s of processor]
+LONG = 0.5  # [s of processor]
 
 
 def main(path) -> None:
