@@ -28,8 +28,8 @@ import numpy as np  # noqa: E402
 from numba.core import config  # noqa: E402
 
 import ctrl_df as cdf  # noqa: E402
-from ctrl_df.identify.estimation.segments import make_segments  # noqa: E402
-from ctrl_df.identify.estimation.simulator import Simulator  # noqa: E402
+from ctrl_df.identify.prediction.segments import make_segments  # noqa: E402
+from ctrl_df.identify.prediction.simulator import Simulator  # noqa: E402
 
 ROWS: list[tuple[str, str, str, bool]] = []
 

@@ -97,7 +97,7 @@ def free_run(model, run: cdf.Measurement) -> float:
 
     The published figures leave the mean out: so the published model comes to its 8.38 mm on the test record.
     """
-    from ctrl_df.identify.estimation.simulator import free_run
+    from ctrl_df.identify.prediction.simulator import free_run
 
     return float(np.std(run.y - free_run(model, run, position=float(run.y[0]))))
 

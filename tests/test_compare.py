@@ -13,8 +13,8 @@ from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.identify.compare import compare
 from ctrl_df.identify.data.measurement import Measurement
-from ctrl_df.identify.estimation.segments import make_segments
-from ctrl_df.identify.estimation.simulator import Simulator
+from ctrl_df.identify.prediction.segments import make_segments
+from ctrl_df.identify.prediction.simulator import Simulator
 from ctrl_df.simulate.loop import closed_loop
 from ctrl_df.simulate.response import event_response
 

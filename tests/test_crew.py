@@ -10,8 +10,8 @@ import pytest
 import rigs
 
 import ctrl_df as cdf
-from ctrl_df.identify.estimation.segments import cut
-from ctrl_df.identify.estimation.simulator import Simulator
+from ctrl_df.identify.prediction.segments import cut
+from ctrl_df.identify.prediction.simulator import Simulator
 from ctrl_df.simulate import crew
 
 T = 1e-3 * np.arange(2000)

@@ -7,7 +7,7 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import prepare
-from ctrl_df.identify.estimation.segments import cut, facts
+from ctrl_df.identify.prediction.segments import cut, facts
 from ctrl_df.identify.starting.ripple_spectrum import RippleSpectrum
 
 MASS, DRY, VISCOUS, DT = 5.0, 0.5, 20.0, 1e-3

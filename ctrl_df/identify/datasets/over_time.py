@@ -10,12 +10,12 @@ from ..arguments import check_window
 from ..estimation.fit import segment_lengths
 from ..estimation.multiple_shooting import Problem
 from ..estimation.noise_model import power
-from ..estimation.prepared import REFERENCE
 from ..estimation.refit_records import blurred, doubts, refit_records
-from ..estimation.segments import make_segments, split
-from ..estimation.sensed import sensed
-from ..estimation.simulators import simulator_of
 from ..planning.inputs import input_that_separates
+from ..prediction.prepared import REFERENCE
+from ..prediction.segments import make_segments, split
+from ..prediction.sensed import sensed
+from ..prediction.simulators import simulator_of
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
 from ..thresholds import BEGINNINGS, SEGMENT_LEAST

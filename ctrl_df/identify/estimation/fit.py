@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..data.measurement import Measurement
+from ..prediction.initial_states import FREE
+from ..prediction.segments import Segments, facts, make_segments, usual_segment
+from ..prediction.simulators import simulator_of
 from ..thresholds import RTOL
 from .covariance import covariance_of
-from .initial_states import FREE
 from .multiple_shooting import Problem
 from .noise_model import NoiseModel
-from .segments import Segments, facts, make_segments, usual_segment
 from .sensitivity import OutputSensitivity
-from .simulators import simulator_of
 from .variables import default_free
 
 

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ...simulate.crew import check
+from ..prediction.initial_states import FREE
+from ..prediction.segments import Segments, facts_of
+from ..prediction.sensed import sensed
+from ..prediction.simulator import Simulator, feasible
+from ..prediction.simulators import simulator_of
 from ..thresholds import GOOD, RTOL
-from .initial_states import FREE
 from .noise_model import power
 from .restarts import restart_segments, scan_gap_state
-from .segments import Segments, facts_of
-from .sensed import sensed
 from .sensitivity import OutputSensitivity
-from .simulator import Simulator, feasible
-from .simulators import simulator_of
 from .variables import beforehand, step_of_sensor, variables_of
 
 Signals = list[np.ndarray]

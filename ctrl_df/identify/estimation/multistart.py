@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...simulate.crew import side_by_side
+from ..prediction.simulator import feasible
 from ..thresholds import (
     BETTER,
     HOPELESS,
@@ -29,7 +30,6 @@ from ..thresholds import (
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
-from .simulator import feasible
 
 
 def nonsmooth_names(found: FitResult) -> list[str]:

@@ -10,10 +10,10 @@ import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
+from ..prediction.simulators import simulator_of
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .segmented import short_segment
-from .simulators import simulator_of
 from .variables import step_of_sensor
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..prediction.sensed import sensed
 from ..thresholds import GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS
-from .sensed import sensed
 
 
 def restart_segments(problem, theta) -> bool:

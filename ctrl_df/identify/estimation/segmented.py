@@ -11,6 +11,11 @@ import numpy as np
 from ...units import size
 from ..data import derivatives
 from ..data.measurement import Measurement
+from ..prediction.initial_states import CONTINUED, FREE, MEASURED
+from ..prediction.segments import Segments, cut, facts, load_of, split
+from ..prediction.sensed import sensed
+from ..prediction.simulator import Simulator
+from ..prediction.simulators import simulator_of
 from ..thresholds import (
     BRIEF,
     FILTERED,
@@ -29,12 +34,7 @@ from ..thresholds import (
 )
 from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
-from .initial_states import CONTINUED, FREE, MEASURED
 from .noise_model import NoiseModel, acceleration_filter
-from .segments import Segments, cut, facts, load_of, split
-from .sensed import sensed
-from .simulator import Simulator
-from .simulators import simulator_of
 from .variables import RecordScales, typical_mass
 
 

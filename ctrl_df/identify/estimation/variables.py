@@ -11,9 +11,9 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...units import dimension, size
+from ..prediction.segments import Facts, facts
+from ..prediction.sensed import POSITION, sensed
 from ..thresholds import SIZE_PRIOR
-from .segments import Facts, facts
-from .sensed import POSITION, sensed
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..estimation.segments import facts
-from ..estimation.sensed import POSITION, place_unit, sensed
-from ..estimation.simulator import free_run
+from ..prediction.segments import facts
+from ..prediction.sensed import POSITION, place_unit, sensed
+from ..prediction.simulator import free_run
 from ..results.experiment import Experiment, separated
 from ..thresholds import PLAN_MARGIN, PLAN_SIZES
 

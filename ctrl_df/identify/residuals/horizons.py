@@ -13,11 +13,11 @@ from ...drawing import draw
 from ..data.imposed import imposes_motion
 from ..data.measurement import Measurement
 from ..estimation.fit import FitResult, fit_segments
-from ..estimation.initial_states import CONTINUED, FREE
 from ..estimation.segmented import same_begins
-from ..estimation.segments import cut, facts
-from ..estimation.sensed import sensed
-from ..estimation.simulators import simulator_of
+from ..prediction.initial_states import CONTINUED, FREE
+from ..prediction.segments import cut, facts
+from ..prediction.sensed import sensed
+from ..prediction.simulators import simulator_of
 from ..thresholds import FULL_SAMPLES, HORIZONS, SHORTEST_HORIZON
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..estimation.segments import facts
-from ..estimation.sensed import POSITION, force_scale, sensed
+from ..prediction.segments import facts
+from ..prediction.sensed import POSITION, force_scale, sensed
 from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
 
 

@@ -14,8 +14,8 @@ from ...drawing import draw
 from ..data.derivatives import automatic_cutoff, derivative
 from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
-from ..estimation.segments import facts
-from ..estimation.sensed import sensed
+from ..prediction.segments import facts
+from ..prediction.sensed import sensed
 from ..residuals.comparison_base import ComparisonBase
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..residuals.regions import Regions, error_regions

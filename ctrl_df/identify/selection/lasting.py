@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from ..estimation.segments import facts
+from ..prediction.segments import facts
 from ..results.diagnosis import Baseline, CandidateEffect
 from ..thresholds import GROWTH, OUTLASTING, UNMOVED
 

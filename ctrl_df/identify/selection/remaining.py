@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..estimation.segments import facts
+from ..prediction.segments import facts
 from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places

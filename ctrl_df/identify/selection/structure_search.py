@@ -16,9 +16,9 @@ from ..estimation.fit import FitResult
 from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
-from ..estimation.segments import facts
-from ..estimation.sensed import POSITION, sensed
-from ..estimation.simulator import feasible
+from ..prediction.segments import facts
+from ..prediction.sensed import POSITION, sensed
+from ..prediction.simulator import feasible
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
 from ..thresholds import (

@@ -12,10 +12,10 @@ from ...blocks.mechanism import Mechanism
 from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
-from ..estimation.prepared import REFERENCE
-from ..estimation.segments import facts, load_of, make_segments
-from ..estimation.simulators import simulator_of
 from ..estimation.variables import default_free
+from ..prediction.prepared import REFERENCE
+from ..prediction.segments import facts, load_of, make_segments
+from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
 from ..thresholds import FORCE_KNOWN
 from .curves import Curve, curve_over

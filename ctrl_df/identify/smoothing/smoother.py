@@ -18,8 +18,8 @@ from scipy.optimize import minimize
 
 from ...blocks.mechanism import Mechanism
 from ..data.measurement import Measurement
-from ..estimation.segments import facts_of
-from ..estimation.sensed import POSITION
+from ..prediction.segments import facts_of
+from ..prediction.sensed import POSITION
 from ..thresholds import (
     SMOOTHER_ESTIMATED,
     SMOOTHER_LEAK,

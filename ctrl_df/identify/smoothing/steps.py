@@ -14,10 +14,10 @@ from ...blocks.primitives import Ramp
 from ...simulate.groups import groups_of
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
-from ..estimation import initial_states
-from ..estimation.segments import facts_of
-from ..estimation.sensed import POSITION
-from ..estimation.simulator import Simulator
+from ..prediction import initial_states
+from ..prediction.segments import facts_of
+from ..prediction.sensed import POSITION
+from ..prediction.simulator import Simulator
 from ..thresholds import SMOOTHER_NUDGE, SMOOTHER_RTOL, UNPLACED
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.segmented import Scales
-from ..estimation.segments import facts, load_of
+from ..prediction.segments import facts, load_of
 from ..thresholds import STRONG
 from .extend import extended
 from .own_laws import Columns, allowed, own_columns

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..estimation.segments import facts
+from ..prediction.segments import facts
 from ..thresholds import RIPPLE_COARSEST, RIPPLE_STEP, RIPPLE_TURNS, SPECTRUM_SAMPLES
 
 _PLAIN = ("dry", "linear", "constant")

@@ -17,8 +17,8 @@ import numpy as np
 from ...blocks.core import level
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..estimation.segmented import Scales
-from ..estimation.simulator import feasible
 from ..estimation.variables import Variable
+from ..prediction.simulator import feasible
 from ..thresholds import GROSS, RIGID, WORK_HIGH
 
 

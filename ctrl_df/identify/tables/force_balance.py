@@ -15,7 +15,7 @@ import numpy as np
 from ...simulate.imposed import imposed_forces, path_of
 from ...simulate.imposed_response import imposable
 from ..estimation.segmented import Scales
-from ..estimation.simulator import feasible
+from ..prediction.simulator import feasible
 from ..thresholds import BALANCE_PERIODS, BALANCE_ROUNDS, BALANCE_SAMPLES
 from .fit import Points
 
