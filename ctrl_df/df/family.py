@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..checks import number, path_of
 from ..drawing import draw
+from ..table import Table
 from .family_file import FORMAT, read_arrays, write_arrays
 from .journal import is_journal, lines_done, read_header
 from .points import AtPairs
@@ -138,6 +140,11 @@ class Family:
         regimes = ", ".join(f"{name} {count}" for name, count in self.counts.items())
         size = f"{self.N.shape[0]} x {self.N.shape[1]} points"
         return f"<Family of {self.description or 'a block'}: {size}; {regimes}>"
+
+    def _repr_html_(self) -> str:
+        """Return the same above its regimes."""
+        rows = tuple((name, str(count)) for name, count in self.counts.items())
+        return f"<p>{html.escape(repr(self)[1:-1])}</p>{Table(('regime', 'points'), rows)._repr_html_()}"
 
 
 def load_family(path) -> Family:

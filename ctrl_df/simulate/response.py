@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 import warnings
 from collections.abc import Mapping
@@ -15,9 +16,12 @@ from ..blocks.mechanism import Mechanism
 from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
 from ..drawing import draw
 from ..status import Status
+from ..table import Table
 from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
 from .program import layout as L
 from .program.parameters import checked_parameters, with_values
+
+SHOWN = 10  # events in a notebook
 
 
 class EventResponse(ct.TimeResponseData):
@@ -78,6 +82,12 @@ class EventResponse(ct.TimeResponseData):
             else "no time"
         )
         return f"<EventResponse of {signals}: {span}, {self.event_count} events, {self.status.name.lower()}>"
+
+    def _repr_html_(self) -> str:
+        """Return the same above its first events."""
+        rows = tuple((f"{e.time:.6g}", e.subsystem, e.kind) for e in self.events[:SHOWN])
+        table = Table(("time [s]", "in", "event"), rows)._repr_html_() if rows else ""
+        return f"<p>{html.escape(repr(self)[1:-1])}</p>{table}"
 
 
 def event_response(
