@@ -80,7 +80,7 @@ def test_blocks_print_signals_and_parameters():
     assert "coulomb.level" in _cells(cdf.Mass(1.0, [cdf.Coulomb(0.3)])._repr_html_())
     block, t = cdf.friction_mass(2, 5, 0.5), np.linspace(0, 2, 50)
     assert "breakaway" in _cells(cdf.event_response(block, t, 8 * np.sin(6 * t))._repr_html_())
-    assert "slip" in _cells(cdf.describing_function_family(block, [6.0, 8.0], [3.0])._repr_html_())
+    assert "stick-slip" in _cells(cdf.describing_function_family(block, [6.0, 8.0], [3.0])._repr_html_())
 
 
 def test_the_prediction_with_its_harmonics_is_in_the_tables(response, check):
