@@ -178,7 +178,7 @@ def test_a_table_held_out():
     assert found.best.id == "quadratic_drag"
     assert found.holdout[0] is table(DRAG=60.0, seed=9)
     drawn = found.plot()
-    assert drawn.axes.size == 3 and "quadratic drag" in drawn.axes.flat[2].get_title(loc="left")
+    assert drawn.axes.size == 3 and "quadratic drag" in drawn.axes.flat[2].get_title()
     plt.close(drawn.figure)
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.estimation import initial_states
 from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.estimation.variables import default_free
+from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.selection.rounding import rounding_evidence

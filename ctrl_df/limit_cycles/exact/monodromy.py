@@ -161,7 +161,7 @@ class Tracer:
                 values.append(self.rate(t, x, mode, margins=True)[1][margin])
             normal[j] = (values[0] - values[1]) / (2 * h)
         # rate of the margin along the flow, its own dependence on time included
-        h = 1e-6 * np.min(size / np.maximum(np.abs(f_minus), 1e-300))
+        h = 1e-6 / max(float(np.max(np.abs(f_minus) / size)), 1e-300)
         ahead = self.rate(t + h, before + h * f_minus, mode, margins=True)[1][margin]
         behind = self.rate(t - h, before - h * f_minus, mode, margins=True)[1][margin]
         speed = (ahead - behind) / (2 * h)
