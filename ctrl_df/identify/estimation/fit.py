@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..data.measurement import Measurement
+from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
@@ -176,7 +177,7 @@ def fit_records(
     mode, window
         As for `compare`.
     thin : int
-        Samples a step of the input in all but the last iterations; 1: never thinned.
+        Samples a step of the input in all but the last iterations, at most; 1: never thinned.
     polish : int
         Iterations at full rate at the end; 0 leaves the fit at the thinned input.
     coarse : bool or None
@@ -193,6 +194,7 @@ def fit_records(
         Bound on the iterations over the full segments.
     """
     records = list(records)
+    thin = thinnable(records, thin)
     first = simulator_of(model, records[0])
     model = first.with_values(dict(start)) if start else model
     block = first.block if not start else simulator_of(model, records[0]).block
