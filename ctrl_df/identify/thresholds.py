@@ -265,6 +265,9 @@ RESTARTED_AGAIN, RESTARTS_KEPT = 2, 3
 OPEN_RANGE = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """How far about a static level the segments are tried for the range that they leave open."""
 
+UNFOLLOWED = 0.7
+"""Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
+
 RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
 """Speeds to begin a segment with, over how far the estimate may be off."""
 

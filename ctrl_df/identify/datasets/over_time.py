@@ -16,7 +16,7 @@ from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
-from ..thresholds import RTOL
+from ..thresholds import RESTARTS_KEPT, RTOL
 from .dataset import Dataset, Estimate
 
 
@@ -39,7 +39,7 @@ class TimeDataset(Dataset):
         self.check_segments(mode, window)
         mode = "windows" if mode == "auto" and window is not None else mode
         lengths = segment_lengths(model, self.records, mode, window)
-        problem = Problem(model, self.records, (), 10_000)
+        problem = Problem(model, self.records, (), 10_000, followed=RESTARTS_KEPT)
         cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
         return self._comparison(model, cut, find_states(problem, cut, 1, RTOL))
 

@@ -15,7 +15,7 @@ from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
-from ..thresholds import RTOL
+from ..thresholds import RESTARTS_KEPT, RTOL
 from .covariance import covariance_of
 from .multiple_shooting import Problem
 from .noise_model import NoiseModel
@@ -201,7 +201,7 @@ def fit_records(
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
     begun = {k: p.value for k, p in block.parameters.items()} if names else {}
-    problem = Problem(model, records, names, budget, about=begun)
+    problem = Problem(model, records, names, budget, about=begun, followed=RESTARTS_KEPT)
     theta = problem.start()
     if coarse is None:
         coarse = start is None
@@ -275,8 +275,9 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about
-    )
+        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about,
+        RESTARTS_KEPT if errors else 0,
+    )  # fmt: skip
     problem.stage(list(segments), thin, starts, rtol)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

@@ -34,7 +34,8 @@ class Problem:
     """Records, segments and free parameters of one fit.
 
     Call `stage` to set the segments, then `solve`; afterwards `last` holds the residuals, `nuisance` the
-    initial states, `slopes` the derivatives of the last step.
+    initial states, `slopes` the derivatives of the last step. `followed`: tries of where a segment begins
+    that are followed to their end; with none the best is taken where it errs far less as it is.
     """
 
     def __init__(
@@ -48,10 +49,12 @@ class Problem:
         begins=FREE,
         hopeless=(math.inf, 0),
         about=None,
+        followed=0,
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
+        self.followed = followed
         self.block = simulator_of(model, records[0]).block
         self.known = [facts_of(self.block, r) for r in records]
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -163,10 +166,10 @@ class Problem:
 
     # --- solving --------------------------------------------------------------------------------------
 
-    def solve(self, theta, iterations, tolerance, robust, again=True):
+    def solve(self, theta, iterations, tolerance, robust, restarts=True):
         """Levenberg-Marquardt from `theta`; the initial states go along.
 
-        `again`: whether segments that err far more than others are begun anew.
+        `restarts`: whether segments that err far more than others are begun anew.
         """
         if self.fresh:
             scan_gap_state(self, theta)
@@ -174,7 +177,7 @@ class Problem:
                 self._states_first(theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
-        if not again:
+        if not restarts:
             return theta
         again = max(iterations // 2, 3)
         # without parameters a segment found lets the next one go on where it ends
@@ -200,17 +203,23 @@ class Problem:
     def _states_first(self, theta):
         """Find the initial states alone: parameters would bend to make up for them, past events."""
         alone = self.alone(theta)
-        self.nuisance = find_states(alone, self.segments, self.thin, self.rtol, self.nuisance)
+        if self.followed:
+            self.nuisance = find_states(alone, self.segments, self.thin, self.rtol, self.nuisance)
+        else:
+            alone.stage(self.segments, self.thin, self.nuisance, self.rtol)
+            alone.solve(np.zeros(0), 4, 2e-2, False, restarts=False)
+            self.nuisance = alone.nuisance
         self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
         self.count(alone.nfev)
 
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
         model = self.simulators[0].with_values(self.values(theta) or {})
-        hopeless = self.hopeless, self.outlook
+        hopeless, records = (self.hopeless, self.outlook), self.records[which]
         return Problem(
-            model, self.records[which], (), self.budget, None, self.error_filter, self.begins, hopeless
-        )
+            model, records, (), self.budget, None, self.error_filter, self.begins, hopeless,
+            followed=self.followed,
+        )  # fmt: skip
 
     def _without_outliers(self, theta, iterations, tolerance, robust):
         """Let the segments that fit decide the parameters, then find where the others begin.

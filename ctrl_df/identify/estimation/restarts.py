@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..prediction.sensed import sensed
-from ..thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, RESTARTS_KEPT
+from ..thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, UNFOLLOWED
 
 
 def restart_segments(problem, theta) -> bool:
@@ -53,15 +53,16 @@ def restart_segments(problem, theta) -> bool:
             shift, gain = _shift(held, some, e, simulator.position_dependent)
             powers.append(some.means(e**2) - gain)
             trial[:, 0] += shift
-        alone = problem.alone(theta, slice(k, k + 1))
-        nearest = np.argsort(powers, axis=0, kind="stable")[:RESTARTS_KEPT]
-        for order in nearest:
-            begun = np.array([trials[i][w] for w, i in enumerate(order)])
-            alone.stage([some], problem.thin, [begun], problem.rtol)
-            alone.solve(np.zeros(0), 5, 1e-2, False, again=False)
-            ended = some.means(alone.last[0] ** 2)
+        order, alone = np.argsort(powers, axis=0, kind="stable"), problem.alone(theta, slice(k, k + 1))
+        for rank in range(max(problem.followed, 1)):
+            begun = np.array([trials[i][w] for w, i in enumerate(order[rank])])
+            ended = np.take_along_axis(np.array(powers), order[rank : rank + 1], axis=0)[0] / UNFOLLOWED
+            if problem.followed:
+                alone.stage([some], problem.thin, [begun], problem.rtol)
+                alone.solve(np.zeros(0), 5, 1e-2, False, restarts=False)
+                begun, ended = alone.nuisance[0], some.means(alone.last[0] ** 2)
             better = ended < least
-            chosen[better], least = alone.nuisance[0][better], np.minimum(least, ended)
+            chosen[better], least = begun[better], np.minimum(least, ended)
             found = found or bool(better.any())
         starts[bad] = chosen
         problem.count(len(tries) * len(some) / len(segments) + alone.nfev)
