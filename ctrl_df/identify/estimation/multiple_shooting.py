@@ -212,6 +212,14 @@ class Problem:
         self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
         self.count(alone.nfev)
 
+    def _followed_states(self, theta, nuisance):
+        """Return the initial states after a few steps from `nuisance`, and what is left of the outputs."""
+        alone = self.alone(theta)
+        alone.stage(self.segments, self.thin, nuisance, self.rtol)
+        alone.solve(np.zeros(0), 2, 1e-2, False, restarts=False)
+        self.nfev += alone.nfev
+        return alone.nuisance, alone.last
+
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
         model = self.simulators[0].with_values(self.values(theta) or {})
@@ -281,8 +289,12 @@ class Problem:
                 trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
                 trial_nuisance = back(trial_theta - theta)
                 trial = self.residual(trial_theta, trial_nuisance)
-                trial_cost = self.cost(trial, trial_nuisance, weights)
-                trial_cost += 0.5 * float(known @ (trial_theta - self.about) ** 2)
+                away = 0.5 * float(known @ (trial_theta - self.about) ** 2)
+                trial_cost = away + self.cost(trial, trial_nuisance, weights)
+                if trial_cost >= cost and self._nonsmooth:
+                    # of some segments the begin may have to follow past an event
+                    trial_nuisance, trial = self._followed_states(trial_theta, trial_nuisance)
+                    trial_cost = away + self.cost(trial, trial_nuisance, weights)
                 if trial_cost < cost:
                     gain, accepted = 1 - trial_cost / cost, True
                     theta, nuisance, residual = trial_theta, trial_nuisance, trial
