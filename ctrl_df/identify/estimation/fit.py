@@ -275,9 +275,8 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about,
-        RESTARTS_KEPT if errors else 0,
-    )  # fmt: skip
+        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about
+    )
     problem.stage(list(segments), thin, starts, rtol)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

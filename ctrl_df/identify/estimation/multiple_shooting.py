@@ -173,7 +173,7 @@ class Problem:
         """
         if self.fresh:
             scan_gap_state(self, theta)
-            if self._nonsmooth:
+            if self.followed and self._nonsmooth:
                 self._states_first(theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
@@ -203,12 +203,7 @@ class Problem:
     def _states_first(self, theta):
         """Find the initial states alone: parameters would bend to make up for them, past events."""
         alone = self.alone(theta)
-        if self.followed:
-            self.nuisance = find_states(alone, self.segments, self.thin, self.rtol, self.nuisance)
-        else:
-            alone.stage(self.segments, self.thin, self.nuisance, self.rtol)
-            alone.solve(np.zeros(0), 4, 2e-2, False, restarts=False)
-            self.nuisance = alone.nuisance
+        self.nuisance = find_states(alone, self.segments, self.thin, self.rtol, self.nuisance)
         self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
         self.count(alone.nfev)
 
@@ -261,7 +256,7 @@ class Problem:
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):
-        if not self.names and not any(s.continued for s in self.simulators):
+        if self.followed and not self.names and not any(s.continued for s in self.simulators):
             self.last = self.residual(theta, self.nuisance)
             descend(self, iterations, tolerance)
             return theta
@@ -291,7 +286,7 @@ class Problem:
                 trial = self.residual(trial_theta, trial_nuisance)
                 away = 0.5 * float(known @ (trial_theta - self.about) ** 2)
                 trial_cost = away + self.cost(trial, trial_nuisance, weights)
-                if trial_cost >= cost and self._nonsmooth:
+                if trial_cost >= cost and self.followed and self._nonsmooth:
                     # of some segments the begin may have to follow past an event
                     trial_nuisance, trial = self._followed_states(trial_theta, trial_nuisance)
                     trial_cost = away + self.cost(trial, trial_nuisance, weights)
@@ -378,14 +373,16 @@ class Problem:
         self.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
-    def state_products(self, k, rows) -> np.ndarray:
-        """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual]."""
+    def state_products(self, k, which, seen) -> np.ndarray:
+        """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
+
+        `which`, `seen`: of the segments (nw,) and the samples (n,) of a signal, booleans.
+        """
         segments, simulator = self.segments[k], self.simulators[k]
-        which = np.isin(np.arange(len(segments)), rows)
-        some, seen = segments.only(which), segments.spread(which)
-        starts, widths = self._moved_starts(k, self.nuisance[k][rows], some, self.priors[k][rows])
+        some = segments.only(which)
+        starts, widths = self._moved_starts(k, self.nuisance[k][which], some, self.priors[k][which])
         signals = simulator.run_all([(some, None, start) for start in starts if start is not None])
-        self.nfev += len(starts) * len(rows) / len(segments) / len(self.segments)
+        self.nfev += len(starts) * len(some) / len(segments) / len(self.segments)
         base = (self.measured[k] - self.last[k])[seen]
         js = _by_start(starts, widths, signals, base, self._by_place(k)[seen])
         return _by_segment(js, np.empty((len(base), 0)), self.last[k][seen], np.ones(len(base)), some)

@@ -9,10 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..prediction.segments import split
-from ..thresholds import BEGINNINGS, SEGMENT_LEAST
+from ..thresholds import BEGINNINGS, DAMPED, SEGMENT_LEAST
 from .noise_model import power
-
-TRIES = 4
 
 
 def find_states(problem, segments, thin, rtol, starts=None) -> list[np.ndarray]:
@@ -53,7 +51,7 @@ def descend(problem, iterations: int, tolerance: float) -> None:
         before = power(problem.last)
         for r in left:
             r.step(tolerance)
-        if problem.too_far(power(problem.last) / max(before, 1e-300), iterations - i - 1):
+        if problem.too_far(power(problem.last) / max(before, 1e-300), iterations - i - 1 + problem.outlook):
             break
     problem.converged = not any(r.open.any() for r in left)
 
@@ -74,40 +72,46 @@ class _Record:
         known = (starts - self.means[rows]) ** 2 * self.precision[rows]
         return segments.sums(residual**2) + known.sum(axis=1)
 
+    def _signal(self, rows):
+        """Return which segments these rows are, and which samples of a signal theirs (booleans)."""
+        which = np.isin(np.arange(len(self.segments)), rows)
+        return which, self.segments.spread(which)
+
     def step(self, tolerance):
         """Take a step in every open segment, damped until its cost falls."""
         problem, k = self.problem, self.k
         rows = np.flatnonzero(self.open)
         if not rows.size:
             return
-        products = problem.state_products(k, rows)
-        ns = self.means.shape[1]
-        i = np.arange(ns)
-        for _ in range(TRIES):
-            ss, right = products[:, :ns, :ns].copy(), products[:, :ns, -1].copy()
-            ss[:, i, i] += self.precision[rows]
-            ss[:, i, i] *= 1 + self.damping[rows, None]
-            right -= self.precision[rows] * (problem.nuisance[k][rows] - self.means[rows])
-            size = np.sqrt(ss[:, i, i])
-            matrix = ss / (size[:, :, None] * size[:, None, :])
-            moved = np.linalg.solve(matrix, (right / size)[:, :, None])[:, :, 0] / size
-            trial = problem.within_reach(k, problem.nuisance[k][rows] + moved, rows)
-            some = self.segments.only(np.isin(np.arange(len(self.segments)), rows))
-            seen = self.segments.spread(np.isin(np.arange(len(self.segments)), rows))
+        products = problem.state_products(k, *self._signal(rows))
+        for _ in range(DAMPED):
+            which, seen = self._signal(rows)
+            some, starts = self.segments.only(which), problem.nuisance[k]
+            trial = problem.within_reach(k, starts[rows] + self._moves(products, starts[rows], rows), rows)
             residual = problem.measured[k][seen] - self.simulator.run(some, None, trial)
             problem.nfev += len(rows) / len(self.segments) / len(problem.segments)
             cost = self._cost(some, residual, trial, rows)
             better = cost < self.cost[rows]
             gained = rows[better]
-            gain = 1 - cost[better] / self.cost[gained]
-            problem.nuisance[k][gained] = trial[better]
-            taken = self.segments.spread(np.isin(np.arange(len(self.segments)), gained))
-            problem.last[k][taken] = residual[some.spread(better)]
-            self.cost[gained] = cost[better]
+            self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
+            self.cost[gained], starts[gained] = cost[better], trial[better]
+            problem.last[k][self._signal(gained)[1]] = residual[some.spread(better)]
             self.damping[gained] = np.maximum(self.damping[gained] / 10, 1e-7)
-            self.open[gained[gain < tolerance]] = False
             rows, products = rows[~better], products[~better]
             self.damping[rows] *= 10
             if not rows.size:
                 return
         self.open[rows] = False
+
+    def _moves(self, products, starts, rows):
+        """Return the damped steps of Gauss and Newton, (nr, ns)."""
+        ns = starts.shape[1]
+        i = np.arange(ns)
+        ss, right = products[:, :ns, :ns].copy(), products[:, :ns, -1].copy()
+        ss[:, i, i] += self.precision[rows]
+        ss[:, i, i] *= 1 + self.damping[rows, None]
+        right -= self.precision[rows] * (starts - self.means[rows])
+        # of one size, whatever the units: pivots are then chosen alike
+        size = np.sqrt(ss[:, i, i])
+        solved = np.linalg.solve(ss / (size[:, :, None] * size[:, None, :]), (right / size)[:, :, None])
+        return solved[:, :, 0] / size

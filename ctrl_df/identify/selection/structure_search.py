@@ -13,15 +13,7 @@ from ...blocks.effect import static_levels
 from ...simulate.crew import side_by_side
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
-from ..estimation.multistart import (
-    all_restarted,
-    beyond,
-    cross_started,
-    nonsmooth_names,
-    own,
-    restarted,
-    thresholds_refined,
-)
+from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..prediction.segments import facts
@@ -292,27 +284,17 @@ class StructureSearch(Search):
         errors = [math.inf if f is None else f.rmse for f in before]
         ahead = [0, *([1 + int(np.argmin(errors[1:]))] if len(errors) > 1 else [])]
         found: list[Any] = [None] * len(fits)
-        moved = side_by_side(lambda i: self._moved(data, fits[i], before[i]), ahead)
-        for i, f in zip(ahead, moved, strict=True):
+        for i, f in zip(ahead, side_by_side(data.moved, [fits[i] for i in ahead]), strict=True):
             found[i] = f
         hopeless = HOPELESS * min(found[i].rmse for i in ahead)
         others = [i for i, e in enumerate(errors) if i not in ahead and e < hopeless]
-        moved = side_by_side(lambda i: self._moved(data, fits[i], before[i], hopeless), others)
+        moved = side_by_side(lambda i: data.moved(fits[i], hopeless=hopeless), others)
         for i, f in zip(others, moved, strict=True):
             found[i] = f
         there = [i for i, f in enumerate(found) if f is not None]
         for i, f in zip(there, all_restarted([found[i] for i in there], data, floor), strict=True):
             found[i] = f
         return found
-
-    @staticmethod
-    def _moved(data: SegmentedData, found: FitResult, shorter, hopeless=math.inf) -> FitResult:
-        """Move a fit to other segments; where minima are many also the one over shorter segments.
-
-        The shorter a segment, the fewer events come and go in it as parameters move.
-        """
-        begun = [found, shorter] if shorter is not found and nonsmooth_names(found) else [found]
-        return min((data.moved(f, hopeless=hopeless) for f in begun), key=lambda f: f.rmse)
 
     def _ended(self, tried: CandidateFit, exactly: bool, floor: float, least: float) -> CandidateFit:
         """Return a candidate in its best minimum, unless nothing better is possible.
