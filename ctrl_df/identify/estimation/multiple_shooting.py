@@ -173,7 +173,7 @@ class Problem:
         """
         if self.fresh:
             scan_gap_state(self, theta)
-            if self.followed and self._nonsmooth:
+            if self.followed and self.names and self.error_filter is None:
                 self._states_first(theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)

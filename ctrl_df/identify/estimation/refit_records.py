@@ -38,7 +38,10 @@ def refit_records(
     settings: dict[str, Any] = dict(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
     )
-    found = fit_records(model, records, start, names, coarse=start is None, iterations=40, **settings)
+    # short segments lead from far off; from nearby they may lead away, into another minimum
+    ways = [True, False] if start is None and _many_minima(model, records) else [start is None]
+    fits = [fit_records(model, records, start, names, coarse=w, iterations=40, **settings) for w in ways]
+    found = min(fits, key=lambda f: f.rmse)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
         brief = short_segment(found.model, records)
@@ -57,6 +60,12 @@ def refit_records(
     # a model that errs over brief segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
+
+
+def _many_minima(model, records) -> bool:
+    """Whether the error of a model has many minima over its parameters."""
+    effects = getattr(simulator_of(model, records[0]).block, "effects", ())
+    return any(e.nonsmooth or e.multimodal for e in effects)
 
 
 class _Beside:
