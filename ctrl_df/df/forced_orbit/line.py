@@ -48,8 +48,8 @@ class Line:
             done, _, self._known = sweep(
                 address(), s.shot.at, self._drive, self._scratch, self.A[p:end], self.omega[p:end],
                 self._power, self._past, self._mode, self._known, s.mirrored, RTOL,
-                s._hmax(self.orders), s.max_steps, self.integrals[p:end], self.ends[p:end], self.miss[p:end], self.kinds[p:end],
-                self.still[p:end],
+                s._hmax(self.orders), s.max_steps, self.integrals[p:end], self.ends[p:end],
+                self.miss[p:end], self.kinds[p:end], self.still[p:end],
             )  # fmt: skip
             go_on()
             s._raise_if_raised()
