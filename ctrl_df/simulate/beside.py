@@ -13,6 +13,7 @@ from .compiler.native import call_native
 from .compiler.views import lean
 from .engine import Engine, State
 from .kernel import driver
+from .kernel.driver import copy
 from .kernel.space import space_at
 from .program import pointers
 from .program.layout import H_NG, Drive
@@ -48,18 +49,23 @@ def _flow(
 ):  # fmt: skip
     """Run every row of `x`, in place, from the same clock, mode and scale."""
     prog, drive, x, memo = lean(prog), lean(drive), lean(x), space_at(space).memo
+    clock, mode, scale = lean(clock), lean(mode), lean(scale)
+    my_clock, my_mode, my_scale = lean(my_clock), lean(my_mode), lean(my_scale)
     for row in range(x.shape[0]):
-        my_clock[:], my_mode[:], my_scale[:] = clock, mode, scale
+        copy(clock, my_clock)
+        copy(mode, my_mode)
+        for i in range(scale.shape[0]):
+            copy(scale[i], my_scale[i])
         begin = fresh
         memo[2] = 0.0
         while True:
             reason = call_native(
                 engine,
                 (
-                    prog, drive, lean(my_clock), x[row], lean(my_mode), end, lean(none), lean(none_x),
+                    prog, drive, my_clock, x[row], my_mode, end, lean(none), lean(none_x),
                     lean(none_y), 8, rtol, 0.0, math.inf, False, False, -1, 0.0, -1, height,
                     min(_MOST - int(my_clock[3]), _AT_ONCE), lean(log_t), lean(log_n), lean(log_k),
-                    lean(before), lean(my_scale), begin, space, lean(spectrum), 0.0,
+                    lean(before), my_scale, begin, space, lean(spectrum), 0.0,
                 ),
             )  # fmt: skip
             begin = 0

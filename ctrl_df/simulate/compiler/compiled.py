@@ -82,7 +82,7 @@ def cfunc(signature, law) -> Any:
     args, returns = sigutils.normalize_signature(signature)
 
     def uncompiled() -> Any:
-        return ccallback.CFunc(law, (args, returns), {}, {})
+        return ccallback.CFunc(law, (args, returns), {}, {}, pipeline_class=LeanCompiler)
 
     compiled = uncompiled()
     if _is_ours(law):
