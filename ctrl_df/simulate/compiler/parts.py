@@ -15,9 +15,11 @@ from llvmlite import binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes
 
 SPEED = 2  # of LLVM's levels; 1 makes the steps of Runge-Kutta methods half as fast, 3 nothing faster
+INLINED = 100  # size up to which functions are copied into others; larger ones are no faster for it
 
 
 class LeanLibrary(JITCodeLibrary):
@@ -34,6 +36,7 @@ class LeanLibrary(JITCodeLibrary):
         tuning = llvm.create_pipeline_tuning_options(speed_level=SPEED)
         tuning.loop_vectorization = tuning.slp_vectorization = False
         tuning.loop_unrolling = tuning.loop_interleaving = False
+        tuning.inlining_threshold = INLINED
         builder = llvm.create_pass_builder(self._codegen._tm, tuning)
         builder.getModulePassManager().run(self._final_module, builder)
 
@@ -85,18 +88,20 @@ class LeanCompiler(CompilerBase):
     """numba's pipeline with a lowering of its own in the place of numba's."""
 
     lowering = LeanLowering
+    needless = ()
 
     def define_pipelines(self):
         """Return the one pipeline."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes._finalized = False
         passes.add_pass_after(self.lowering, NativeLowering)
-        passes.passes = [p for p in passes.passes if p[0] is not NativeLowering]
+        passes.passes = [p for p in passes.passes if p[0] not in (NativeLowering, *self.needless)]
         passes.finalize()
         return [passes]
 
 
 class PartCompiler(LeanCompiler):
-    """The same for parts."""
+    """The same for parts, in which there are neither closures nor expressions of arrays."""
 
     lowering = PartLowering
+    needless = (InlineClosureLikes, NopythonRewrites)
