@@ -82,7 +82,8 @@ def cfunc(signature, law) -> Any:
     args, returns = sigutils.normalize_signature(signature)
 
     def uncompiled() -> Any:
-        return ccallback.CFunc(law, (args, returns), {}, {}, pipeline_class=LeanCompiler)
+        compiler: Any = LeanCompiler
+        return ccallback.CFunc(law, (args, returns), {}, {}, pipeline_class=compiler)
 
     compiled = uncompiled()
     if _is_ours(law):
