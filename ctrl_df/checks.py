@@ -139,8 +139,8 @@ def real_array(owner: str, name: str, values, unit: str = "", *, remedy: str = "
         raise TypeError(f"{owner} needs {rule}; got {kind}: {shown(values)}.{tail}")
     flat = [_as_float(v) for v in given.ravel()] if mixed else given
     array = np.array(flat, dtype=float).reshape(given.shape)
-    bad = ~np.isfinite(array)
-    if bad.any():
+    if not np.isfinite(array).all():
+        bad = ~np.isfinite(array)
         what = "NaN" if np.isnan(array[bad][0]) else "infinity"
         where = f" at index {int(np.argmax(bad.ravel()))}" if array.ndim else ""
         raise ValueError(f"{owner} needs {name} finite; got {what}{where}.{tail or ' Remove it.'}")

@@ -104,6 +104,16 @@ def _simulation():
     event_response(friction_mass(1, 1, 1), np.linspace(0, 1, 9), 2.0)
 
 
+def _curved_laws():
+    from .blocks.effects import Coulomb, CubicSpring
+    from .blocks.mechanism import Mass
+    from .simulate.response import event_response
+
+    event_response(
+        Mass(1.0).with_effect(Coulomb(1.0)).with_effect(CubicSpring(1.0)), np.linspace(0, 1, 9), 2.0
+    )
+
+
 def _laws():
     from .blocks.effect import effect_library
     from .blocks.memoryless import cubic
@@ -173,6 +183,6 @@ def _imposed_motion():
 STAGES = (
     {"simulation": _simulation, "backlash family": _backlash_family, "laws": _laws,
      "friction family": _friction_family},
-    {"general family": _general_family, "exact orbits": _orbit, "many runs": _many_runs,
-     "imposed motion": _imposed_motion},
+    {"curved laws": _curved_laws, "general family": _general_family, "exact orbits": _orbit,
+     "many runs": _many_runs, "imposed motion": _imposed_motion},
 )  # fmt: skip

@@ -13,6 +13,8 @@ from .compiler.native import call_native
 from .compiler.views import lean
 from .engine import Engine, State
 from .kernel import driver
+from .kernel.driver import copy
+from .kernel.space import space_at
 from .program import pointers
 from .program.layout import H_NG, Drive
 
@@ -31,7 +33,7 @@ def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float
     with pointers.interruptible():
         _flow(
             driver.address(), engine.program, drive, clock, x, state.mode, state.time + span, rtol,
-            max(rtol, 1e-10), scale, int(state.fresh), engine._space, np.zeros(0),
+            max(rtol, 1e-10), scale, int(state.fresh), engine._space.at, np.zeros(0),
             np.zeros((0, engine.nstates)), np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64),
             np.zeros(1, np.int64), np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex),
             clock.copy(), state.mode.copy(), scale.copy(),
@@ -46,22 +48,27 @@ def _flow(
     log_t, log_n, log_k, before, spectrum, my_clock, my_mode, my_scale,
 ):  # fmt: skip
     """Run every row of `x`, in place, from the same clock, mode and scale."""
-    prog, drive, x, space = lean(prog), lean(drive), lean(x), lean(space)
+    prog, drive, x, memo = lean(prog), lean(drive), lean(x), space_at(space).memo
+    clock, mode, scale = lean(clock), lean(mode), lean(scale)
+    my_clock, my_mode, my_scale = lean(my_clock), lean(my_mode), lean(my_scale)
     for row in range(x.shape[0]):
-        my_clock[:], my_mode[:], my_scale[:] = clock, mode, scale
+        copy(clock, my_clock)
+        copy(mode, my_mode)
+        for i in range(scale.shape[0]):
+            copy(scale[i], my_scale[i])
         begin = fresh
-        space.memo[2] = 0.0
+        memo[2] = 0.0
         while True:
             reason = call_native(
                 engine,
                 (
-                    prog, drive, lean(my_clock), x[row], lean(my_mode), end, lean(none), lean(none_x),
+                    prog, drive, my_clock, x[row], my_mode, end, lean(none), lean(none_x),
                     lean(none_y), 8, rtol, 0.0, math.inf, False, False, -1, 0.0, -1, height,
                     min(_MOST - int(my_clock[3]), _AT_ONCE), lean(log_t), lean(log_n), lean(log_k),
-                    lean(before), lean(my_scale), begin, space, lean(spectrum), 0.0,
+                    lean(before), my_scale, begin, space, lean(spectrum), 0.0,
                 ),
             )  # fmt: skip
             begin = 0
             if reason != driver.STEPS or int(my_clock[3]) >= _MOST:
                 break
-            space.memo[2] = 1.0
+            memo[2] = 1.0

@@ -13,6 +13,8 @@ import numpy as np
 
 from ..status import Status
 from .kernel import driver, history
+from .kernel.pace import keep_pace
+from .kernel.space import Space, workspace
 from .program import layout, pointers
 from .program.flatten import flatten
 from .program.layout import EVENT_KINDS, Drive
@@ -142,9 +144,9 @@ class Engine:
         self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
 
     @cached_property
-    def _space(self) -> driver.Space:
+    def _space(self) -> Space:
         """Scratch of runs made from here; `ctrl_df.simulate.runs` has its own."""
-        return driver.workspace(self.program, delays=True)
+        return workspace(self.program, delays=True)
 
     @property
     def delayed(self) -> bool:
@@ -163,7 +165,7 @@ class Engine:
     def _modes(self) -> np.ndarray:
         """Modes of a fresh state, for those who set states by themselves: not possible with a history."""
         if self.delayed:
-            driver.workspace(self.program)
+            workspace(self.program)
         return self._initial
 
     def start(self, x0=None, time: float = 0.0) -> State:
@@ -241,7 +243,7 @@ class Engine:
         now = state.copy()
         ng, address = int(self.program.ints[layout.H_NG]) + 1, driver.address()
         scale = now.scale if now.scale is not None else np.zeros((4, ng))
-        xout, yout = np.full((len(times), self.nstates), np.nan), np.full((len(times), self.noutputs), np.nan)
+        xout, yout = np.empty((len(times), self.nstates)), np.empty((len(times), self.noutputs))
         clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
         log = max(log, 1)
         log_t, log_n, log_k = np.empty(log), np.empty(log, np.int64), np.empty(log, np.int64)
@@ -250,10 +252,13 @@ class Engine:
         fresh = int(now.fresh)
         pointers.raised.clear()
         pointers.gave_nan.clear()
-        memo = self._space.memo
+        space = self._space
+        memo = space.memo
         memo[2] = 0.0
+        if len(times) + len(drive.time) > 2:
+            keep_pace(self.program, space)
         chunk = max(int(_FIRST_CHUNK / (1 + (self.nstates / 6) ** 2)), 10)
-        past = history.stored(self.program, self._space.work[0])
+        past = history.stored(self.program, space.work[0])
         if self.delayed and not fresh:
             if now.history is None:
                 raise ValueError(
@@ -272,7 +277,7 @@ class Engine:
                     address, self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order,
                     rtol, atol, max_step, locate, stop_at_event, watch, level, -direction, height,
                     min(max_steps - int(clock[3]), chunk), log_t, log_n, log_k, before, scale, fresh,
-                    self._space, spectrum, omega,
+                    space.at, spectrum, omega,
                 )  # fmt: skip
             pointers.raise_kept()
             pace = _CHUNK_TIME / max(perf_counter() - began, 1e-6)
@@ -289,6 +294,8 @@ class Engine:
                 memo[2] = 1.0  # the same run goes on: so does its count of events without progress
                 continue
             break
+        recorded = int(clock[1])
+        xout[recorded:] = yout[recorded:] = np.nan
         status = STATUS[reason]
         if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(now.x), initial=0.0) < FAR:
             raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
@@ -307,7 +314,7 @@ class Engine:
             reason,
             yout,
             xout,
-            int(clock[1]),
+            recorded,
             int(clock[3]),
             int(clock[9]),
             int(clock[4]),

@@ -16,6 +16,7 @@ from .compiler.native import call_native
 from .compiler.views import lean
 from .engine import FAR, STATUS, Engine, State, constant_drive
 from .kernel import driver, history
+from .kernel.space import space_at, workspace
 from .program import pointers
 from .program.layout import H_NG
 
@@ -70,7 +71,7 @@ def strides(
         As in `Engine.run`.
     """
     n, program = engine.nstates, engine.program
-    space, now = driver.workspace(program, delays=True), state.copy()
+    space, now = workspace(program, delays=True), state.copy()
     if engine.delayed and now.history is not None:
         history.stored(program, space.work[0])[:] = now.history
     scale = np.zeros((4, int(program.ints[H_NG]) + 1)) if now.scale is None else now.scale
@@ -91,8 +92,8 @@ def strides(
         with pointers.interruptible():
             done = _pass_on(
                 driver.address(), program, drive, clock, now.x, now.mode, times, *seen, rtol, signal, row,
-                max(rtol, 1e-10), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space, spectrum,
-                first, limit, last, ends, states, numbers, budget,
+                max(rtol, 1e-10), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space.at,
+                spectrum, first, limit, last, ends, states, numbers, budget,
             )  # fmt: skip
         pointers.raise_kept()
         for i in range(done):
@@ -120,7 +121,7 @@ def _pass_on(
     xout, yout, log_t, log_n, log_k, before = (
         lean(xout), lean(yout), lean(log_t), lean(log_n), lean(log_k), lean(before),
     )  # fmt: skip
-    scale, space, spectrum = lean(scale), lean(space), lean(spectrum)
+    scale, spectrum, memo = lean(scale), lean(spectrum), space_at(space).memo
     peeks, spent = times.shape[0], 0
     for i in range(ends.shape[0]):
         begin = clock[0]
@@ -131,7 +132,7 @@ def _pass_on(
         until = min(begin + ahead, limit)
         clock[1] = clock[3] = clock[4] = clock[9] = 0.0
         clock[8] = -1.0
-        space.memo[2] = 0.0
+        memo[2] = 0.0
         while True:
             reason = call_native(
                 engine,
@@ -144,7 +145,7 @@ def _pass_on(
             last[3] = 0.0
             if reason != driver.STEPS or int(clock[3]) >= _MOST:
                 break
-            space.memo[2] = 1.0
+            memo[2] = 1.0
         peak = 0.0
         for k in range(int(clock[1])):
             value = abs(yout[k, row])

@@ -19,8 +19,10 @@ from .groups import Group
 from .kernel import driver, many
 from .kernel.many import Drives, How, Rows
 from .program import pointers
+from .program.layout import H_AFFINE
 
 _MOST_TOGETHER = 256  # runs between two looks at what is left to do
+_ready: set[int] = set()  # kinds of laws (`H_AFFINE`) for which this process has the machine code
 _SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time
 
 
@@ -195,8 +197,11 @@ class _Work:
             return
         todo = deque(self._parts(threads))
         threads = max(min(threads, len(todo)), 1)
-        # compiled, or read from its file, before any thread asks for it
-        self._run(self._desk(self.groups[0]), self.groups[0], np.zeros(0, np.int64))
+        curved = int(self.groups[0].engine.program.ints[H_AFFINE])
+        if curved not in _ready:
+            # compiled, or read from its file, before any thread asks for it
+            self._run(self._desk(self.groups[0]), self.groups[0], np.zeros(0, np.int64))
+            _ready.add(curved)
         # this thread only waits: it is the one that hears Ctrl-C
         workers = [crew.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)]
         try:

@@ -272,7 +272,8 @@ def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
                 mean[:] = 0.0
                 spread = _average(A, eps, phi, w, periods, mean)
                 if spread >= 0.0 and (spread < least or regime[j] == FREE):
-                    out[:] = mean
+                    for k in range(mean.size):
+                        out[k] = mean[k]
                     regime[j], residual[j], least = APERIODIC, spread, spread
                 if 0.0 <= spread < VAGUE:
                     break

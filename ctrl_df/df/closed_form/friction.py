@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from ...simulate.compiler.compiled import njit
+from ...simulate.compiler.compiled import njit, part
 
 FRICTION_REGIMES = ("slip", "stick-slip", "stuck")
 SLIP, STICK_SLIP, STUCK = 0, 1, 2
@@ -162,7 +162,7 @@ def _family(M, K, B, Ks, amplitudes, frequencies, harmonics, regime, residual):
                 out[k] *= scale
 
 
-@njit(error_model="numpy")
+@part
 def _slip(kappa, beta, falls, E, S, C, out):
     """Sliding without stop: the input less a square wave of height kappa that starts at psi0."""
     # p(psi0) = -(kappa/beta) tanh(pi beta/2), p the particular solution cos(theta + phi)/sqrt(1 + beta^2)
@@ -190,7 +190,7 @@ def _slip(kappa, beta, falls, E, S, C, out):
     return abs(left) / _speed(rise, cos0, -sin0, beta, falls - math.atan2(sin0, cos0))
 
 
-@njit(error_model="numpy")
+@part
 def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
     """One slip arc from rest a half period; returns the velocity left at its end, relative."""
     low, high = delta + falls, math.pi
@@ -223,14 +223,14 @@ def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
     return abs(left) / peak
 
 
-@njit(error_model="numpy")
+@part
 def _speed(rise, sigma, sine, beta, s):
     """Peak velocity of an arc, within a factor of two: where F = K falling, or half way when overdamped."""
     E, S, C, _, _ = _responses(beta, s if beta < 1.0 else 0.5 * s)
     return rise * E + sigma * C + sine * S
 
 
-@njit(error_model="numpy")
+@part
 def _long_arc(kappa, delta, s, beta, out):
     """Integrate the force over the arc in closed form: int (cos(theta) - kappa) e^{-jk theta}."""
     middle, h = 0.5 * s - delta, 0.5 * s
@@ -249,7 +249,7 @@ def _long_arc(kappa, delta, s, beta, out):
         before = after
 
 
-@njit(error_model="numpy")
+@part
 def _short_arc(sigma, rise, sine, delta, s, beta, out):
     """Gauss's rule over the velocity, or over the force where the velocity has a boundary layer."""
     damped = beta * s >= 1.0
@@ -278,7 +278,7 @@ def _short_arc(sigma, rise, sine, delta, s, beta, out):
         start *= square
 
 
-@njit(error_model="numpy")
+@part
 def _position(k, beta):
     """1/(jk (jk + beta)): force harmonic to position harmonic; no overflow for any beta."""
     unit = 1.0 / max(1.0, beta)
@@ -286,7 +286,7 @@ def _position(k, beta):
     return complex(-k * unit / size, -beta * unit / size)
 
 
-@njit(error_model="numpy")
+@part
 def _responses(beta, s):
     """Velocity a time s after rest under forces 1, sin and cos - 1: (E, S, C), then sin(s) and 1 - cos(s).
 

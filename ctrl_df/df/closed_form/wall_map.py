@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ...simulate.compiler.compiled import njit
+from ...simulate.compiler.compiled import njit, part
 
 CHATTER = 3e-4  # [rad] remaining time of a chatter below which contact is sustained
 # The time of an impact is taken when Halley's step is this part of it, and the step is still made: it is then
@@ -76,7 +76,7 @@ def two_impact_harmonics(A, eps, tau, v, out):
 # --- one flight -------------------------------------------------------------------------------------------
 
 
-@njit(cache=True)
+@part
 def flight(A, c, s, w, near):
     """Follow the ball from a wall to its next impact: (kind, time, speed).
 
@@ -118,7 +118,7 @@ def flight(A, c, s, w, near):
     return impact(A, c, s, w, top + late, bottom + late, 0, near)
 
 
-@njit(cache=True)
+@part
 def extreme(A, c, s, w, up, along):
     """Time r in (0, 2 pi] with tan(r/2) = up/along, up >= 0, and xi there."""
     r = 2.0 * math.atan2(up, along)
@@ -126,7 +126,7 @@ def extreme(A, c, s, w, up, along):
     return r, w * r + A * (c * size * up - s * lag(r, size * along))
 
 
-@njit(cache=True)
+@part
 def impact(A, c, s, w, low, high, kind, near):
     """Time and speed at which xi reaches the wall within a monotone piece, by safeguarded Halley steps."""
     target = 1.0 if kind == 1 else 0.0
@@ -164,13 +164,13 @@ def impact(A, c, s, w, low, high, kind, near):
     return kind, r, max(v, 0.0)
 
 
-@njit(cache=True)
+@part
 def place(A, c, s, w, r):
     """Distance xi from the wall a time r after leaving it."""
     return w * r + A * (c * 2.0 * math.sin(0.5 * r) ** 2 - s * lag(r, math.sin(r)))
 
 
-@njit(cache=True)
+@part
 def lag(r, sn):
     """Return r - sin(r) without cancellation: chatter is made of very short flights."""
     if r > 0.3:
@@ -179,7 +179,7 @@ def lag(r, sn):
     return r * x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0 * (1.0 - x / 110.0))))
 
 
-@njit(cache=True)
+@part
 def stays(A, eps, c, s, w):
     """Whether a ball that leaves at speed w is pressed back for good (complete chatter)."""
     if c >= 0.0:

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ...simulate.compiler.compiled import njit
+from ...simulate.compiler.compiled import njit, part
 from .wall_map import EXACT, ROUGH, flight, lag, place, stays, wrap
 
 NEAR = 1e-5  # distance of a recurrence from which Newton's method is tried
@@ -23,7 +23,7 @@ RELEASE = -0.5 * math.pi  # phi at which a pressing acceleration changes sign
 # --- settling on an attractor -----------------------------------------------------------------------------
 
 
-@njit(cache=True)
+@part
 def event(A, eps, phi, c, s, w, near):
     """One flight, the impact, and sustained contact if it follows.
 
@@ -73,7 +73,7 @@ def settle(A, eps, phi, w, transient):
     return 0, 0, 0, phi, w, False, 0.0, 0.0
 
 
-@njit(cache=True)
+@part
 def shortest(A, eps, phi, w, count, lap, contact, radius, closing):
     """Return the answer of `settle` for a lap that may hold the same orbit several times."""
     for parts in range(lap, 1, -1):
@@ -196,7 +196,8 @@ def average(A, eps, phi, w, periods, out):
         side = -side if kind == 1 else side
         while cuts <= blocks and tau + time + rest > cut:
             # Integrals up to the cut, e^{-jk tau} = 1 there: int y'' - y' - jk y = (jk)^2 int y.
-            mark[:] = wall
+            for k in range(wall.size):
+                mark[k] = wall[k]
             if tau + time > cut:
                 r = cut - tau
                 y = side0 * (0.5 - place(A, c0, s0, w0, r))
@@ -210,7 +211,8 @@ def average(A, eps, phi, w, periods, out):
             for k in range(1, n):
                 mark[k] -= complex(rate, k * y)
             if cuts == 0:
-                out[:] = mark
+                for k in range(mark.size):
+                    out[k] = mark[k]
             else:
                 squares += abs(mark[1] - last) ** 2
             last = mark[1]
@@ -232,7 +234,7 @@ def average(A, eps, phi, w, periods, out):
     return 2.0 * math.sqrt(error) / max(mean, 1e-300)
 
 
-@njit(cache=True)
+@part
 def interval(A, eps, phi, c, s, w):
     """Mean time between the next impacts; inf where one of them never comes."""
     clock = 0.0
@@ -244,7 +246,7 @@ def interval(A, eps, phi, c, s, w):
     return clock / RARE
 
 
-@njit(cache=True)
+@part
 def push(A, eps, side, phi, rest, part, speed, wall):
     """Add what the wall does to y: an impulse, then -A cos(tau) for the first `part` of a contact."""
     start = phi - rest  # phi of the impact
@@ -267,7 +269,7 @@ def push(A, eps, side, phi, rest, part, speed, wall):
             q *= leave
 
 
-@njit(cache=True)
+@part
 def swept(A, c, s, w, r):
     """Area under xi over a flight."""
     versine = 2.0 * math.sin(0.5 * r) ** 2

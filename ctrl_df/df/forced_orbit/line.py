@@ -7,6 +7,7 @@ import numpy as np
 from ...simulate.engine import State, harmonic_drive
 from ..threads import go_on
 from .orbit_search import RTOL
+from .shooting import address
 from .sweep import sweep
 
 _AT_ONCE = 64  # points of a line between two chances to interrupt it
@@ -45,10 +46,10 @@ class Line:
         while p < len(self.A):  # compiled code hears no Ctrl-C: some points at a time
             end = min(p + _AT_ONCE, len(self.A))
             done, _, self._known = sweep(
-                s.shot, self._drive, self._scratch, self.A[p:end], self.omega[p:end], self._power, self._past,
-                self._mode, self._known, s.mirrored, RTOL, s._hmax(self.orders), s.max_steps,
-                self.integrals[p:end], self.ends[p:end], self.miss[p:end], self.kinds[p:end],
-                self.still[p:end],
+                address(), s.shot.at, self._drive, self._scratch, self.A[p:end], self.omega[p:end],
+                self._power, self._past, self._mode, self._known, s.mirrored, RTOL,
+                s._hmax(self.orders), s.max_steps, self.integrals[p:end], self.ends[p:end],
+                self.miss[p:end], self.kinds[p:end], self.still[p:end],
             )  # fmt: skip
             go_on()
             s._raise_if_raised()

@@ -211,7 +211,7 @@ class OrbitSearch:
     def _state(self, y, mode=None):
         """State at coordinates y."""
         x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
-        set_state(self.shot, np.array(y, float), x, mode)
+        set_state(self.shot.at, np.array(y, float), x, mode)
         return State(0.0, x, mode)
 
     def _nudged(self, state):
@@ -231,7 +231,7 @@ class OrbitSearch:
         trail = np.empty((shots, len(state.x)))
         for first in range(0, shots, _AT_ONCE):
             reason, spent = follow(
-                self.shot, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
+                self.shot.at, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
                 self._hmax(1) * self.period, _START * self.period, self.budget,
                 trail[first : first + _AT_ONCE],
             )  # fmt: skip
@@ -252,7 +252,7 @@ class OrbitSearch:
         if not 0.0 < shot.clock[2] <= 5 * _START * self.period:
             shot.clock[2] = _START * self.period
         reason = shoot(
-            shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
+            shot.at, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
             self._hmax(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum, self.budget,
         )  # fmt: skip
         self.budget -= int(shot.clock[3])
@@ -273,8 +273,9 @@ class OrbitSearch:
             shot.jacobian[:] = np.nan
         shot.clock[2] = _START * self.period
         outcome, miss = close_orbit(
-            shot, self.drive, self._span(periods), state.x, state.mode, self.mirrored, RTOL, self.atol,
-            self._hmax(orders) * self.period, spectrum, self.budget, 24, False,
+            shooting.address(), shot.at, self.drive, self._span(periods), state.x, state.mode,
+            self.mirrored, RTOL, self.atol, self._hmax(orders) * self.period, spectrum,
+            self.budget, 24, False,
         )  # fmt: skip
         self.budget -= int(shot.clock[3]) * 4
         go_on()

@@ -9,15 +9,19 @@ points cost three or four shots, the first of them coarse.
 
 from __future__ import annotations
 
+import functools
 import math
 
-from ...simulate.compiler.compiled import njit, part
-from ...simulate.compiler.native import call_native
+import numpy as np
+
+from ...simulate.compiler.compiled import apart, njit, part
+from ...simulate.compiler.native import call_native, native_address
 from ...simulate.compiler.views import lean
+from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.driver import copy
 from ...simulate.kernel.matrices import multiply
-from .shot import coordinates, place
+from .shot import coordinates, place, shot_at
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
@@ -28,22 +32,47 @@ NOISE = 4.0  # errors in tolerances of a shot below which it is the shots that d
 ROUGHLY = 1e-7  # tolerance of shots far from the orbit
 
 
+@functools.cache
+def address() -> int:
+    """Return the address of `close`, compiled now if need be."""
+    drive, x, modes = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros(0), np.zeros(0, np.int64)
+    return native_address(
+        close, (0, drive, 1.0, x, modes, True, 0.0, 0.0, 1.0, np.zeros((0, 0), complex), 1, 1, True)
+    )
+
+
 @njit(error_model="numpy", nogil=True)
-def close_orbit(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
-    """`close`, from Python."""
-    return close(
-        lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
-        budget, shots, eager,
+def close_orbit(
+    close, shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager
+):
+    """`close` at its address, from Python; returns outcome and error."""
+    outcome = call_native(
+        close,
+        (
+            shot, lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum), budget,
+            shots, eager,
+        ),
     )  # fmt: skip
+    return outcome, shot_at(shot).error[0]
 
 
-@part
+@apart
 def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
     """Close an orbit from (x, mode), in place, by chord and Broyden steps.
 
     The integrals of the closed shot go to `spectrum`. `shots` bounds the shots, `budget` the integration
-    steps; with `eager` the first shot takes integrals already. Returns outcome and error of the state.
+    steps; with `eager` the first shot takes integrals already. Returns the outcome, and leaves the error of
+    the state in ``shot.error``.
     """
+    outcome, shot_at(shot).error[0] = _close(
+        shot_at(shot), shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager
+    )
+    return outcome
+
+
+@part(inline=True)
+def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
+    """Return outcome and error."""
     n, nf = x.shape[0], shot.free.shape[0]
     y0, y1, change, x0 = shot.trial[0], shot.trial[1], shot.trial[2], shot.trial[3]
     last, end = shot.trial[7], shot.trial[6]
@@ -66,7 +95,7 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
         reason = call_native(
             shot.take,
             (
-                shot, drive, time, x, mode, mirrored, tolerance, atol, hmax,
+                at, drive, time, x, mode, mirrored, tolerance, atol, hmax,
                 spectrum if take else shot.no_spectrum, budget,
             ),
         )  # fmt: skip
@@ -111,7 +140,7 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
                 if not fresh_jacobian:
                     # Broyden's matrix is no proof: differentiate before judging
                     if not _differentiate(
-                        shot, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget, first
+                        shot, at, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget, first
                     ):
                         return OPEN, error
                 if not _attracts(shot, jacobian):
@@ -123,7 +152,7 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
             if jacobians == 3:
                 return OPEN, best
             if not _differentiate(
-                shot, drive, time, x0, m0, y1, mirrored, tolerance, atol, hmax, budget, first
+                shot, at, drive, time, x0, m0, y1, mirrored, tolerance, atol, hmax, budget, first
             ):
                 return FAILED, best
             jacobians += 1
@@ -214,7 +243,7 @@ def _broyden(shot, jacobian, change, before, after):
 
 
 @part
-def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget, first):
+def _differentiate(shot, at, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget, first):
     """Difference the shot over its free coordinates; `step` is the closing error at x0.
 
     All shots are of the tolerance of that one and begin with a step `first` as it did, so that their errors
@@ -239,7 +268,7 @@ def _differentiate(shot, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, 
             place(shot, y, x, mode)
             shot.clock[2] = first
             reason = call_native(
-                shot.take, (shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget)
+                shot.take, (at, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget)
             )
             if reason != driver.DONE:
                 return False

@@ -8,17 +8,20 @@ A `Shot` holds what stays the same from shot to shot, so that compiled code allo
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 
 from ...simulate.compiler.compiled import apart, njit, part
 from ...simulate.compiler.native import call_native, native_address
+from ...simulate.compiler.packed import Layout, address_of
 from ...simulate.compiler.views import lean
 from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.flow import combine, refresh
 from ...simulate.kernel.modes import settle
+from ...simulate.kernel.space import Space
 from ...simulate.program import layout as L
 
 _CHATTER_ROOM = 60  # runs go on where the event log is full
@@ -30,7 +33,7 @@ class Shot(NamedTuple):
     run: int  # addresses of the engine and of `take`
     take: int
     prog: L.Program
-    space: driver.Space
+    space: Space
     scale: np.ndarray  # (4, ng) scales of margins
     clock: np.ndarray
     before: np.ndarray
@@ -58,7 +61,16 @@ class Shot(NamedTuple):
     matrix: np.ndarray  # (3, nf, nf) scratch
     shifts: np.ndarray  # (ns, n) directions of free position
     ends: np.ndarray  # (2, ny) outputs at the start and at the end of the last shot with a spectrum
+    error: np.ndarray  # (1,) of the state of the orbit closed last
     tally: np.ndarray  # shots, steps, event kinds (bits), Jacobians, reason of the last run, ended stuck
+    words: np.ndarray  # all these, laid out
+    at: int  # and where
+
+
+_NONE = np.zeros(0, np.int64)
+LAYOUT = Layout()
+shot_at = LAYOUT.opener()
+"""A `Shot` from its address, in compiled code."""
 
 
 def make_shot(engine, symmetries, rows: int) -> Shot:
@@ -66,7 +78,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     n, nf = engine.nstates, len(symmetries.free)
     ng = int(engine.program.ints[L.H_NG]) + 1
     s = symmetries
-    drive, vector, modes = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros(n), engine._modes.copy()
+    modes = engine._modes.copy()
     none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
     no_spectrum = np.zeros((rows, 0), complex)
     log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
@@ -76,11 +88,20 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
         np.full((nf, nf), np.nan), np.zeros((14, max(n, 1))), np.zeros((4, len(modes)), np.int64),
         np.zeros((3, nf, nf)),
-        np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(6, np.int64),
+        np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(1),
+        np.zeros(6, np.int64), _NONE, 0,
     )  # fmt: skip
-    return shot._replace(
-        take=native_address(take, (shot, drive, 1.0, vector, modes, True, 1e-9, 1e-12, 1.0, no_spectrum, 1))
-    )
+    LAYOUT.learn(shot)
+    shot = shot._replace(take=_address())
+    words = LAYOUT.pack(shot)
+    return shot._replace(words=words, at=address_of(words))
+
+
+@functools.cache
+def _address() -> int:
+    """Return the address of `take`, compiled now if need be."""
+    drive, x, modes = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros(0), np.zeros(0, np.int64)
+    return native_address(take, (0, drive, 1.0, x, modes, True, 0.0, 0.0, 1.0, np.zeros((0, 0), complex), 1))
 
 
 # --- one shot ---------------------------------------------------------------------------------------------
@@ -90,9 +111,9 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
 def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
     """`take` one shot, from Python."""
     return call_native(
-        shot.take,
+        shot_at(shot).take,
         (
-            lean(shot), lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
+            shot, lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
             budget,
         ),
     )  # fmt: skip
@@ -105,7 +126,8 @@ def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget,
     A step that another run has left behind is `step` [s] if it is no use here. Returns why the last one ended
     and how many integration steps all took.
     """
-    shot, drive, x, mode, trail = lean(shot), lean(drive), lean(x), lean(mode), lean(trail)
+    at, shot = shot, shot_at(shot)
+    drive, x, mode, trail = lean(drive), lean(x), lean(mode), lean(trail)
     reason, spent = driver.DONE, 0
     for k in range(trail.shape[0]):
         coordinates(shot, x, trail[k])
@@ -114,7 +136,7 @@ def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget,
         reason = call_native(
             shot.take,
             (
-                shot, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget - spent,
+                at, drive, time, x, mode, mirrored, rtol, atol, hmax, shot.no_spectrum, budget - spent,
             ),
         )  # fmt: skip
         spent += int(shot.clock[3])
@@ -130,6 +152,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
     With columns in `spectrum` the integrals of the outputs against exp(-j k omega t) are written to it, and
     the outputs at both ends to ``shot.ends``.
     """
+    shot = shot_at(shot)
     prog, clock = shot.prog, shot.clock
     work = shot.space.work
     clock[0] = clock[1] = clock[3] = clock[4] = clock[5] = clock[6] = clock[7] = 0.0
@@ -152,7 +175,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
             (
                 prog, drive, clock, x, mode, time, shot.none, shot.none_x, shot.none_y, 8, rtol, atol, hmax,
                 True, False, -1, 0.0, -1, max(rtol, 1e-10), budget, shot.log_t, shot.log_n, shot.log_k,
-                shot.before, shot.scale, 0, shot.space, spectrum, drive.omega,
+                shot.before, shot.scale, 0, shot.space.at, spectrum, drive.omega,
             ),
         )  # fmt: skip
         for i in range(min(int(clock[5]), shot.log_t.shape[0])):
@@ -230,7 +253,7 @@ def coordinates(shot, x, y):
 @njit(error_model="numpy")
 def set_state(shot, y, x, mode):
     """`place`, from Python."""
-    place(lean(shot), lean(y), lean(x), lean(mode))
+    place(shot_at(shot), lean(y), lean(x), lean(mode))
 
 
 @part

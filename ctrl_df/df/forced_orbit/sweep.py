@@ -7,27 +7,30 @@ from __future__ import annotations
 import math
 
 from ...simulate.compiler.compiled import njit, part
+from ...simulate.compiler.native import call_native
 from ...simulate.compiler.views import lean
 from ...simulate.kernel.driver import copy
 from ...simulate.program import layout as L
 from ...simulate.program.layout import Drive
-from .shooting import CLOSED, SHOTS, close
-from .shot import coordinates, place
+from .shooting import CLOSED, SHOTS
+from .shot import coordinates, place, shot_at
 
 
 @njit(error_model="numpy", nogil=True)
 def sweep(
-    shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
+    close, shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
     rtol, hmax, budget, out, ends, miss, kinds, still,
 ):  # fmt: skip
     """Close the orbits of consecutive points, each started from those before; stop where one does not close.
 
     `past` (4, n): scaled states of the points before, newest first, `known` of them, and the step size
     relative to the period in ``past[3, 0]``; `past_mode` the newest modes. `coefficients`: (1, nh) scratch
-    of the drive. Returns points done, outcome of the last, points known.
+    of the drive; `close`: address of `shooting.close`. Returns points done, outcome of the last, points
+    known.
     """
-    shot, samples, coefficients, amplitudes, omegas = (
-        lean(shot), lean(samples), lean(coefficients), lean(amplitudes), lean(omegas),
+    at, shot = shot, shot_at(shot)
+    samples, coefficients, amplitudes, omegas = (
+        lean(samples), lean(coefficients), lean(amplitudes), lean(omegas),
     )  # fmt: skip
     power, past, past_mode, out, ends = lean(power), lean(past), lean(past_mode), lean(out), lean(ends)
     n = power.shape[0]
@@ -53,10 +56,14 @@ def sweep(
         period = 2.0 * math.pi / omega
         shot.clock[2] = past[3, 0] * period
         shot.tally[0] = 0
-        outcome, miss[p] = close(
-            shot, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol, 0.0,
-            hmax * period, out[p], budget, SHOTS, eager,
+        outcome = call_native(
+            close,
+            (
+                at, drive, 0.5 * period if mirrored else period, x, mode, mirrored, rtol, 0.0,
+                hmax * period, out[p], budget, SHOTS, eager,
+            ),
         )  # fmt: skip
+        miss[p] = shot.error[0]
         past[3, 0] = min(shot.clock[2] / period, 0.1)
         if outcome != CLOSED:
             return p, outcome, known

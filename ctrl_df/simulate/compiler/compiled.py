@@ -23,23 +23,24 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba import types
 from numba.core import ccallback, config, event, sigutils
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
 from .notice import Notice
-from .parts import PartCompiler
+from .parts import LeanCompiler, PartCompiler
 
 _PACKAGE = Path(__file__).resolve().parents[2]
 _IMPORT = re.compile(r"^from[ ]+(\.+)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n(]*)", re.MULTILINE)
-_COMPILED = re.compile(r"^@(njit|part|apart|intrinsic|numba\.njit)\b", re.MULTILINE)
+_COMPILED = re.compile(r"^@(njit|part|apart|intrinsic|numba\.njit)\b|^\w+ = \w+\.opener\(", re.MULTILINE)
 
 
 def njit(cache=True, **options) -> Any:
     """Decorate as ``numba.njit(**options)``, with the machine code kept where `KeptCode` finds a place."""
 
     def decorate(function):
-        dispatcher: Any = numba.njit(**options)(function)
+        dispatcher: Any = numba.njit(pipeline_class=LeanCompiler, **options)(function)
         if cache and hasattr(dispatcher, "_cache"):  # a plain function under NUMBA_DISABLE_JIT
             _keep(dispatcher, function)
         return dispatcher
@@ -65,7 +66,15 @@ def part(function=None, *, inline=False) -> Any:
     )
     if inline:
         options["forceinline"] = True
-    return numba.njit(pipeline_class=PartCompiler, **options)(function)
+    return _once(numba.njit(pipeline_class=PartCompiler, **options)(function))
+
+
+def _once(dispatcher: Any) -> Any:
+    """Let a constant among the arguments be a number like any other: no form of the function for each."""
+    template = getattr(dispatcher, "get_call_template", None)
+    if template is not None:
+        dispatcher.get_call_template = lambda args, kws: template(tuple(map(types.unliteral, args)), kws)
+    return dispatcher
 
 
 def cfunc(signature, law) -> Any:
@@ -73,7 +82,8 @@ def cfunc(signature, law) -> Any:
     args, returns = sigutils.normalize_signature(signature)
 
     def uncompiled() -> Any:
-        return ccallback.CFunc(law, (args, returns), {}, {})
+        compiler: Any = LeanCompiler
+        return ccallback.CFunc(law, (args, returns), {}, {}, pipeline_class=compiler)
 
     compiled = uncompiled()
     if _is_ours(law):

@@ -1,14 +1,47 @@
-"""Parts of compiled functions: lowered once, machine code only within the function that uses them."""
+"""Functions that exist only within those that call them, and how all machine code of the package is made.
+
+numba makes machine code of every function it compiles, then copies what a function calls into it and
+optimizes everything again. Of a part of the engine nobody wants machine code: `PartCompiler` ends with its
+LLVM code, which is optimized once, together with the function that uses it.
+
+numba optimizes for long loops over arrays: it vectorizes and unrolls, each loop in several versions. The
+engine's loops go over the few states of a system; there such versions cost time to make and time to choose
+from. `LeanCompiler` leaves them out, and simplifies each function once instead of three times.
+"""
 
 from __future__ import annotations
 
+from llvmlite import binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes
+
+SPEED = 2  # of LLVM's levels; 1 makes the steps of Runge-Kutta methods half as fast, 3 nothing faster
+INLINED = 100  # size up to which functions are copied into others; larger ones are no faster for it
 
 
-class PartLibrary(JITCodeLibrary):
+class LeanLibrary(JITCodeLibrary):
+    """Machine code of a function and its parts, optimized once, without versions of its loops."""
+
+    def _optimize_functions(self, ll_module):
+        """Leave it to the one time that all are optimized."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self):
+        if not hasattr(llvm, "create_pipeline_tuning_options"):  # before llvmlite 0.44
+            super()._optimize_final_module()
+            return
+        tuning = llvm.create_pipeline_tuning_options(speed_level=SPEED)
+        tuning.loop_vectorization = tuning.slp_vectorization = False
+        tuning.loop_unrolling = tuning.loop_interleaving = False
+        tuning.inlining_threshold = INLINED
+        builder = llvm.create_pass_builder(self._codegen._tm, tuning)
+        builder.getModulePassManager().run(self._final_module, builder)
+
+
+class PartLibrary(LeanLibrary):
     """Code that others link in: neither optimized by itself nor turned into machine code."""
 
     def finalize(self):
@@ -18,6 +51,19 @@ class PartLibrary(JITCodeLibrary):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LeanLowering(NativeLowering):
+    """Lower a function into a `LeanLibrary`."""
+
+    _name = "lean_lowering"
+
+    def run_pass(self, state):
+        """Lower as numba does."""
+        state.library = LeanLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().run_pass(state)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -38,14 +84,24 @@ class PartLowering(NativeLowering):
         return True
 
 
-class PartCompiler(CompilerBase):
-    """numba's pipeline with `PartLowering` in the place of its own."""
+class LeanCompiler(CompilerBase):
+    """numba's pipeline with a lowering of its own in the place of numba's."""
+
+    lowering = LeanLowering
+    needless = ()
 
     def define_pipelines(self):
         """Return the one pipeline."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes._finalized = False
-        passes.add_pass_after(PartLowering, NativeLowering)
-        passes.passes = [p for p in passes.passes if p[0] is not NativeLowering]
+        passes.add_pass_after(self.lowering, NativeLowering)
+        passes.passes = [p for p in passes.passes if p[0] not in (NativeLowering, *self.needless)]
         passes.finalize()
         return [passes]
+
+
+class PartCompiler(LeanCompiler):
+    """The same for parts, in which there are neither closures nor expressions of arrays."""
+
+    lowering = PartLowering
+    needless = (InlineClosureLikes, NopythonRewrites)

@@ -144,7 +144,7 @@ def lean_type(kind: Any) -> Any:
     """Type of a value once it is lean."""
     if isinstance(kind, types.Array):
         return View(kind.dtype, kind.ndim)
-    if isinstance(kind, types.NamedTuple):
+    if isinstance(kind, types.NamedTuple | types.NamedUniTuple):
         return types.NamedTuple([lean_type(k) for k in kind.types], kind.instance_class)
     if isinstance(kind, types.Tuple | types.UniTuple):
         return types.Tuple([lean_type(k) for k in kind.types])
@@ -160,7 +160,7 @@ def _lean_value(context, builder, kind: Any, value):
         for k, n in enumerate(cgutils.unpack_tuple(builder, array.shape)):
             setattr(made, f"n{k}", n)
         return made._getvalue()
-    if isinstance(kind, types.Tuple | types.UniTuple | types.NamedTuple):
+    if isinstance(kind, types.Tuple | types.UniTuple | types.NamedTuple | types.NamedUniTuple):
         values = [
             _lean_value(context, builder, k, builder.extract_value(value, i))
             for i, k in enumerate(kind.types)

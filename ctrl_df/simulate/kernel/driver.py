@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,32 +13,23 @@ from ..compiler.compiled import apart, njit, part
 from ..compiler.native import call_native, native_address
 from ..compiler.views import lean
 from ..program.layout import (
-    CURVED,
-    F_ASKED,
-    F_SIZE,
     H_AFFINE,
     H_BUMP,
     H_DELAYS,
     H_HISTORY,
-    H_NG,
-    H_NX,
-    H_NY,
     H_TRACK,
-    NG,
-    STRAIGHT,
-    Y_SIZE,
     Drive,
     G,
     Program,
 )
 from . import history
-from .affine import HARMONICS, Memory, crossing, forced, memory, recall, series, shrink
-from .exponential import Bend, bend_memory
+from .affine import HARMONICS, crossing, forced, recall, series, shrink
 from .flow import rates
-from .glide import Glide, forget_run, glide, glide_memory
+from .glide import forget_run
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
+from .space import space_at, workspace
 from .stepper import grains, inside, prepare, prepare8, roughness, step
 
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
@@ -53,64 +43,6 @@ WAIT = 3  # steps at most until constant propagators are tried again
 GRAINS = 200  # steps after which rounding is asked anew
 REACH = 1e-4  # of a step: the time over which rates of inputs are taken
 SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
-
-
-class Space(NamedTuple):
-    """Scratch arrays of a run; see `workspace`."""
-
-    work: tuple  # signals, inputs and the history of delays; forces; a state
-    k: np.ndarray  # rates of the stages of a step
-    poly: np.ndarray  # interpolant
-    x1: np.ndarray  # states
-    xi: np.ndarray
-    dx: np.ndarray
-    size: np.ndarray  # running size of each state
-    grain: np.ndarray  # see `grains`
-    g: np.ndarray  # margins
-    g0: np.ndarray
-    gtol: np.ndarray
-    lowest: np.ndarray
-    norm: np.ndarray
-    owner: np.ndarray  # node of each margin
-    memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
-    store: Memory
-    tracks: Glide
-    bend: Bend
-
-
-def workspace(prog, delays: bool = False):
-    """Scratch arrays of a run, made once: compiled code that counts no references needs memory from outside.
-
-    With `delays` the work vector also holds the history of pure delays, part of the state of the program. Who
-    moves states about without it cannot treat such a program.
-    """
-    n, ng = int(prog.ints[H_NX]), int(prog.ints[H_NG])
-    past = int(prog.ints[H_DELAYS]) * Y_SIZE
-    if past and not delays:
-        raise ValueError(
-            "exact orbits need a state of finitely many numbers; this system has a pure delay inside, whose "
-            "state is a whole history. Find its motion by simulation (event_response), or put a lag of the "
-            "same time (input_lag) in its place."
-        )
-    work = (np.zeros(int(prog.ints[H_HISTORY]) + past), np.zeros(F_SIZE), np.zeros(max(n, 4) + 2))
-    work[1][F_ASKED] = STRAIGHT | CURVED
-    owner = np.zeros(ng + 1, np.int64)
-    for node in range(prog.nodes.shape[0]):
-        owner[prog.nodes[node, G] : prog.nodes[node, G] + prog.nodes[node, NG]] = node
-    vectors = [np.zeros(n) for _ in range(5)] + [np.zeros(ng + 1) for _ in range(5)]
-    store = memory(prog)
-    tracks = glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY]))
-    return Space(
-        work,
-        np.zeros((16, n)),
-        np.zeros((20, n)),
-        *vectors,
-        owner,
-        np.zeros(3),
-        store,
-        tracks,
-        bend_memory(store),
-    )
 
 
 @part(inline=True)
@@ -128,7 +60,7 @@ def address() -> int:
     drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
     arguments = (
         prog, drive, none, none, counts, 0.0, none, rows, rows, 8, 0.0, 0.0, 0.0, True, True, -1, 0.0, 1, 0.0,
-        0, none, counts, counts, none, rows, 0, workspace(prog), np.zeros((0, 0), complex), 0.0,
+        0, none, counts, counts, none, rows, 0, workspace(prog).at, np.zeros((0, 0), complex), 0.0,
     )  # fmt: skip
     return native_address(advance, arguments)
 
@@ -143,7 +75,7 @@ def run(
     return call_native(engine, (
         lean(prog), lean(drive), lean(clock), lean(x), lean(mode), t_end, lean(tout), lean(xout), lean(yout),
         order, rtol, atol, hmax, locate, stop_at_event, watch, watch_level, watch_sign, height, max_steps,
-        lean(log_t), lean(log_n), lean(log_k), lean(before), lean(scale), fresh, lean(space), lean(spectrum),
+        lean(log_t), lean(log_n), lean(log_k), lean(before), lean(scale), fresh, space, lean(spectrum),
         omega,
     ))  # fmt: skip
 
@@ -159,13 +91,18 @@ def advance(
     ``clock``: [time, next output index, last step size, steps used, events so far, events in this log,
     segment, on section, margin of the last event, steps by constant propagators].
     ``before``: state just before the event that stopped the run. ``scale`` (4, ng): see `renewed`.
-    ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: scratch arrays of `workspace`.
+    ``fresh``: 1 to settle modes first (a new state), 0 to go on. ``space``: address of a `workspace`.
     ``spectrum``: (ny, kmax + 1) complex, to which the integrals of y exp(-j k omega t) over the run are
     added; no columns, no integrals. Returns the reason (module constants).
     """
-    work, k, poly, x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner, memo, store, tracks, bend = (
-        space
-    )
+    room = space_at(space)
+    work, k, poly, x1, xi, dx, size, grain = (
+        room.work, room.k, room.poly, room.x1, room.xi, room.dx, room.size, room.grain,
+    )  # fmt: skip
+    g, g0, gtol, lowest, norm, owner, memo, store, paced, led = (
+        room.g, room.g0, room.gtol, room.lowest, room.norm, room.owner, room.memo, room.store, room.paced,
+        room.led,
+    )  # fmt: skip
     n, ng = x.shape[0], scale.shape[1]
     t, index, h = clock[0], int(clock[1]), clock[2]
     segment = int(clock[6])
@@ -176,7 +113,8 @@ def advance(
     affine = prog.ints[H_AFFINE] == 1 and drive.address == 0 and nh <= HARMONICS
     curved = prog.ints[H_AFFINE] == 2 and drive.address == 0
     gliding = (
-        (affine or curved)
+        paced[0] != 0
+        and (affine or curved)
         and locate
         and watch < 0
         and nh <= 1
@@ -205,7 +143,7 @@ def advance(
     for i in range(ng):
         g[i] = math.inf  # the section's margin must not outlive the run that watched it
     if fresh == 1:
-        forget_run(store, tracks)
+        forget_run(store, room.tracks)
         for j in range(n):
             size[j], grain[j] = abs(x[j]), 0.0
         if delays:
@@ -254,22 +192,20 @@ def advance(
                 skip -= 1
             elif gliding:
                 begun = t
-                if affine:
-                    gone, t, segment, index, next_tick, ticked = glide(
-                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, None,
-                    )  # fmt: skip
-                else:
-                    gone, t, segment, index, next_tick, ticked = glide(
-                        prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
-                        xout, yout, size, scale, rtol, atol, h, grain, next_tick, x1, xi, dx, g, bend,
-                    )  # fmt: skip
+                gone = call_native(
+                    paced[0],
+                    (
+                        prog, drive, space, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
+                        scale, rtol, atol, h, next_tick,
+                    ),
+                )  # fmt: skip
+                t, segment, index, next_tick = led[0], int(led[1]), int(led[2]), led[3]
                 if gone > 0:
                     clock[9] += gone
                     skip = wait = 0
                     if affine:
                         h = max(h, t - begun)
-                    known, jumped = False, ticked or held
+                    known, jumped = False, led[4] == 1.0 or held
                     continue
                 if curved:
                     skip = wait = min(2 * wait + 1, WAIT)

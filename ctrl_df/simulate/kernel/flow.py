@@ -65,7 +65,9 @@ def external(prog, drive, t, segment, w):
             c = drive.harmonics[i, k]
             if c != 0:
                 angle = k * drive.omega * t
-                value += c.real * math.cos(angle) - c.imag * math.sin(angle)
+                value += c.real * math.cos(angle)
+                if c.imag != 0.0:
+                    value -= c.imag * math.sin(angle)
         w[at + i] = value
 
 

@@ -199,7 +199,11 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             if store.ready[place] == USELESS:
                 break
             stale = stale or place != before
-            if not _straight(tracks, place, stale, jumped, scale, n):
+            if not _straight(
+                here, ahead, bound, tracks.slack, tracks.curved[place], tracks.active[place],
+                tracks.count[place], tracks.fed[place], tracks.owner[place], tracks.first[place],
+                tracks.column[place], tracks.value[place], stale, jumped, scale, n,
+            ):  # fmt: skip
                 break
             stale = False
         before = place
@@ -231,32 +235,114 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
             for j in range(n):
                 xout[index, j] = x[j]
             index += 1
+        if bend is None and next_tick == math.inf and segment + 1 < nt and t == time[segment + 1]:
+            gone, index = _march(
+                drive,
+                tracks,
+                place,
+                which,
+                t,
+                t_end,
+                rtol,
+                segment,
+                index,
+                x,
+                tout,
+                xout,
+                yout,
+                size,
+                scale,
+                n,
+                nr,
+                ny,
+            )
+            if gone > 0:
+                segment += gone
+                done += gone
+                t = time[segment + 1]
+            stale = True  # what has stopped it is looked at anew
     return done, t, segment, index, next_tick, ticked
 
 
+@part
+def _march(
+    drive, tracks, place, which, t, t_end, rtol, segment, index, x, tout, xout, yout, size, scale, n, nr, ny
+):  # fmt: skip
+    """Go on from sample to sample as long as nothing but the inputs changes, every sample an output or none.
+
+    These are the steps of `glide`, without what it asks at each of them. `t` is the time of the sample after
+    `segment`. Returns how many, and the next output's index.
+    """
+    time, samples = drive.time, drive.samples
+    here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
+    curved, active, live, fed = (
+        tracks.curved[place], tracks.active[place], tracks.count[place], tracks.fed[place],
+    )  # fmt: skip
+    owner, first, column = tracks.owner[place], tracks.first[place], tracks.column[place]
+    values, length = tracks.value[place], tracks.length[which]
+    at, begun, ramped = n + 2 * nr, segment, drive.linear == 1
+    constant = drive.harmonics.shape[1] > 0
+    while segment + 2 < time.shape[0]:
+        t1 = time[segment + 2]
+        near = NEAR * rtol * (t1 - t) + 2.0 * EPS * (abs(t) + abs(t1))
+        due = index < tout.shape[0] and tout[index] == t1
+        if (
+            t1 > t_end
+            or abs(length - (t1 - t)) > near
+            or (not due and index < tout.shape[0] and tout[index] <= t1 + near)
+        ):
+            break
+        for k in range(nr):
+            value = drive.harmonics[k, 0].real if constant else 0.0
+            value += samples[k, segment + 1]
+            here[n + k] = ahead[n + k] = value
+            if ramped:
+                slope = (samples[k, segment + 2] - samples[k, segment + 1]) / (t1 - t)
+                ahead[n + k] = value + slope * (t1 - t)
+                here[n + nr + k] = ahead[n + nr + k] = slope
+        here[at], ahead[at] = t, t1
+        if not _straight(
+            here, ahead, bound, slack, curved, active, live, fed, owner, first, column, values, False,
+            not ramped, scale, n,
+        ):  # fmt: skip
+            break
+        for j in range(n):
+            x[j] = here[j] = ahead[j]
+            size[j] = max(abs(ahead[j]), 0.98 * size[j])
+        if due:
+            for i in range(ny):
+                yout[index, i] = row_times(first, column, values, n + fed.shape[0] + i, ahead)
+            for j in range(n):
+                xout[index, j] = x[j]
+            index += 1
+        segment += 1
+        t = t1
+    return segment - begun, index
+
+
 @part(inline=True)
-def _straight(tracks, place, stale, jumped, scale, n):
-    """Take an affine step from `here` to `ahead`; whether no event lies inside.
+def _straight(
+    here, ahead, bound, slack, curved, active, live, fed, owner, first, column, values, stale, jumped, scale,
+    n,
+):  # fmt: skip
+    """Take an affine step from `here` to `ahead`, fields of a `Glide`; whether no event lies inside.
 
     `stale`: bounds, slack and the margins here are to be taken anew; `jumped`: the inputs have.
     """
-    here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
     for j in range(here.shape[0] - 1):
         if abs(here[j]) > bound[j]:
             bound[j] = 2.0 * abs(here[j])
             stale = True
-    live = tracks.count[place]
     if stale:
         for k in range(live):
             value = 0.0
             for j in range(here.shape[0]):
-                value += tracks.curved[place, tracks.active[place, k], j] * bound[j]
+                value += curved[active[k], j] * bound[j]
             slack[k] = value
     # margins at the start, where they are not those at the end of the step before
-    first, column, values = tracks.first[place], tracks.column[place], tracks.value[place]
     for k in range(live):
-        m = tracks.active[place, k]
-        if stale or (jumped and tracks.fed[place, m] == 1):
+        m = active[k]
+        if stale or (jumped and fed[m] == 1):
             if not row_times(first, column, values, n + m, here) > slack[k]:
                 return False
     for j in range(n):
@@ -264,11 +350,11 @@ def _straight(tracks, place, stale, jumped, scale, n):
         if not abs(ahead[j]) < math.inf:
             return False
     for k in range(live):
-        m = tracks.active[place, k]
-        owner, value = tracks.owner[place, m], row_times(first, column, values, n + m, ahead)
+        m = active[k]
+        value = row_times(first, column, values, n + m, ahead)
         if not value > slack[k]:
             return False
-        scale[0, owner] = max(scale[0, owner], value)
+        scale[0, owner[m]] = max(scale[0, owner[m]], value)
     return True
 
 

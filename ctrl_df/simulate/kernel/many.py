@@ -19,6 +19,8 @@ from ..compiler.native import call_native
 from ..compiler.views import cut, lean
 from ..program.layout import H_NG, Drive, Program
 from . import driver
+from .pace import keep_pace
+from .space import space_at, workspace
 
 NOT_BEGUN, UNFINISHED = -1, -2
 """Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
@@ -73,7 +75,8 @@ class Desk(NamedTuple):
     run: int
     nodes: np.ndarray
     ints: np.ndarray
-    space: driver.Space
+    space: int
+    words: np.ndarray  # of the space
     scale: np.ndarray
     before: np.ndarray
     spectrum: np.ndarray
@@ -102,13 +105,15 @@ def make_desk(engine, states: np.ndarray, keep: bool, logged: bool, stop: np.nda
     """Allocate what a thread needs for the runs of one program; `logged`: keep their events."""
     program = engine.program
     n, ng = engine.nstates, int(program.ints[H_NG]) + 1
-    space = driver.workspace(program, delays=True)
+    space = workspace(program, delays=True)
+    keep_pace(program, space)
     room = _LOGS * EVENTS if logged else 1
     log_t, log_n, log_k, log_row = (np.zeros(room, kind) for kind in (float, np.int64, np.int64, np.int64))
     scale, before = np.zeros((4, ng)), np.zeros(n)
     spectrum = np.zeros((engine.noutputs, 0), complex)
     return Desk(
-        driver.address(), program.nodes, program.ints, space, scale, before, spectrum, states, int(keep),
+        driver.address(), program.nodes, program.ints, space.at, space.words, scale, before, spectrum, states,
+        int(keep),
         log_t, log_n, log_k, log_row, np.array([0, -1]), max(int(_FEW_STEPS / (1 + (n / 6) ** 2)), 10), stop,
     )  # fmt: skip
 
@@ -132,7 +137,8 @@ def run_rows(desk, rows, drives, par, how, todo, begin):
 @part
 def _one(desk, rows, drives, par, how, row):
     """Run one row to its end; False where it has to stop before."""
-    memo = desk.space.memo
+    space = space_at(desk.space)
+    memo = space.memo
     clock, first = rows.clock[row], rows.first[row]
     times = cut(rows.times, first, rows.count[row])
     outputs = cut(rows.outputs, rows.at[row], times.shape[0])
@@ -148,7 +154,7 @@ def _one(desk, rows, drives, par, how, row):
         fresh = 1
         if desk.tally[1] != rows.par[row]:
             # maps of modes that were learnt with other parameters
-            desk.space.store.order[0] = 0
+            space.store.order[0] = 0
             desk.tally[1] = rows.par[row]
         for i in range(desk.scale.shape[0]):
             for j in range(desk.scale.shape[1]):

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..compiler.compiled import part
-from ..program.layout import DELAY, H_DELAYS, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
+from ..program.layout import DELAY, FEED, H_DELAYS, H_NS, H_NY, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
 from . import history
 from .flow import combine, external, node_input, refresh, signals
 from .modes import advance_state, answers_at_once, hold, settle
@@ -93,21 +93,48 @@ def record_inside(prog, drive, segment, t, theta, length, x, mode, work, terms, 
 
 @part
 def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, poly, xi, spectrum, omega):
-    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss' quadrature."""
-    w = work[0]
-    for i in range(NODES.shape[0]):
+    """Add a step's share of the integrals of the outputs against exp(-j k omega t), by Gauss' quadrature.
+
+    The nodes lie in pairs about the middle of the step, and so do the phases of the waves there.
+    """
+    w, last, driven = work[0], NODES.shape[0] - 1, _driven(prog)
+    middle = omega * (t + 0.5 * theta * length)
+    center, aside = complex(math.cos(middle), -math.sin(middle)), complex(1.0, 0.0)
+    for step in range(NODES.shape[0]):
+        i = step // 2 if step % 2 == 0 else last - step // 2
         at = theta * NODES[i]
         time = t + at * length
         inside(terms, at, x, poly, xi)
-        refresh(prog, drive, segment, time, xi, mode, w)
+        if driven:
+            external(prog, drive, time, segment, w)
+        signals(prog, time, xi, mode, w)
         share = theta * length * WEIGHTS[i]
-        turn = complex(math.cos(omega * time), -math.sin(omega * time))
+        if step % 2 == 0:
+            angle = omega * (NODES[i] - 0.5) * theta * length
+            aside = complex(math.cos(angle), -math.sin(angle))
+        else:
+            aside = aside.conjugate()
+        turn = center * aside
         for row in range(spectrum.shape[0]):
             value = share * combine(prog, prog.ints[prog.ints[H_OUT] + row], w)
             rotation = complex(1.0, 0.0)
             for harmonic in range(spectrum.shape[1]):
                 spectrum[row, harmonic] += value * rotation
                 rotation *= turn
+
+
+@part
+def _driven(prog):
+    """Whether signals or outputs follow external inputs without a state between."""
+    for n in range(prog.nodes.shape[0]):
+        if prog.nodes[n, FEED] == 1:
+            return True
+    for i in range(prog.ints[H_NY]):
+        row = prog.ints[prog.ints[H_OUT] + i]
+        for j in range(row + 1, row + 1 + 2 * prog.ints[row], 2):
+            if prog.ints[j] >= prog.ints[H_NS]:
+                return True
+    return False
 
 
 @part

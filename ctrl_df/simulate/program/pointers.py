@@ -71,6 +71,8 @@ def address(law: Callable, kind: str) -> int:
 
 def calls_python(address: int) -> bool:
     """Whether a law's address leads back into Python, because numba could not compile the law."""
+    if not _Guarded.made:
+        return False
     with _one_at_a_time:
         return any(
             place == address and not isinstance(kept, CFunc)  # pyright: ignore[reportGeneralTypeIssues]

@@ -1,0 +1,70 @@
+# pyright: reportCallIssue=false
+# (numba's stubs know neither its private options nor the arguments of an intrinsic)
+"""Steps at a regular pace, called by the driver through their address: compiled for runs that have one."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..compiler.compiled import apart, part
+from ..compiler.native import native_address
+from ..program.layout import H_AFFINE, H_HISTORY, Drive, Program
+from .glide import glide
+from .space import Space, space_at, workspace
+
+
+def keep_pace(program: Program, space: Space) -> None:
+    """Let runs in a space take steps at a regular pace, where the laws of the program allow them."""
+    if program.ints[H_AFFINE] and not space.paced[0]:
+        space.paced[0] = _address(program.ints[H_AFFINE] == 2)
+
+
+@functools.cache
+def _address(curved: bool) -> int:
+    """Return the address of the steps, compiled now if need be."""
+    none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
+    program = Program(np.zeros((0, 13), np.int64), np.zeros(H_HISTORY + 1, np.int64), none)
+    drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
+    arguments = (
+        program, drive, workspace(program).at, 0, 0.0, 0.0, 0.0, 0, 0, none, counts, none, rows, rows, rows,
+        0.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
+    return native_address(curved_pace if curved else affine_pace, arguments)
+
+
+@apart
+def affine_pace(
+    prog, drive, space, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout, scale, rtol, atol,
+    long, next_tick,
+):  # fmt: skip
+    """`glide` where all laws are affine; returns the steps gone, and leaves in `Space.led` where they led."""
+    room = space_at(space)
+    return _led(room, glide(
+        prog, drive, room.work, room.store, room.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+        xout, yout, room.size, scale, rtol, atol, long, room.grain, next_tick, room.x1, room.xi, room.dx,
+        room.g, None,
+    ))  # fmt: skip
+
+
+@apart
+def curved_pace(
+    prog, drive, space, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout, scale, rtol, atol,
+    long, next_tick,
+):  # fmt: skip
+    """Do the same where some laws are not."""
+    room = space_at(space)
+    return _led(room, glide(
+        prog, drive, room.work, room.store, room.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
+        xout, yout, room.size, scale, rtol, atol, long, room.grain, next_tick, room.x1, room.xi, room.dx,
+        room.g, room.bend,
+    ))  # fmt: skip
+
+
+@part(inline=True)
+def _led(room, gone):
+    """Keep where `glide` has led; return the steps gone."""
+    room.led[0], room.led[1], room.led[2], room.led[3] = gone[1], gone[2], gone[3], gone[4]
+    room.led[4] = 1.0 if gone[5] else 0.0
+    return gone[0]
