@@ -99,9 +99,8 @@ def main() -> int:
                 f"{name:<20} {verdict:<10} {called:<36} {evidence:>10.1f}  {says}  {seconds:.0f} s",
                 flush=True,
             )
-    print(
-        f"{same} of {len(names)} {'the same in other units' if args.units else 'copies found as their originals'}"
-    )
+    said = "the same in other units" if args.units else "copies found as their originals"
+    print(f"{same} of {len(names)} {said}")
     return int(same < len(names))
 
 
