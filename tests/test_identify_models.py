@@ -57,7 +57,7 @@ def eddy_brake(monkeypatch):
     del sys.modules["own_effect"]
 
 
-def brake_record(seed, dt=2e-3, n=4000):
+def brake_record(seed, dt=2e-3, n=2500):
     """Return a run of mass, viscous drag and brake, integrated by SciPy, with white noise."""
     rng = np.random.default_rng(seed)
     t = dt * np.arange(n)
@@ -88,7 +88,7 @@ def test_an_effect_of_the_users_own_is_found(eddy_brake):
 
 
 def test_a_loop_is_accepted_for_its_block():
-    rig = rigs.draw("linear_spring", 3, snr_db=60, closed_loop=True, n=4000)
+    rig = rigs.draw("linear_spring", 3, snr_db=60, closed_loop=True, n=2000)
     train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
     loop = cdf.closed_loop(cdf.pid(*rig.controller[:4]), rig.baseline)
     channels = {"reference": rig.train[0].r}

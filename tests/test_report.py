@@ -22,9 +22,9 @@ BROWSER = next(
 
 @pytest.fixture(scope="module")
 def study():
-    rig = rigs.draw("linear_spring", 14, snr_db=60, n=4000)
+    rig = rigs.draw("linear_spring", 14, snr_db=60, n=2000)
     train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
-    return improve(rig.baseline, train, held, candidates=("linear_spring", "quadratic_drag"), max_effects=2)
+    return improve(rig.baseline, train, held, candidates=("linear_spring", "quadratic_drag"), max_effects=1)
 
 
 @pytest.fixture(scope="module")
