@@ -39,7 +39,7 @@ def pictures(record):
     fitted = cdf.refit(base, record).comparison
     names = ["constant_force", "quadratic_drag"]
     study = cdf.improve(base, record, candidates=names)
-    A, w = np.geomspace(6, 50, 5), np.geomspace(3, 20, 6)
+    A, w = np.geomspace(6, 50, 4), np.geomspace(3, 20, 4)
     N = cdf.describing_function_family(axis.with_effect(cdf.QuadraticDrag(30.0)), A, w).N
     table = cdf.FrequencyMeasurement(A, w, N)
     found = cdf.diagnose(axis, table, candidates=["quadratic_drag", "viscous"])

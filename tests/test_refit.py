@@ -40,7 +40,7 @@ def test_standard_errors_hold_for_wrong_parameters():
     "hidden", ["stribeck", "bristle", "input_delay", "backlash", "compliance", "hard_stop"]
 )
 def test_true_structure_reaches_the_noise(hidden):
-    rig = rigs.draw(hidden, 3)
+    rig = rigs.draw(hidden, 3, n=5000)
     block, record = rig.true_block, rig.train[0]
     shift = np.random.default_rng(0)
     free = [k for k, p in block.parameters.items() if p.free]
