@@ -55,6 +55,7 @@ def test_limit_cycles_as_text_and_json(model, capsys):
     assert exact[0]["stable"] is False
 
 
+@pytest.mark.quick
 def test_limit_cycles_of_a_loop_with_a_delay(tmp_path, capsys):
     path = tmp_path / "late.toml"
     path.write_text(

@@ -63,7 +63,7 @@ def test_free_forces_tell_what_a_model_misses_and_where():
     assert missed.kind == "time" and missed.evidence > 100
 
 
-@pytest.mark.parametrize("effect", [pytest.param("linear_spring", marks=pytest.mark.quick), "input_delay"])
+@pytest.mark.parametrize("effect", ["linear_spring", "input_delay"])
 def test_a_single_effect_is_named_first(effect):
     rig = rigs.draw(effect, 11, snr_db=60, n=4000)
     train, held = of(rig)

@@ -60,6 +60,7 @@ def test_the_linear_border_is_that_of_the_cubic(fixed):
         np.testing.assert_allclose(9 * every["ki"], (every["kd"] + 0.5) * every["kp"], rtol=2e-3)
 
 
+@pytest.mark.quick
 def test_across_a_fold_two_cycles_vanish():
     found = cdf.limit_cycle_map(FRICTION, kp=(500, 4000), ki=(0, 80000), kd=130, n=10, exact_check=0)
     (fold,) = found.folds
@@ -99,9 +100,9 @@ def test_a_saturation_cycles_above_the_critical_gain():
 @pytest.mark.parametrize(
     ("element", "plant", "checks"),
     [
-        (cdf.relay(1.0), LAG, 4),
-        (cdf.dead_zone(0.5), LAG, 4),
-        (cdf.relay_with_hysteresis(1.0, 0.1), LAG, 4),
+        (cdf.relay(1.0), LAG, 8),
+        (cdf.dead_zone(0.5), LAG, 8),
+        (cdf.relay_with_hysteresis(1.0, 0.1), LAG, 8),
         (cdf.play(0.2), ct.tf([1], [1, 1, 0]), 0),
     ],
     ids=["relay", "dead zone", "hysteresis", "play"],

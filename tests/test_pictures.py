@@ -128,6 +128,7 @@ def test_an_unreliable_prediction_is_not_drawn_as_stable(pictures):
     plt.close("all")
 
 
+@pytest.mark.quick
 def test_curves_between_coarse_nodes_are_smooth():
     family = cdf.describing_function_family(
         cdf.friction_mass(9, 5, 0.5), np.geomspace(6, 60, 5), np.geomspace(2, 30, 5)

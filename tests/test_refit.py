@@ -91,6 +91,7 @@ def test_quantum_is_read_from_the_record():
     assert "sensor_quantization.step" not in fit.parameters
 
 
+@pytest.mark.quick
 def test_loop_is_fitted_through_its_block():
     rig = rigs.draw_wrong_parameters(8, closed_loop=True)
     record = rig.train[0]

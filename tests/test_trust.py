@@ -326,6 +326,7 @@ def test_a_start_beside_an_unstable_orbit_does_not_cycle_on_it():
     assert False not in stable and stable.count(True) == 4
 
 
+@pytest.mark.quick
 def test_the_path_of_a_rattle_reaches_its_orbit():
     """Under one force the gap has several motions; the path stays on the one it began on."""
     response = cdf.describing_function_response(

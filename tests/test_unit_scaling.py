@@ -24,7 +24,6 @@ def first(hidden, *rivals):
     return diagnosed(hidden, (hidden, *rivals))
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize("scale", SCALES)
 def test_rivals_are_ranked_alike(scale):
     before = first("linear_spring", *RIVALS)
