@@ -262,8 +262,14 @@ STATIC_FACTORS = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)
 RESTARTED_AGAIN, RESTARTS_KEPT = 2, 3
 """Times that a parameter that found a better minimum is moved once more; restarts that go on."""
 
+DAMPED = 4
+"""Times that a refused step of an initial state is damped tenfold: from 1e-3 to a step a tenth as long."""
+
 OPEN_RANGE = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """How far about a static level the segments are tried for the range that they leave open."""
+
+UNFOLLOWED = 0.7
+"""Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
 
 RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
 """Speeds to begin a segment with, over how far the estimate may be off."""

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-import numpy as np
-
 from ..arguments import check_window
 from ..estimation.fit import segment_lengths
 from ..estimation.multiple_shooting import Problem
-from ..estimation.noise_model import power
 from ..estimation.refit_records import blurred, doubts, refit_records
+from ..estimation.states import find_states
 from ..planning.inputs import input_that_separates
 from ..prediction.prepared import REFERENCE
-from ..prediction.segments import make_segments, split
+from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
-from ..thresholds import BEGINNINGS, SEGMENT_LEAST
+from ..thresholds import RESTARTS_KEPT, RTOL
 from .dataset import Dataset, Estimate
 
 
@@ -41,29 +39,9 @@ class TimeDataset(Dataset):
         self.check_segments(mode, window)
         mode = "windows" if mode == "auto" and window is not None else mode
         lengths = segment_lengths(model, self.records, mode, window)
-        problem = Problem(model, self.records, (), 10_000)
+        problem = Problem(model, self.records, (), 10_000, followed=RESTARTS_KEPT)
         cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
-        return self._comparison(model, cut, self._begun(problem, cut))
-
-    def _begun(self, problem: Problem, cut) -> list[np.ndarray]:
-        """Return the initial states of segments: found at once, or over their beginnings first.
-
-        The longer a segment, the more minima its error has over the state it begins in; a short beginning
-        hardly has any. Each way can end in a wrong one: the better counts.
-        """
-        found = []
-        for shares in ((), BEGINNINGS):
-            starts = None
-            for share in shares:
-                parts = [split(r, w, share, SEGMENT_LEAST) for r, w in zip(self.records, cut, strict=True)]
-                first = [p.only(np.isin(p.begins, w.begins)) for p, w in zip(parts, cut, strict=True)]
-                problem.stage(first, 1, starts)
-                problem.solve(np.zeros(0), iterations=5, tolerance=1e-2, robust=False)
-                starts = problem.nuisance
-            problem.stage(cut, 1, starts)
-            problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
-            found.append((power(problem.last), len(found), problem.nuisance))
-        return min(found, key=lambda f: f[:2])[2]
+        return self._comparison(model, cut, find_states(problem, cut, 1, RTOL))
 
     def _comparison(self, model, segments, starts, fitted: int = 0) -> Comparison:
         """Return the comparison of a model whose initial states in each segment are known already."""

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ..data.measurement import Measurement
+from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
-from ..thresholds import RTOL
+from ..thresholds import RESTARTS_KEPT, RTOL
 from .covariance import covariance_of
 from .multiple_shooting import Problem
 from .noise_model import NoiseModel
@@ -176,7 +177,7 @@ def fit_records(
     mode, window
         As for `compare`.
     thin : int
-        Samples a step of the input in all but the last iterations; 1: never thinned.
+        Samples a step of the input in all but the last iterations, at most; 1: never thinned.
     polish : int
         Iterations at full rate at the end; 0 leaves the fit at the thinned input.
     coarse : bool or None
@@ -193,13 +194,14 @@ def fit_records(
         Bound on the iterations over the full segments.
     """
     records = list(records)
+    thin = thinnable(records, thin)
     first = simulator_of(model, records[0])
     model = first.with_values(dict(start)) if start else model
     block = first.block if not start else simulator_of(model, records[0]).block
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
     begun = {k: p.value for k, p in block.parameters.items()} if names else {}
-    problem = Problem(model, records, names, budget, about=begun)
+    problem = Problem(model, records, names, budget, about=begun, followed=RESTARTS_KEPT)
     theta = problem.start()
     if coarse is None:
         coarse = start is None

@@ -24,6 +24,7 @@ from ..thresholds import GOOD, RTOL
 from .noise_model import power
 from .restarts import restart_segments, scan_gap_state
 from .sensitivity import OutputSensitivity
+from .states import descend, find_states
 from .variables import beforehand, step_of_sensor, variables_of
 
 Signals = list[np.ndarray]
@@ -33,7 +34,8 @@ class Problem:
     """Records, segments and free parameters of one fit.
 
     Call `stage` to set the segments, then `solve`; afterwards `last` holds the residuals, `nuisance` the
-    initial states, `slopes` the derivatives of the last step.
+    initial states, `slopes` the derivatives of the last step. `followed`: tries of where a segment begins
+    that are followed to their end; with none the best is taken where it errs far less as it is.
     """
 
     def __init__(
@@ -47,10 +49,12 @@ class Problem:
         begins=FREE,
         hopeless=(math.inf, 0),
         about=None,
+        followed=0,
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
+        self.followed = followed
         self.block = simulator_of(model, records[0]).block
         self.known = [facts_of(self.block, r) for r in records]
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
@@ -82,7 +86,7 @@ class Problem:
         self.simulators = [
             simulator_of(self.model, r, thin=thin, begins=self.begins, rtol=rtol) for r in self.records
         ]
-        self.segments = segments
+        self.segments, self.thin, self.rtol = segments, thin, rtol
         self.measured = [sensed(r).within(w.samples) for r, w in zip(self.records, segments, strict=True)]
         self.priors = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
         if starts is not None:
@@ -162,28 +166,63 @@ class Problem:
 
     # --- solving --------------------------------------------------------------------------------------
 
-    def solve(self, theta, iterations, tolerance, robust):
-        """Levenberg-Marquardt from `theta`; the initial states go along."""
+    def solve(self, theta, iterations, tolerance, robust, restarts=True):
+        """Levenberg-Marquardt from `theta`; the initial states go along.
+
+        `restarts`: whether segments that err far more than others are begun anew.
+        """
         if self.fresh:
             scan_gap_state(self, theta)
+            if self.followed and self._nonsmooth:
+                self._states_first(theta)
             self.fresh = False
         theta = self._descend(theta, iterations, tolerance, robust)
+        if not restarts:
+            return theta
         again = max(iterations // 2, 3)
         # without parameters a segment found lets the next one go on where it ends
         for _ in range(1 if self.names else 4):
             if not self._worth_restarting() or not restart_segments(self, theta):
                 break
             theta = self._descend(theta, again, tolerance, robust)
-        rough = any(e.nonsmooth for e in getattr(self.block, "effects", ()))
-        rough = rough and self.names and self.error_filter is None
         if (
-            rough
+            self._nonsmooth
             and self._worth_restarting()
             and self.nfev < self.budget
             and any(t.min() < 0.5 for t in self._trusts())
         ):
             theta = self._without_outliers(theta, again, tolerance, robust)
         return theta
+
+    @property
+    def _nonsmooth(self) -> bool:
+        """Whether events of the model come and go as its parameters move."""
+        effects = getattr(self.block, "effects", ())
+        return bool(self.names) and self.error_filter is None and any(e.nonsmooth for e in effects)
+
+    def _states_first(self, theta):
+        """Find the initial states alone: parameters would bend to make up for them, past events."""
+        alone = self.alone(theta)
+        self.nuisance = find_states(alone, self.segments, self.thin, self.rtol, self.nuisance)
+        self.priors = [np.maximum(p, np.abs(a)) for p, a in zip(self.priors, self.nuisance, strict=True)]
+        self.count(alone.nfev)
+
+    def _followed_states(self, theta, nuisance):
+        """Return the initial states after a few steps from `nuisance`, and what is left of the outputs."""
+        alone = self.alone(theta)
+        alone.stage(self.segments, self.thin, nuisance, self.rtol)
+        alone.solve(np.zeros(0), 2, 1e-2, False, restarts=False)
+        self.nfev += alone.nfev
+        return alone.nuisance, alone.last
+
+    def alone(self, theta, which=slice(None)) -> Problem:
+        """Return the problem of the initial states alone, for some of the records."""
+        model = self.simulators[0].with_values(self.values(theta) or {})
+        hopeless, records = (self.hopeless, self.outlook), self.records[which]
+        return Problem(
+            model, records, (), self.budget, None, self.error_filter, self.begins, hopeless,
+            followed=self.followed,
+        )  # fmt: skip
 
     def _without_outliers(self, theta, iterations, tolerance, robust):
         """Let the segments that fit decide the parameters, then find where the others begin.
@@ -217,6 +256,10 @@ class Problem:
         return trusts
 
     def _descend(self, theta, iterations, tolerance, robust, trusts=None):
+        if self.followed and not self.names and not any(s.continued for s in self.simulators):
+            self.last = self.residual(theta, self.nuisance)
+            descend(self, iterations, tolerance)
+            return theta
         damping, before, self.converged = 1e-3, 0.0, False
         nuisance = self.nuisance
         residual = self.residual(theta, nuisance)
@@ -241,8 +284,12 @@ class Problem:
                 trial_theta = np.array([v.clip(q) for v, q in zip(self.variables, theta + step, strict=True)])
                 trial_nuisance = back(trial_theta - theta)
                 trial = self.residual(trial_theta, trial_nuisance)
-                trial_cost = self.cost(trial, trial_nuisance, weights)
-                trial_cost += 0.5 * float(known @ (trial_theta - self.about) ** 2)
+                away = 0.5 * float(known @ (trial_theta - self.about) ** 2)
+                trial_cost = away + self.cost(trial, trial_nuisance, weights)
+                if trial_cost >= cost and self.followed and self._nonsmooth:
+                    # of some segments the begin may have to follow past an event
+                    trial_nuisance, trial = self._followed_states(trial_theta, trial_nuisance)
+                    trial_cost = away + self.cost(trial, trial_nuisance, weights)
                 if trial_cost < cost:
                     gain, accepted = 1 - trial_cost / cost, True
                     theta, nuisance, residual = trial_theta, trial_nuisance, trial
@@ -255,18 +302,19 @@ class Problem:
                 self.converged = True
                 break
             left = iterations - iteration - 1 + self.outlook
-            if self._too_far(residual, (1 - max(gain, before)) ** left):
+            self.nuisance, self.last = nuisance, residual
+            if self.too_far(1 - max(gain, before), left):
                 break
             before = gain
         self.nuisance, self.last = nuisance, residual
         return theta
 
-    def _too_far(self, residual, left) -> bool:
-        """Whether the error is hopeless still when so much of its square is left."""
+    def too_far(self, pace: float, left: int) -> bool:
+        """Whether the error is hopeless still after so many steps more, its square falling at this pace."""
         if math.isinf(self.hopeless):
             return False
-        total, count = self.power(residual)
-        return total / count * left > self.hopeless**2
+        total, count = self.power(self.last)
+        return total / count * pace**left > self.hopeless**2
 
     def count(self, runs):
         """Count simulations that seek initial states: bounded by themselves, outside the descent's budget."""
@@ -281,13 +329,14 @@ class Problem:
         by_start = []
         for k, simulator in enumerate(self.simulators):
             asked = [(self.segments[k], self.values(q), nuisance[k]) for q in thetas]
-            starts, widths = self._moved_starts(k, nuisance)
+            starts, widths = self._moved_starts(k, nuisance[k], self.segments[k], self.priors[k])
             values = self.values(theta)
             asked += [(self.segments[k], values, start) for start in starts if start is not None]
             signals = simulator.run_all(asked)
             for found, y in zip(moved, signals, strict=False):
                 found.append(y)
-            by_start.append(self._by_start(k, starts, widths, signals[len(thetas) :], base[k]))
+            by_start.append(_by_start(starts, widths, signals[len(thetas) :], base[k], self._by_place(k)))
+            self.nfev += len(starts) / len(self.simulators)
         self.nfev += len(thetas)
         columns: list[Signals] = [[] for _ in self.records]
         ready = iter(moved)
@@ -324,9 +373,23 @@ class Problem:
         self.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
-    def _moved_starts(self, k, nuisance):
+    def state_products(self, k, which, seen) -> np.ndarray:
+        """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
+
+        `which`, `seen`: of the segments (nw,) and the samples (n,) of a signal, booleans.
+        """
+        segments, simulator = self.segments[k], self.simulators[k]
+        some = segments.only(which)
+        starts, widths = self._moved_starts(k, self.nuisance[k][which], some, self.priors[k][which])
+        signals = simulator.run_all([(some, None, start) for start in starts if start is not None])
+        self.nfev += len(starts) * len(some) / len(segments) / len(self.segments)
+        base = (self.measured[k] - self.last[k])[seen]
+        js = _by_start(starts, widths, signals, base, self._by_place(k)[seen])
+        return _by_segment(js, np.empty((len(base), 0)), self.last[k][seen], np.ones(len(base)), some)
+
+    def _moved_starts(self, k, nuisance, segments, priors):
         """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
-        simulator, segments = self.simulators[k], self.segments[k]
+        simulator = self.simulators[k]
         starts, widths = [], []
         for j, name in enumerate(simulator.nuisances):
             if name == "x" and not simulator.position_dependent:
@@ -334,27 +397,32 @@ class Problem:
                 widths.append(None)
                 continue
             size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
-                self.priors[k][:, j],
+                priors[:, j],
                 {"x": 0.003 * self.known[k].position, "v": 0.003 * self.known[k].speed}.get(name, np.inf),
             )
-            moved = nuisance[k].copy()
+            moved = nuisance.copy()
             sign = np.where(moved[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             moved[:, j] += sign * size
             starts.append(moved)
             widths.append(segments.spread(sign * size))
         return starts, widths
 
-    def _by_start(self, k, starts, widths, signals, base) -> np.ndarray:
-        """Return derivatives (n, ns) of one record's output by its initial states, all segments at once."""
-        rows, moved = [], iter(signals)
-        for start, width in zip(starts, widths, strict=True):
-            rows.append(self._by_place(k) if start is None else (next(moved) - base) / width)
-        self.nfev += len(rows) / len(self.simulators)
-        return np.array(rows).T.reshape(len(self.measured[k]), len(rows))
-
     def _by_place(self, k) -> np.ndarray:
         """Return the derivatives by the place where no law knows it."""
         return sensed(self.records[k]).of_place(len(self.segments[k].samples))
+
+    def within_reach(self, k, states, rows=slice(None)) -> np.ndarray:
+        """Return initial states (nr, ns) of some segments, none farther off than it can be.
+
+        The data say where a segment begins: its start must not hide the faults of the model.
+        """
+        means, limit = self.means()[k][rows], 3 * self.priors[k][rows]
+        states = np.clip(states, means - limit, means + limit)
+        names = self.simulators[k].nuisances
+        if "slack" in names:
+            j = names.index("slack")
+            states[:, j] = np.clip(states[:, j], 0.0, 1.0)
+        return states
 
     def normal(self, jp, js, residual, weights, nuisance, damping=0.0):
         """Eliminate the initial states; return (H, g, back) with ``back(step)`` their own step."""
@@ -386,16 +454,10 @@ class Problem:
                 pieces.append((k, solved))
 
         def back(step):
-            moved = [a.copy() for a in nuisance]
+            moved = [self.within_reach(k, a.copy()) for k, a in enumerate(nuisance)]
             for k, solved in pieces:
-                limit = 3 * self.priors[k]
-                there = moved[k] + solved[:, :, p] - solved[:, :, :p] @ step
-                # The data say where a segment begins: its start must not hide the faults of the model.
-                moved[k] = np.clip(there, means[k] - limit, means[k] + limit)
-            for k, simulator in enumerate(self.simulators):
-                if "slack" in simulator.nuisances:
-                    j = simulator.nuisances.index("slack")
-                    moved[k][:, j] = np.clip(moved[k][:, j], 0.0, 1.0)
+                there = nuisance[k] + solved[:, :, p] - solved[:, :, :p] @ step
+                moved[k] = self.within_reach(k, there)
             return moved
 
         return h, g, back
@@ -435,6 +497,16 @@ class Problem:
         limits = np.array([v.step(q) for v, q in zip(self.variables, theta, strict=True)])
         largest = float(np.max(np.abs(step) / limits)) if p else 0.0
         return step / max(largest, 1.0)
+
+
+def _by_start(starts, widths, signals, base, by_place) -> np.ndarray:
+    """Return derivatives (n, ns) of one record's output by its initial states, all segments at once."""
+    moved = iter(signals)
+    rows = [
+        by_place if start is None else (next(moved) - base) / width
+        for start, width in zip(starts, widths, strict=True)
+    ]
+    return np.array(rows).T.reshape(len(base), len(rows))
 
 
 def _by_segment(states, parameters, residual, weights, segments: Segments) -> np.ndarray:

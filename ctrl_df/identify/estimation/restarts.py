@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..prediction.sensed import sensed
-from ..thresholds import GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS
+from ..thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, UNFOLLOWED
 
 
 def restart_segments(problem, theta) -> bool:
@@ -31,7 +31,7 @@ def restart_segments(problem, theta) -> bool:
             continue
         some = segments.only(bad)
         held = sensed(problem.records[k])
-        measured, least = held.within(some.samples), 0.7 * rms[bad] ** 2
+        measured, least = held.within(some.samples), BETTER**2 * rms[bad] ** 2
         problem.priors[k][bad, column] = problem.widest[k][bad, column]
         reach, chosen = problem.priors[k][bad, column], starts[bad].copy()
         before = simulator.carried_on(segments, values, starts)[bad]
@@ -47,16 +47,25 @@ def restart_segments(problem, theta) -> bool:
         trials = [starts[bad].copy() for _ in tries]
         for trial, (which, value) in zip(trials, tries, strict=True):
             trial[:, which] = value
+        powers = []
         for trial, y in zip(trials, simulator.run_all([(some, values, t) for t in trials]), strict=True):
             e = measured - y
             shift, gain = _shift(held, some, e, simulator.position_dependent)
-            powers = some.means(e**2) - gain
-            better = powers < least
+            powers.append(some.means(e**2) - gain)
             trial[:, 0] += shift
-            chosen[better], least = trial[better], np.minimum(least, powers)
+        order, alone = np.argsort(powers, axis=0, kind="stable"), problem.alone(theta, slice(k, k + 1))
+        for rank in range(max(problem.followed, 1)):
+            begun = np.array([trials[i][w] for w, i in enumerate(order[rank])])
+            ended = np.take_along_axis(np.array(powers), order[rank : rank + 1], axis=0)[0] / UNFOLLOWED
+            if problem.followed:
+                alone.stage([some], problem.thin, [begun], problem.rtol)
+                alone.solve(np.zeros(0), 5, 1e-2, False, restarts=False)
+                begun, ended = alone.nuisance[0], some.means(alone.last[0] ** 2)
+            better = ended < least
+            chosen[better], least = begun[better], np.minimum(least, ended)
             found = found or bool(better.any())
         starts[bad] = chosen
-        problem.count(len(tries) * len(some) / len(segments))
+        problem.count(len(tries) * len(some) / len(segments) + alone.nfev)
     return found
 
 

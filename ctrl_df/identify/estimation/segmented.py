@@ -11,6 +11,7 @@ import numpy as np
 from ...units import size
 from ..data import derivatives
 from ..data.measurement import Measurement
+from ..prediction.decimated import thinnable
 from ..prediction.initial_states import CONTINUED, FREE, MEASURED
 from ..prediction.segments import Segments, cut, facts, load_of, split
 from ..prediction.sensed import sensed
@@ -359,9 +360,7 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
-    step = thin
-    while thin > 1 and any(_rough(r, thin) for r in (*records, *validation)):
-        thin //= 2
+    step, thin = thin, thinnable((*records, *validation), thin)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = _scales(block, records)
@@ -379,14 +378,6 @@ def _within(own, shown) -> tuple[float, float]:
         return own
     low, high = max(own[0], shown[0]), min(own[1], shown[1])
     return (low, high) if low < high else own
-
-
-def _rough(record, thin: int) -> bool:
-    """Whether the input jumps about within the steps of a thinned one: its peaks decide what breaks away."""
-    u, t = record.u, record.t
-    off = np.abs(u - np.interp(t, t[::thin], u[::thin]))
-    # single jumps (steps of the force) are no harm: what counts is what most samples do
-    return float(np.quantile(off, 0.75)) > 0.05 * float(np.std(u))
 
 
 def _count(record) -> int:

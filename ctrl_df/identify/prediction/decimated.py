@@ -45,6 +45,21 @@ def thinned(t, u, factor):
     return time, values, "linear"
 
 
+def thinnable(records, factor: int) -> int:
+    """Return how many samples a step of the inputs may take, `factor` at most, so that none is rough."""
+    while factor > 1 and any(_rough(r, factor) for r in records):
+        factor //= 2
+    return factor
+
+
+def _rough(record, factor: int) -> bool:
+    """Whether the input jumps about within the steps of a thinned one: its peaks decide what breaks away."""
+    u, t = record.u, record.t
+    off = np.abs(u - np.interp(t, t[::factor], u[::factor]))
+    # single jumps (steps of the force) are no harm: what counts is what most samples do
+    return float(np.quantile(off, 0.75)) > 0.05 * float(np.std(u))
+
+
 def lagged(t, u, time_constant):
     """Return the output of a first-order lag at the samples of a held input, started at its steady value."""
     from scipy.signal import lfilter
