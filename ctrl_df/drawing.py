@@ -16,13 +16,13 @@ PICTURES = {
     "analysis": "describing.describing_function_plot",
     "event response": "response.event_response_plot",
     "orbit": "orbit.orbit_plot",
-    "comparison": "compare.comparison_plot",
-    "table comparison": "table.table_comparison_plot",
-    "diagnosis": "diagnosis.plot_diagnosis",
-    "table diagnosis": "table.plot_frequency_diagnosis",
-    "ladder": "ladder.plot_ladder",
-    "horizons": "horizons.horizons_plot",
-    "missing force": "missing_force.missing_force_plot",
+    "comparison": "identification.compare.comparison_plot",
+    "table comparison": "identification.table.table_comparison_plot",
+    "diagnosis": "identification.diagnosis.plot_diagnosis",
+    "table diagnosis": "identification.table.plot_frequency_diagnosis",
+    "ladder": "identification.ladder.plot_ladder",
+    "horizons": "identification.horizons.horizons_plot",
+    "missing force": "identification.missing_force.missing_force_plot",
     "gains": "gains.plot_limit_cycle_map",
 }
 
@@ -51,7 +51,7 @@ def draw(picture: str, result, **keywords) -> Any:
     -------
     ct.ControlPlot
     """
-    module, function = PICTURES[picture].split(".")
+    module, _, function = PICTURES[picture].rpartition(".")
     return getattr(importlib.import_module(f"ctrl_df.plot.{module}"), function)(result, **keywords)
 
 

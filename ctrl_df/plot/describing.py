@@ -12,7 +12,8 @@ from matplotlib.lines import Line2D
 from ..limit_cycles.predicted.grade import UNRELIABLE
 from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
-from .curves import (
+from .family import keys
+from .parts.curves import (
     draw_curves,
     draw_single,
     finish,
@@ -25,8 +26,16 @@ from .curves import (
     units,
     view_of,
 )
-from .family import keys
-from .page import CROSSING_COLOR, EXACT_COLOR, NYQUIST_COLOR, OMEGA_COLOR, in_lines, legend_above, page, style
+from .parts.page import (
+    CROSSING_COLOR,
+    EXACT_COLOR,
+    NYQUIST_COLOR,
+    OMEGA_COLOR,
+    in_lines,
+    legend_above,
+    page,
+    style,
+)
 
 _ANALYSIS = (
     "refine",

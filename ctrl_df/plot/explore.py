@@ -17,7 +17,7 @@ from ..gains.plane import Plane, plane_of, require_linear
 from ..gains.predicted import PredictedCycle, at_one
 from ..gains.simulated import Simulated, simulated
 from ..gains.stability import unstable_poles
-from .curves import (
+from .parts.curves import (
     draw_curves,
     draw_single,
     finish,
@@ -30,7 +30,7 @@ from .curves import (
     units,
     view_of,
 )
-from .page import AMPLITUDE_COLOR, CROSSING_COLOR, EXACT_COLOR, NYQUIST_COLOR, style
+from .parts.page import AMPLITUDE_COLOR, CROSSING_COLOR, EXACT_COLOR, NYQUIST_COLOR, style
 
 _OWNER = "explore"
 _SHOWN = (48, 64)  # amplitudes and frequencies of the curves drawn

@@ -6,7 +6,7 @@ import control as ct
 import numpy as np
 from matplotlib.lines import Line2D
 
-from .curves import (
+from .parts.curves import (
     draw_curves,
     finish,
     in_brackets,
@@ -19,7 +19,7 @@ from .curves import (
     units,
     view_of,
 )
-from .page import AMPLITUDE_COLOR, OMEGA_COLOR, legend_above, page
+from .parts.page import AMPLITUDE_COLOR, OMEGA_COLOR, legend_above, page
 
 _LONG = 20.0  # a span of amplitudes beyond which their axis is logarithmic
 

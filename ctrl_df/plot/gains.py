@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 
 from ..blocks.mechanism import Mechanism
 from ..gains.map import Fine, LimitCycleMap
-from .curves import in_brackets, plain_spines
-from .page import AMPLITUDE_COLOR, CROSSING_COLOR, NARROW, OMEGA_COLOR
+from .parts.curves import in_brackets, plain_spines
+from .parts.page import AMPLITUDE_COLOR, CROSSING_COLOR, NARROW, OMEGA_COLOR
 
 _REST, _CYCLE, _BOTH, _HATCH = "#ffffff", "#d9d9d9", "#efefef", "////"
 

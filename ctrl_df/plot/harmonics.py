@@ -6,8 +6,8 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .curves import in_brackets, labels_of, log_ticks, memoryless, short, units
-from .page import page
+from .parts.curves import in_brackets, labels_of, log_ticks, memoryless, short, units
+from .parts.page import page
 
 _HARMONIC_STYLES = (("-", "o"), ("--", "s"), ("-", "^"), ("--", "v"), ("-.", "D"), (":", "x"))
 

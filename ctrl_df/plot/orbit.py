@@ -6,8 +6,8 @@ import control as ct
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
-from .events import mark_events, shade_sticking
-from .page import legend_above, page
+from .parts.events import mark_events, shade_sticking
+from .parts.page import legend_above, page
 
 _SMALL = 0.1  # [m, rad]: below it motions are drawn in thousandths
 

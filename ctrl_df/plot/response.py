@@ -6,8 +6,8 @@ import control as ct
 import numpy as np
 
 from ..blocks.coordinates import AXIS, LINE
-from .events import MARKS, mark_events, shade_sticking
-from .page import legend_above, page
+from .parts.events import MARKS, mark_events, shade_sticking
+from .parts.page import legend_above, page
 
 
 def event_response_plot(run, *, fmt=(), events=True, **keywords) -> ct.ControlPlot:

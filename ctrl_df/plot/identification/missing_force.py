@@ -5,7 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
-from .page import legend_above, page
+from ..parts.page import legend_above, page
 
 _POINTS, _CURVE = "#7f9cc6", "#b3402a"
 _WORDS = {

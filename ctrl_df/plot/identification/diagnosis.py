@@ -6,9 +6,9 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..identify.results.diagnosis import rivals
-from .labels import settle
-from .page import MODEL, OTHER, QUIET, page
+from ...identify.results.diagnosis import rivals
+from ..parts.labels import settle
+from ..parts.page import MODEL, OTHER, QUIET, page
 
 
 def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> ct.ControlPlot:

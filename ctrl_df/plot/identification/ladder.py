@@ -8,8 +8,8 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .curves import log_ticks
-from .page import MODEL, OTHER, legend_above, page
+from ..parts.curves import log_ticks
+from ..parts.page import MODEL, OTHER, legend_above, page
 
 OF = {
     "output": "error [% of the output's rms]",

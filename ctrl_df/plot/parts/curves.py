@@ -7,8 +7,8 @@ import re
 import numpy as np
 from matplotlib import ticker
 
-from ..blocks.mechanism import Mechanism
-from ..units import over
+from ...blocks.mechanism import Mechanism
+from ...units import over
 from .labels import Labels, settle
 from .page import AMPLITUDE_COLOR, OMEGA_COLOR
 

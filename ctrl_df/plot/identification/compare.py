@@ -9,8 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from ..checks import known_name
-from .page import ERROR, MEASURED, MODEL, legend_above, page
+from ...checks import known_name
+from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import control as ct
 
-from .curves import log_ticks
-from .page import ERROR, MEASURED, MODEL, legend_above, page
+from ..parts.curves import log_ticks
+from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
 _COLOURS = (MODEL, ERROR, MEASURED, "#3f8f5f", "#8a5fa8")
 

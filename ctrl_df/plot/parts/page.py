@@ -15,7 +15,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..checks import positive
+from ...checks import positive
 
 WIDE = 7.0
 """Width of a figure unless told otherwise [in]."""

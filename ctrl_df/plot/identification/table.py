@@ -6,9 +6,9 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .curves import log_ticks
+from ..parts.curves import log_ticks
+from ..parts.page import legend_above, page
 from .diagnosis import draw_ranking, verdict_title
-from .page import legend_above, page
 
 
 def table_comparison_plot(

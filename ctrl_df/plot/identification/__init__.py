@@ -1,0 +1,1 @@
+"""Pictures of models beside records and tables."""
