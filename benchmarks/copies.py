@@ -1,10 +1,11 @@
 """Every effect of the library, copied into a file of a user's own: is it found as the original is.
 
-    python benchmarks/copies.py [--jobs 2] [--only PART] [--whole]
+    python benchmarks/copies.py [--jobs 2] [--only PART] [--whole | --units]
 
 One rig an effect. The diagnosis is made twice: with the original among the candidates, and with its copy in
-its place. `--whole`: against the whole library; else against three others. One line each: verdict, evidence,
-and what differs.
+its place. `--whole`: against the whole library; else against three others. `--units`: the original alone, in
+three other systems of units (a third of these the tests see). One line each: verdict, evidence, and what
+differs.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ if "--jobs" in sys.argv:
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import rigs
+from units_apart import SCALES, alike, diagnosed
 from user_copies import copied
 
 import ctrl_df as cdf
 
 OTHERS = ("quadratic_drag", "linear_spring", "asymmetric_coulomb")
 SEEDS = {"position_ripple": 6001}  # of seed 21 it is none that fits can follow
+Row = tuple[str, str, str, float, list[str], float]
 
 
 def found_by(rig, candidates):
@@ -38,8 +41,21 @@ def found_by(rig, candidates):
     return cdf.diagnose(rig.baseline, train, holdout=held, free=free, candidates=candidates)
 
 
-def row(job) -> tuple[str, str, str, float, list[str], float]:
-    """Return effect, both verdicts, the evidence of the original, what differs, processor time."""
+def in_units(name) -> Row:
+    """Return a line of `row` for an effect in other systems of units."""
+    began, differs = time.process_time(), []
+    before = diagnosed(name, [name])
+    for force, length in SCALES:
+        try:
+            alike(before, diagnosed(name, [name], force, length), (force, length))
+        except AssertionError as error:
+            differs.append(f"in units {force:g}, {length:g}: {error}".splitlines()[0])
+    named = before.best.id if before.best else "-"
+    return name, before.verdict, named, before.ranking[0].evidence, differs, time.process_time() - began
+
+
+def row(job) -> Row:
+    """Return effect, verdict and name of the original, its evidence, what differs, processor time."""
     name, whole = job
     began = time.process_time()
     library = cdf.effect_library()
@@ -64,22 +80,28 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", default="")
-    parser.add_argument("--whole", action="store_true")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--whole", action="store_true")
+    how.add_argument("--units", action="store_true")
     args = parser.parse_args()
     names = [n for n in rigs.ORDER if args.only in n]
-    alike = 0
+    jobs = [(n, args.whole) for n in names]
+    if args.units:  # the sine of an angle knows no other unit of it
+        jobs = names = [n for n in names if not cdf.effect_library()[n].turns]
+    same = 0
     with ProcessPoolExecutor(args.jobs) as pool:
         for name, verdict, called, evidence, differs, seconds in pool.map(
-            row, [(n, args.whole) for n in names]
+            in_units if args.units else row, jobs
         ):
-            alike += not differs
+            same += not differs
             says = "; ".join(differs) or "alike"
             print(
                 f"{name:<20} {verdict:<10} {called:<36} {evidence:>10.1f}  {says}  {seconds:.0f} s",
                 flush=True,
             )
-    print(f"{alike} of {len(names)} copies found as their originals")
-    return int(alike < len(names))
+    said = "the same in other units" if args.units else "copies found as their originals"
+    print(f"{same} of {len(names)} {said}")
+    return int(same < len(names))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Machine code is made once, before the workers start; tests that take long are marked slow by a list.
 
-`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than half a second of processor. The
-list is made of a whole run, ``CTRL_DF_TIMES=times.txt pytest``, by ``python tests/tiers.py times.txt``.
+`pytest -m "not slow"` leaves out what `slow.txt` names: tests of more than a quarter of a second of
+processor, with the fixtures that they share with others. The list is made of a whole run,
+``CTRL_DF_TIMES=times.txt pytest``, by ``python tests/tiers.py times.txt``.
 """
 
 import os
@@ -30,15 +31,39 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.slow)
 
 
+_shared, _open = {}, []  # what fixtures of files took [s]; those being made
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_fixture_setup(fixturedef):
+    """Note what a fixture takes that several tests share, without those that it needs itself."""
+    if fixturedef.scope == "function":
+        yield
+        return
+    began = processor_time()
+    _open.append(0.0)
+    yield
+    took = processor_time() - began
+    _shared[fixturedef.baseid, fixturedef.argname] = took - _open.pop()
+    if _open:
+        _open[-1] += took
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_protocol(item):
-    """Write how long a test took [s of processor], fixtures and processes included, where that is asked."""
-    began = processor_time()
+    """Write how long a test took [s of processor], processes included, where that is asked.
+
+    A second figure is what the fixtures took that it shares with others: whichever test comes first pays.
+    """
+    began, made = processor_time(), set(_shared)
     yield
-    times = os.environ.get("CTRL_DF_TIMES")
-    if times:
+    if times := os.environ.get("CTRL_DF_TIMES"):
+        took = processor_time() - began
+        needs = {key for key in _shared if key[1] in item.fixturenames and item.nodeid.startswith(key[0])}
+        paid = sum(_shared[key] for key in needs - made)
+        shared = sum(_shared[key] for key in needs)
         with open(times, "a") as file:
-            file.write(f"{processor_time() - began:.3f} {item.nodeid.rpartition('tests/')[2]}\n")
+            file.write(f"{took:.3f} {took - paid + shared:.3f} {item.nodeid.rpartition('tests/')[2]}\n")
 
 
 def processor_time():

@@ -431,8 +431,7 @@ def test_other_threads_of_python_go_on():
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no POSIX signals")
-@pytest.mark.parametrize("which", ["many runs", "one long run", "a law of the user's"])
-def test_ctrl_c_within_a_second(which):
+def test_ctrl_c_within_a_second():
     code = textwrap.dedent("""
         import os, subprocess, sys, time
         import control as ct, numpy as np, ctrl_df as cdf
@@ -446,15 +445,17 @@ def test_ctrl_c_within_a_second(which):
         }
         cdf.batch_response(loop, [0, 1])
         cdf.batch_response(user, [0, 1])
-        child = subprocess.Popen(["/bin/sh", "-c", f"sleep 0.6; kill -INT {os.getpid()}"])
-        began = time.time()
-        try:
-            cases[sys.argv[1]]()
-        except KeyboardInterrupt:
-            print(time.time() - began - 0.6)
-        child.wait()
+        for case in cases.values():
+            child = subprocess.Popen(["/bin/sh", "-c", f"sleep 0.6; kill -INT {os.getpid()}"])
+            began = time.time()
+            try:
+                case()
+            except KeyboardInterrupt:
+                print(time.time() - began - 0.6)
+            child.wait()
     """)
-    done = subprocess.run([sys.executable, "-c", code, which], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert -0.5 < float(done.stdout) < 1.5
+    late = [float(seconds) for seconds in done.stdout.split()]
+    assert len(late) == 3 and all(-0.5 < seconds < 1.5 for seconds in late)
     assert signal.getsignal(signal.SIGINT) is not None

@@ -1,5 +1,6 @@
 """The command line: answers, JSON, errors of one line with exit code 2, the demo's pictures."""
 
+import functools
 import json
 import struct
 
@@ -9,6 +10,7 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df import warm
 from ctrl_df.cli import main
+from ctrl_df.identify import improve
 from ctrl_df.model_file import EXAMPLE, read_model
 
 FIGURES = ("fig3", "fig4", "fig5", "fig7", "fig8", "fig9", "fig10")
@@ -53,6 +55,7 @@ def test_limit_cycles_as_text_and_json(model, capsys):
     assert exact[0]["stable"] is False
 
 
+@pytest.mark.quick
 def test_limit_cycles_of_a_loop_with_a_delay(tmp_path, capsys):
     path = tmp_path / "late.toml"
     path.write_text(
@@ -112,13 +115,17 @@ def test_no_command_shows_usage(capsys):
     assert "[effects.coulomb]" in capsys.readouterr().out
 
 
-def test_demo_prints_the_exact_answers_and_draws_the_figures(tmp_path, capsys):
+def test_demo_prints_the_exact_answers_and_draws_the_figures(tmp_path, capsys, monkeypatch):
+    # the whole library is tried on this machine in the tutorial
+    few = functools.partial(improve.improve, candidates=("position_ripple", "linear_spring"))
+    monkeypatch.setattr(improve, "improve", few)
     out = tmp_path / "pictures"
     assert main(["demo", "--out", str(out)]) == 0
     text = capsys.readouterr().out
     # figures of the table of exact answers, digits as printed (cells are wrapped, numbers are not)
     for number in ("13.792124", "8.600097", "11.628680", "13.175267", "14.733968", "156.045031"):
         assert number in text, number
+    assert "Added: position ripple" in text and (out / "hidden-effect.html").exists()
     assert "paper's claim" in text and "grows without bound" in text
     names = [p.name for p in out.glob("*.png")]
     for figure in FIGURES:

@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 
 import ctrl_df as cdf
 
-RIG = rigs.draw("linear_spring", 11, snr_db=60)
+RIG = rigs.draw("linear_spring", 11, snr_db=60, n=4000)
 TRAIN, HELD = RIG.train[0].measurement(), RIG.holdout[0].measurement()
 FEW = ("constant_force", "linear_spring")
 

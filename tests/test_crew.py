@@ -39,7 +39,7 @@ def test_numbers_are_those_of_one_thread_and_in_order():
 
 def test_a_diagnosis_repeats_itself_to_the_last_bit(monkeypatch):
     """Laws that are not smooth make much of a last bit: which one is named must not hang on who ran first."""
-    rig = rigs.draw("stiction", 5, ratio=1.0, snr_db=40, n=3000)
+    rig = rigs.draw("stiction", 5, ratio=1.0, snr_db=40, n=1500)
     record, found = rig.train[0].measurement(), []
     for threads in (2, 1):
         monkeypatch.setattr(crew, "processors", lambda threads=threads: threads)

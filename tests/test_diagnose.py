@@ -40,7 +40,7 @@ def test_initial_states_carried_from_short_segments_to_long_ones_find_the_truth(
 
 
 def test_segments_nest_and_hold_every_sample_once():
-    rig = rigs.draw_none(4, excitation="chirp")
+    rig = rigs.draw_none(4, excitation="chirp", n=4000)
     train, _ = of(rig)
     data = prepare(rig.baseline, [train]).fine
     learn, judge = (view.segments[0].samples for view in (data.train, data.validation))
@@ -56,16 +56,16 @@ def test_free_forces_tell_what_a_model_misses_and_where():
         found = data.fit(block, default_free(block))
         return missing_forces(CandidateFit("", found), data, prediction_error_filter(found.residual))[0]
 
-    rig = rigs.draw("linear_spring", 4, excitation="chirp")
+    rig = rigs.draw("linear_spring", 4, excitation="chirp", n=4000)
     assert most_telling(rig, rig.true_block).evidence < 0
     outside = rigs.draw_outside(4, kind="friction_warming", excitation="chirp")
     missed = most_telling(outside, outside.baseline)
     assert missed.kind == "time" and missed.evidence > 100
 
 
-@pytest.mark.parametrize("effect", [pytest.param("linear_spring", marks=pytest.mark.quick), "input_delay"])
+@pytest.mark.parametrize("effect", ["linear_spring", "input_delay"])
 def test_a_single_effect_is_named_first(effect):
-    rig = rigs.draw(effect, 11, snr_db=60)
+    rig = rigs.draw(effect, 11, snr_db=60, n=4000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert found.verdict == "effect"
@@ -77,7 +77,7 @@ def test_a_single_effect_is_named_first(effect):
 
 
 def test_a_bump_passed_within_a_sample_is_stiction():
-    rig = rigs.draw("stiction", 1005, excitation="multisine", snr_db=40, noise="coloured")
+    rig = rigs.draw("stiction", 1005, excitation="multisine", snr_db=40, noise="coloured", n=4000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=("stiction", "stribeck"))
     assert found.verdict == "effect"
@@ -115,7 +115,7 @@ def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
 
 @pytest.mark.parametrize("hidden", [None, cdf.Backlash(0.005, 0.3, 0.4)])
 def test_simulated_records_without_noise(hidden):
-    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(4000)
+    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(2400)
     tones, phases = rng.uniform(0.3, 4, 8), rng.uniform(0, 6, 8)
     u = sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
     true = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0)])
@@ -136,7 +136,7 @@ def test_simulated_records_without_noise(hidden):
 
 
 def test_equal_maps_are_one_class():
-    rig = rigs.draw("constant_force", 12, snr_db=60)
+    rig = rigs.draw("constant_force", 12, snr_db=60, n=4000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert {found.best.id, *found.best.equivalents} == {"constant_force", "asymmetric_coulomb"}
@@ -144,7 +144,7 @@ def test_equal_maps_are_one_class():
 
 @pytest.mark.parametrize("draw", [rigs.draw_none, rigs.draw_wrong_parameters])
 def test_nothing_hidden_is_none(draw):
-    rig = draw(13, snr_db=60)
+    rig = draw(13, snr_db=60, n=4000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert found.verdict == "none"
@@ -153,7 +153,7 @@ def test_nothing_hidden_is_none(draw):
 
 
 def test_one_record_alone():
-    rig = rigs.draw("linear_spring", 14, snr_db=60)
+    rig = rigs.draw("linear_spring", 14, snr_db=60, n=4000)
     found = diagnose(rig.baseline, of(rig)[0], candidates=("linear_spring", "constant_force"))
     assert found.best.id == "linear_spring"
 

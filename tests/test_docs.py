@@ -84,7 +84,11 @@ def run(language, code, names, path, line):
     return out.getvalue()
 
 
-@pytest.mark.parametrize("path", [p for p in PAGES if blocks(p)], ids=lambda p: p.stem)
+# both questions of the package, one of them put to the whole library: the first thing that must not break
+QUICK = pytest.param(PAGES[0], marks=pytest.mark.quick)
+
+
+@pytest.mark.parametrize("path", [QUICK, *(p for p in PAGES[1:] if blocks(p))], ids=lambda p: p.stem)
 def test_code_blocks_run_as_printed(path, tmp_path):
     before = os.getcwd()
     os.chdir(tmp_path)

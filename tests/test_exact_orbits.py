@@ -66,6 +66,7 @@ def test_floquet_multiplier_is_the_rate_of_simulation():
     assert rate == pytest.approx(orbit.multiplier, rel=2e-3)  # 0.8821
 
 
+@pytest.mark.quick
 def test_relay_cycle_of_tsypkin():
     """G = 1/((s + 1)(0.2 s + 1)), relay 1 with hysteresis 0.1: y(T/2) = 0.1 on the exact response."""
     from scipy.optimize import brentq

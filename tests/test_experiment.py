@@ -41,7 +41,7 @@ CASES = [
 
 @pytest.mark.parametrize(("hidden", "other", "seed", "closed"), CASES)
 def test_it_separates_on_the_true_plant(hidden, other, seed, closed):
-    rig = rigs.draw(hidden, seed, ratio=1.0, snr_db=40, closed_loop=closed)
+    rig = rigs.draw(hidden, seed, ratio=1.0, snr_db=40, closed_loop=closed, n=2500)
     record = rig.train[0].measurement()
     before = diagnose(rig.baseline, record, candidates=(hidden, other))
     loop = cdf.closed_loop(cdf.pid(*rig.controller[:4]), rig.baseline) if closed else None
@@ -63,7 +63,7 @@ def test_it_separates_on_the_true_plant(hidden, other, seed, closed):
 
 
 def test_a_plan_is_ready_to_be_played():
-    rig = rigs.draw("linear_spring", 3, ratio=1.0, snr_db=40)
+    rig = rigs.draw("linear_spring", 3, ratio=1.0, snr_db=40, n=4000)
     found = left_open(
         diagnose(rig.baseline, rig.train[0].measurement(), candidates=("linear_spring", "cubic_spring"))
     )

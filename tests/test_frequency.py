@@ -81,6 +81,7 @@ def test_a_loop_is_compared_and_refitted_through_its_block():
     assert fitted.model.parts.block.parameters["mass"].value == pytest.approx(9, rel=0.01)
 
 
+@pytest.mark.quick
 def test_refit_finds_the_parameters_within_their_errors():
     fit = refit(user_block(), [table(), table(seed=1)])
     truth = {"mass": 9.0, "coulomb.level": 5.0, "viscous.coefficient": 20.0}
@@ -161,7 +162,7 @@ def test_a_gap_is_named_although_one_point_is_of_another_motion():
 
 
 def test_nothing_hidden_is_none():
-    found = diagnose(user_block(), table(seed=3), candidates=FEW[:2])
+    found = diagnose(user_block(), table(seed=3), candidates=FEW[:1])
     assert found.verdict == "none" and found.best is None
     assert "Nothing is missing" in found.explanation
     assert found.next_experiment is None

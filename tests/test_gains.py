@@ -60,6 +60,7 @@ def test_the_linear_border_is_that_of_the_cubic(fixed):
         np.testing.assert_allclose(9 * every["ki"], (every["kd"] + 0.5) * every["kp"], rtol=2e-3)
 
 
+@pytest.mark.quick
 def test_across_a_fold_two_cycles_vanish():
     found = cdf.limit_cycle_map(FRICTION, kp=(500, 4000), ki=(0, 80000), kd=130, n=10, exact_check=0)
     (fold,) = found.folds

@@ -182,6 +182,7 @@ def test_describing_function_of_an_imposed_motion():
 # --- the flow ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.quick
 def test_a_refit_finds_the_truth_and_the_missing_force_is_the_residual():
     truth = BASE.with_effect(cdf.LinearSpring(800.0))
     run = record(truth, 1)

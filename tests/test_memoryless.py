@@ -166,7 +166,7 @@ def test_elements_are_values(element):
     "element", [play(0.1), relay_with_hysteresis(1, 0.3), rate_limiter(1.0), saturation(1)]
 )
 def test_elements_run_in_python_control(element):
-    t = np.linspace(0, 12, 1201)
+    t = np.linspace(0, 8, 801)
     fine = {"max_step": 2e-3}
     response = ct.input_output_response(
         element, t, np.sin(t), 0 if element.nstates else None, solve_ivp_kwargs=fine

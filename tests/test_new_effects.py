@@ -281,7 +281,7 @@ def test_it_is_named_among_its_likes(hidden):
     likes = {"linear_spring": "cubic_spring", "cubic_spring": "linear_spring", "hysteresis": "linear_spring",
              "load_dependent_friction": "position_dependent_friction",
              "position_dependent_friction": "load_dependent_friction"}  # fmt: skip
-    rng, t = np.random.default_rng(3), 2e-3 * np.arange(4000)
+    rng, t = np.random.default_rng(3), 2e-3 * np.arange(2000)
     tones, phases = rng.uniform(0.3, 3, 8), rng.uniform(0, 6, 8)
     u = sum(4 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
     base = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0), cdf.LinearSpring(40.0, 0.05)])

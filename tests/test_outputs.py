@@ -143,7 +143,9 @@ def test_the_true_model_errs_by_the_noise_of_each_output():
     both = found["both"].records[0].by_output
     assert both["position"].rmse == pytest.approx(1e-4, rel=0.05)
     assert both["velocity"].rmse == pytest.approx(1e-3, rel=0.05)
-    assert " m and " in str(found["both"]) and found["both"].rmse == both["position"].rmse
+    assert " m and " in str(found["both"]) and found["both"].rmse == pytest.approx(
+        both["position"].rmse, rel=1e-12
+    )
     errors = [both[q].nrmse for q in ("position", "velocity")]
     assert found["both"].nrmse == pytest.approx(np.sqrt(np.mean(np.square(errors))))
 

@@ -39,7 +39,7 @@ def pictures(record):
     fitted = cdf.refit(base, record).comparison
     names = ["constant_force", "quadratic_drag"]
     study = cdf.improve(base, record, candidates=names)
-    A, w = np.geomspace(6, 50, 5), np.geomspace(3, 20, 6)
+    A, w = np.geomspace(6, 50, 4), np.geomspace(3, 20, 4)
     N = cdf.describing_function_family(axis.with_effect(cdf.QuadraticDrag(30.0)), A, w).N
     table = cdf.FrequencyMeasurement(A, w, N)
     found = cdf.diagnose(axis, table, candidates=["quadratic_drag", "viscous"])
@@ -128,6 +128,7 @@ def test_an_unreliable_prediction_is_not_drawn_as_stable(pictures):
     plt.close("all")
 
 
+@pytest.mark.quick
 def test_curves_between_coarse_nodes_are_smooth():
     family = cdf.describing_function_family(
         cdf.friction_mass(9, 5, 0.5), np.geomspace(6, 60, 5), np.geomspace(2, 30, 5)

@@ -40,7 +40,7 @@ def test_standard_errors_hold_for_wrong_parameters():
     "hidden", ["stribeck", "bristle", "input_delay", "backlash", "compliance", "hard_stop"]
 )
 def test_true_structure_reaches_the_noise(hidden):
-    rig = rigs.draw(hidden, 3)
+    rig = rigs.draw(hidden, 3, n=5000)
     block, record = rig.true_block, rig.train[0]
     shift = np.random.default_rng(0)
     free = [k for k, p in block.parameters.items() if p.free]
@@ -102,6 +102,7 @@ def test_quantum_is_read_from_the_record():
     assert "sensor_quantization.step" not in fit.parameters
 
 
+@pytest.mark.quick
 def test_loop_is_fitted_through_its_block():
     rig = rigs.draw_wrong_parameters(8, closed_loop=True)
     record = rig.train[0]

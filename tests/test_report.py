@@ -22,9 +22,9 @@ BROWSER = next(
 
 @pytest.fixture(scope="module")
 def study():
-    rig = rigs.draw("linear_spring", 14, snr_db=60, n=4000)
+    rig = rigs.draw("linear_spring", 14, snr_db=60, n=2000)
     train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
-    return improve(rig.baseline, train, held, candidates=("linear_spring", "quadratic_drag"), max_effects=2)
+    return improve(rig.baseline, train, held, candidates=("linear_spring", "quadratic_drag"), max_effects=1)
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,9 @@ def test_a_report_of_tables(tmp_path):
     rng = np.random.default_rng(2)
     N = N * (1 + 0.003 * rng.standard_normal(N.shape))
     start = cdf.friction_mass(mass=10, coulomb=5, viscous=20)
-    found = improve(start, cdf.FrequencyMeasurement(A, omega, N), candidates=("linear_spring",))
+    found = improve(
+        start, cdf.FrequencyMeasurement(A, omega, N), candidates=("linear_spring",), max_effects=1
+    )
     page, _ = page_of(write_report(found, tmp_path / "table.html"))
     words = " ".join(page.words)
     assert "linear spring" in words and "|N|" in words and "4 amplitudes" in words

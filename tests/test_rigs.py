@@ -196,7 +196,7 @@ def test_delays_shift_and_static_elements_clip():
     assert np.allclose(dead, physics.run(physics.numbers(**base), shrunk)["x"], atol=1e-13)
 
 
-SHORT = dict(n=4000)
+SHORT = dict(n=2000)
 
 
 @pytest.mark.parametrize("name", rigs.ORDER)

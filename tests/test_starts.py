@@ -85,7 +85,7 @@ def test_rounding_is_told_from_noise_of_the_same_size():
 
 
 def test_a_joint_is_found_by_its_resonance():
-    data = prepare(PLAIN, [record(BLOCKS["joint"], n=6000)]).level(4)
+    data = prepare(PLAIN, [record(BLOCKS["joint"], n=3000)]).level(4)
     screen = Screen(data.fit(PLAIN, default_free(PLAIN)), data)
     found = [f for share in LOAD_SHARES for f in resonating(cdf.Compliance, screen, share, 1)]
     joint = min(found, key=lambda f: f.rmse).model.effects[-1]

@@ -1,5 +1,6 @@
 """Three honest answers (an orbit, none, not found), what the loop does, and the same in every unit."""
 
+import functools
 import time
 
 import control as ct
@@ -180,6 +181,15 @@ def _relay(force, length, time):
 BOXES = {_friction: ((5.8, 60), (5, 40)), _gap: ((5, 60), (8, 60)), _relay: ((0.05, 5), (0.1, 10))}
 
 
+@functools.cache
+def verified(make, units):
+    """Return a loop verified, in units so many times larger."""
+    force, _, time = units
+    (a, b), (low, high) = BOXES[make]
+    A, omega = np.geomspace(a, b, 12) * force, np.geomspace(low, high, 14) / time
+    return cdf.verify(cdf.describing_function_response(*make(*units), A, omega))
+
+
 @pytest.mark.parametrize("make", BOXES)
 @pytest.mark.parametrize(
     "units",
@@ -187,17 +197,7 @@ BOXES = {_friction: ((5.8, 60), (5, 40)), _gap: ((5, 60), (8, 60)), _relay: ((0.
 )
 def test_predictions_orbits_verdicts_and_fates_in_other_units(make, units):
     force, _, time = units
-    (a, b), (low, high) = BOXES[make]
-    told = []
-    for f, x, t in ((1.0, 1.0, 1.0), units):
-        H, block = make(f, x, t)
-        check = cdf.verify(
-            cdf.describing_function_response(
-                H, block, np.geomspace(a, b, 12) * f, np.geomspace(low, high, 14) / t
-            )
-        )
-        told.append(check)
-    one, two = told
+    one, two = verified(make, (1.0, 1.0, 1.0)), verified(make, units)
     assert [r.verdict for r in one] == [r.verdict for r in two]
     assert [r.predicted and r.predicted.grade for r in one] == [
         r.predicted and r.predicted.grade for r in two
@@ -326,6 +326,7 @@ def test_a_start_beside_an_unstable_orbit_does_not_cycle_on_it():
     assert False not in stable and stable.count(True) == 4
 
 
+@pytest.mark.quick
 def test_the_path_of_a_rattle_reaches_its_orbit():
     """Under one force the gap has several motions; the path stays on the one it began on."""
     response = cdf.describing_function_response(

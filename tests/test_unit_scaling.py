@@ -1,6 +1,6 @@
 """Units are a matter of writing: others alter neither verdict nor evidence nor, converted, parameters.
 
-Of every effect of the library; those of `test_own_effects` are seen there.
+Of a third of the effects beside those that `test_own_effects` sees; of all: ``benchmarks/copies.py --units``.
 """
 
 import functools
@@ -15,7 +15,8 @@ import ctrl_df as cdf
 RIVALS = ("quadratic_drag", "asymmetric_coulomb")
 # the sine of an angle knows no other unit of it
 LINEAR = [e for e in rigs.ORDER if not cdf.effect_library()[e].turns]
-KINDS = [e for e in LINEAR if e not in (*copies.FAST, *copies.SLOW)]
+# a threshold, a damping, a stiffness of another power, a channel's level, a time
+KINDS = [e for e in LINEAR if e not in (*copies.FAST, *copies.SLOW)][2::3]
 
 
 @functools.cache
@@ -23,7 +24,6 @@ def first(hidden, *rivals):
     return diagnosed(hidden, (hidden, *rivals))
 
 
-@pytest.mark.quick
 @pytest.mark.parametrize("scale", SCALES)
 def test_rivals_are_ranked_alike(scale):
     before = first("linear_spring", *RIVALS)

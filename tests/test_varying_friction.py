@@ -21,7 +21,7 @@ from ctrl_df.identify.prediction.simulator import Simulator
 DT = 1e-3
 
 
-def machine(seed, difference=0.0, share=0.06, n=5000):
+def machine(seed, difference=0.0, share=0.06, n=3000):
     """A mass of 3 kg on 2 N of friction that varies by a share of it within a tenth of a second.
 
     Integrated here, by small steps; the encoder is good to 10 nm.

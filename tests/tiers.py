@@ -1,6 +1,8 @@
 """Write the list of slow tests from the times of a run; what was not run stays as it is listed.
 
 CTRL_DF_TIMES=times.txt pytest; python tests/tiers.py times.txt
+
+Delete the list before to forget tests that are gone.
 """
 
 import math
@@ -9,20 +11,21 @@ from pathlib import Path
 
 from conftest import SLOW
 
-LONG = 0.5  # [s of processor]
+LONG = 0.25  # [s of processor]
 
 
 def main(path) -> None:
     """Replace the lines of all tests that were timed."""
-    times = {}
+    times, alone = {}, {}
     for line in Path(path).read_text().splitlines():
-        seconds, _, name = line.partition(" ")
-        times[name] = min(times.get(name, math.inf), float(seconds))  # the first one may compile
+        took, with_shared, name = line.split(" ", 2)
+        times[name] = min(times.get(name, math.inf), float(with_shared))  # the first one may compile
+        alone[name] = min(alone.get(name, math.inf), float(took))
     listed = set(SLOW.read_text().split("\n")) - {""} if SLOW.exists() else set()
     slow = {name for name in listed if name not in times} | {n for n, s in times.items() if s > LONG}
     SLOW.write_text("\n".join(sorted(slow)) + "\n")
-    left = sum(s for n, s in times.items() if n not in slow)
-    print(f"{len(slow)} slow tests; the others take {left:.0f} s of processor")
+    whole, left = sum(alone.values()), sum(s for n, s in times.items() if n not in slow)
+    print(f"{len(slow)} slow tests; the others take {left:.0f} s of {whole:.0f} s of processor")
 
 
 if __name__ == "__main__":

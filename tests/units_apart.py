@@ -15,13 +15,13 @@ CLOSE, ALIKE = 1e-6, 2e-2
 SCALES = [(1.0, 2.0**20), (2.0**-20, 2.0**10), (2.0**20, 2.0**-20)]
 """Factors of forces and of lengths: powers of two, so that hardly anything rounds otherwise."""
 
-SEEDS = {"position_ripple": 6001}  # of seed 21 it is none that fits can follow
-LENGTHS = {"hard_stop": 5000}  # samples until the stop has been met often enough
+SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow
+LENGTHS = {"hard_stop": 5000, "backlash": 1600}  # samples until stop and gap have been met often enough
 
 
 @functools.cache
 def rig_of(hidden):
-    seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 2500)
+    seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 1200)
     rig = rigs.draw(hidden, seed, excitation="multisine", snr_db=60, n=n)
     free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
     return rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free

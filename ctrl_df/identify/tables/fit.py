@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ...blocks.core import level
 from ..data.frequency_measurement import FrequencyMeasurement
@@ -254,7 +255,7 @@ class FittedTable:
 def fit_table(
     block, points: Points, names, scales: Scales, *, iterations=10, tolerance=1e-3, budget=400, work=None
 ) -> FittedTable:
-    """Fit parameters to points by damped least squares (Levenberg-Marquardt).
+    """Fit parameters to points by least squares within their bounds (`scipy.optimize.least_squares`).
 
     Parameters
     ----------
@@ -279,37 +280,57 @@ def fit_table(
         block, points,
         [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit), _side(block, k)) for k in names], work,
     )  # fmt: skip
-    z = np.array([v.q(table[v.name].value) for v in job.variables])
-    e = job.errors(z)
-    jacobian = np.zeros((len(e), len(z)))
-    damping, cost, converged = 1e-3, float(e @ e), len(z) == 0
-    for _ in range(iterations if len(z) else 0):
-        if job.count + len(z) > budget:
-            break
-        jacobian = job.slopes(z, e)
-        normal, gradient = jacobian.T @ jacobian, jacobian.T @ e
-        diagonal = np.diag(normal) + 1e-10 * (float(np.max(np.diag(normal))) + 1e-300)
-        accepted = None
-        for _ in range(6):
-            move = np.clip(-np.linalg.solve(normal + damping * np.diag(diagonal), gradient), -0.7, 0.7)
-            moved = np.array([v.clip(q) for v, q in zip(job.variables, z + move, strict=True)])
-            trial = job.errors(moved)
-            if float(trial @ trial) < cost:
-                accepted = moved, trial
-                break
-            damping = max(damping, 1e-6) * 8
-        if accepted is None:
-            converged = True
-            break
-        z, e = accepted
-        gain, cost = 1 - float(e @ e) / cost, float(e @ e)
-        damping = max(damping / 8, 1e-9)
-        if gain < tolerance:
-            converged = True
-            break
-    model = job.model(z)
+    start = np.array([v.q(table[v.name].value) for v in job.variables])
+    fit = _Fit(job, iterations, budget)
+    converged = len(start) == 0
+    if converged or iterations == 0:
+        fit.errors(start)
+    else:
+        low, high = np.array([(v.clip(-math.inf), v.clip(math.inf)) for v in job.variables]).T
+        begin = np.clip(start, low, high)
+        # Beside the Levenberg-Marquardt method of records, on 185 fits: 1.18 times the processor time; 78 %
+        # end within 1 % of its cost, 8 % lower by more than 5 %, 9 % higher. It can end on a bound.
+        try:
+            converged = least_squares(
+                fit.errors, begin, fit.slopes,  # type: ignore[arg-type]
+                (low, high), "dogbox", x_scale="jac", ftol=tolerance,
+            ).success  # fmt: skip
+        except _Enough:
+            pass
+    model = job.model(fit.z)
     error = relative_error(simulate_table(model, points, work), points)
-    return FittedTable(model, tuple(names), error, e, jacobian, tuple(job.variables), z, job.count, converged)
+    return FittedTable(
+        model, tuple(names), error, fit.e, fit.jacobian, tuple(job.variables), fit.z, job.count, converged
+    )
+
+
+class _Enough(Exception):
+    """The steps or the tables allowed are spent."""
+
+
+class _Fit:
+    """What a solver asks of a fit, the best that it met, and an end to it where work is spent."""
+
+    def __init__(self, job: _Job, iterations, budget):
+        self.job, self.left, self.budget, self.cost = job, iterations, budget, math.inf
+        self.z, self.e = np.zeros(0), np.zeros(0)
+        self.jacobian = np.zeros((2 * len(job.points), len(job.variables)))
+
+    def errors(self, z) -> np.ndarray:
+        if self.job.count >= self.budget:
+            raise _Enough
+        e = self.job.errors(z)
+        if (cost := float(e @ e)) < self.cost:
+            self.cost, self.z, self.e = cost, np.array(z), e
+        return e
+
+    def slopes(self, z) -> np.ndarray:
+        if self.left == 0 or self.job.count + len(z) > self.budget:
+            raise _Enough
+        self.left -= 1
+        e = self.e if np.array_equal(z, self.z) else self.job.errors(z)
+        self.jacobian = self.job.slopes(z, e)
+        return self.jacobian
 
 
 def _side(block, name) -> tuple[float, float]:
