@@ -1,7 +1,9 @@
 """How good: every figure that issue and README state, measured here and now, peers in the same run.
 
 ``python benchmarks/run.py`` prints a Markdown table (measured | demanded | ok?), medians of several repeats
-after one warm-up call, one core.
+after one warm-up call, one core; ``python benchmarks/run.py NAME ...`` only these parts. The C program beside
+it is ``friction.c``, or what ``FRICTION_C=SOURCE`` names: one that prints the time of a record first, in s or
+ms.
 """
 
 from __future__ import annotations
@@ -265,7 +267,7 @@ def family_over_c() -> None:
     with tempfile.TemporaryDirectory() as folder:
         program = str(Path(folder) / "family")
         source = Path(__file__).with_name("family.c")
-        subprocess.run([compiler, "-O2", str(source), "-o", program, "-lm"], check=True)
+        subprocess.run([compiler, "-O2", source, "-o", program, "-lm"], check=True)
         for _ in range(7):  # beside each other, as the machine is now
             done = subprocess.run([program], capture_output=True, text=True, check=True)
             spent, total = map(float, done.stdout.split())
@@ -441,8 +443,8 @@ def against_c() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         program = str(Path(folder) / "friction")
-        source = Path(__file__).with_name("friction.c")
-        subprocess.run([compiler, "-O2", str(source), "-o", program, "-lm"], check=True)
+        source = os.environ.get("FRICTION_C") or str(Path(__file__).with_name("friction.c"))
+        subprocess.run([compiler, "-O2", source, "-o", program, "-lm"], check=True)
         for name, block, limit in models:
             ratios = []
             cdf.event_response(block, t, u, input_hold="zoh")
@@ -453,9 +455,10 @@ def against_c() -> None:
                     begin = time.process_time()
                     cdf.event_response(block, t, u, input_hold="zoh")
                     times.append(time.process_time() - begin)
-                ratios.append(min(times) / float(done.stdout.split()[0]))
+                value, unit = done.stdout.split()[:2]
+                ratios.append(min(times) / (float(value) * (1e-3 if unit == "ms" else 1.0)))
             ratio = statistics.median(ratios)
-            what = f"record of 10,000 samples, {name}, over a friction mass in C"
+            what = f"record of 10,000 samples, {name}, over a friction mass in C ({Path(source).name})"
             row(what, f"{ratio:.1f} x", f"{limit} x", ratio <= limit)
 
 
