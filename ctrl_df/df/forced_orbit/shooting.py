@@ -17,10 +17,10 @@ import numpy as np
 from ...simulate.compiler.compiled import apart, njit, part
 from ...simulate.compiler.native import call_native, native_address
 from ...simulate.compiler.views import lean
+from ...simulate.dynamics.matrices import multiply
 from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.driver import copy
-from ...simulate.kernel.matrices import multiply
 from .shot import coordinates, place, shot_at
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)

@@ -20,6 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.compiled import part
+from ..dynamics.flow import combine, rates
+from ..dynamics.mechanics import closed, dry_level
 from ..program import layout as L
 from ..program.layout import (
     A_BODIES,
@@ -44,8 +46,6 @@ from ..program.layout import (
     G,
     X,
 )
-from .flow import combine, rates
-from .mechanics import closed, dry_level
 from .roots import first_root
 
 TERMS = 20

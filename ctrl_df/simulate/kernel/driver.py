@@ -12,6 +12,9 @@ import numpy as np
 from ..compiler.compiled import apart, njit, part
 from ..compiler.native import call_native, native_address
 from ..compiler.views import lean
+from ..dynamics import history
+from ..dynamics.flow import rates
+from ..dynamics.modes import event, settle, track
 from ..program.layout import (
     H_AFFINE,
     H_BUMP,
@@ -22,12 +25,9 @@ from ..program.layout import (
     G,
     Program,
 )
-from . import history
 from .affine import HARMONICS, crossing, forced, recall, series, shrink
-from .flow import rates
 from .glide import forget_run
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
-from .modes import event, settle, track
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
 from .space import space_at, workspace
 from .stepper import grains, inside, prepare, prepare8, roughness, step

@@ -26,10 +26,10 @@ import numpy as np
 
 from ..compiler.compiled import part
 from ..compiler.views import lean
+from ..dynamics.mechanics import curved_forces
 from ..program.layout import CURVED, F_ASKED, F_SIZE, H_BUMP
 from .affine import LENGTHS, RANKS, Memory
 from .locate import bump_share
-from .mechanics import curved_forces
 
 PARTS = np.array([2, 3, 5, 8])  # of a step, for each rank
 MOST = 8

@@ -23,6 +23,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.compiled import part
+from ..dynamics.matrices import multiply, row_times
+from ..dynamics.mechanics import mechanism
+from ..dynamics.modes import settle
 from ..program import layout as L
 from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
 from .exponential import (
@@ -37,9 +40,6 @@ from .exponential import (
     parts,
     renew,
 )
-from .matrices import multiply, row_times
-from .mechanics import mechanism
-from .modes import settle
 from .outputs import next_sample, record, tick
 
 EPS = np.finfo(float).eps

@@ -9,6 +9,8 @@ import math
 import numpy as np
 
 from ..compiler.compiled import part
+from ..dynamics.flow import input_rates, rates
+from ..dynamics.mechanics import closed, dry_level_at
 from ..program.layout import (
     A_BODIES,
     A_CONTACT,
@@ -40,8 +42,6 @@ from ..program.layout import (
     G,
     X,
 )
-from .flow import input_rates, rates
-from .mechanics import closed, dry_level_at
 from .stepper import inside
 
 GRAIN = 4.0 * np.finfo(float).eps

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from ..compiler.compiled import njit
 from ..compiler.views import lean
+from ..dynamics.flow import combine, rates
+from ..dynamics.modes import event, settle
 from ..program.layout import H_OUT, H_TRACK
-from .flow import combine, rates
 from .locate import complete
-from .modes import event, settle
 
 HEIGHT = 1e-10  # relative flight below which a bounce has ended
 

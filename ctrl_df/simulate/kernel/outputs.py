@@ -9,10 +9,10 @@ import math
 import numpy as np
 
 from ..compiler.compiled import part
+from ..dynamics import history
+from ..dynamics.flow import combine, external, node_input, refresh, signals
+from ..dynamics.modes import advance_state, answers_at_once, hold, settle
 from ..program.layout import DELAY, FEED, H_DELAYS, H_NS, H_NY, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
-from . import history
-from .flow import combine, external, node_input, refresh, signals
-from .modes import advance_state, answers_at_once, hold, settle
 from .stepper import inside
 
 NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))

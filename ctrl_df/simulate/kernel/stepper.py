@@ -16,9 +16,9 @@ from scipy.integrate import DOP853, RK23, RK45
 
 from ..compiler.compiled import part
 from ..compiler.views import lean
+from ..dynamics.flow import node_input, rates
+from ..dynamics.mechanics import dry_level
 from ..program.layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
-from .flow import node_input, rates
-from .mechanics import dry_level
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
 E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()

@@ -93,7 +93,7 @@ DRIVING = 8  # added to that of a force which is the drive's own (back-EMF)
 F_GIVEN, F_ASKED, F_TOLD, F_SIZE = 2, 4, 5, 11
 
 # the history of a delay in the work vector: three numbers, then a ring of records: start, length,
-# generation, values; see `ctrl_df.simulate.kernel.history`
+# generation, values; see `ctrl_df.simulate.dynamics.history`
 Y_RING, Y_POINTS, Y_RECORDS, Y_VALUES = 4096, 8, 3, 3
 Y_RECORD = Y_VALUES + Y_POINTS
 Y_SIZE = Y_RECORDS + Y_RING * Y_RECORD
