@@ -12,7 +12,8 @@ import control as ct
 import numpy as np
 
 from ..status import Status
-from .kernel import driver, history
+from .dynamics import history
+from .kernel import driver
 from .kernel.pace import keep_pace
 from .kernel.space import Space, workspace
 from .program import layout, pointers

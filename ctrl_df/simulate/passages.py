@@ -14,8 +14,9 @@ from ..status import Status
 from .compiler.compiled import njit
 from .compiler.native import call_native
 from .compiler.views import lean
+from .dynamics import history
 from .engine import FAR, STATUS, Engine, State, constant_drive
-from .kernel import driver, history
+from .kernel import driver
 from .kernel.space import space_at, workspace
 from .program import pointers
 from .program.layout import H_NG

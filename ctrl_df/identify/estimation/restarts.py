@@ -31,7 +31,8 @@ def restart_segments(problem, theta) -> bool:
             continue
         some = segments.only(bad)
         held = sensed(problem.records[k])
-        measured, least = held.within(some.samples), BETTER**2 * rms[bad] ** 2
+        measured = held.within(some.samples)
+        least = (BETTER**2 if problem.followed else UNFOLLOWED) * rms[bad] ** 2
         problem.priors[k][bad, column] = problem.widest[k][bad, column]
         reach, chosen = problem.priors[k][bad, column], starts[bad].copy()
         before = simulator.carried_on(segments, values, starts)[bad]
@@ -56,7 +57,7 @@ def restart_segments(problem, theta) -> bool:
         order, alone = np.argsort(powers, axis=0, kind="stable"), problem.alone(theta, slice(k, k + 1))
         for rank in range(max(problem.followed, 1)):
             begun = np.array([trials[i][w] for w, i in enumerate(order[rank])])
-            ended = np.take_along_axis(np.array(powers), order[rank : rank + 1], axis=0)[0] / UNFOLLOWED
+            ended = np.take_along_axis(np.array(powers), order[rank : rank + 1], axis=0)[0]
             if problem.followed:
                 alone.stage([some], problem.thin, [begun], problem.rtol)
                 alone.solve(np.zeros(0), 5, 1e-2, False, restarts=False)
