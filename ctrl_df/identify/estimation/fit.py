@@ -236,6 +236,7 @@ def fit_segments(
     hopeless: float = math.inf,
     outlook: int = 0,
     rtol: float = RTOL,
+    followed: int = 0,
 ) -> FitResult:
     """Fit the named parameters over given segments in one stage.
 
@@ -269,14 +270,17 @@ def fit_segments(
         Iterations that are to follow in other fits.
     rtol : float
         Relative tolerance of the simulations.
+    followed : int
+        Tries of where a segment begins that are followed to their end (see `Problem`).
 
     Returns
     -------
     FitResult
     """
     problem = Problem(
-        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about
-    )
+        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about,
+        followed,
+    )  # fmt: skip
     problem.stage(list(segments), thin, starts, rtol)
     theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
     problem.round(theta)

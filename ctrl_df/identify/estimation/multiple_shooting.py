@@ -187,6 +187,7 @@ class Problem:
             theta = self._descend(theta, again, tolerance, robust)
         if (
             self._nonsmooth
+            and not self.outlook
             and self._worth_restarting()
             and self.nfev < self.budget
             and any(t.min() < 0.5 for t in self._trusts())

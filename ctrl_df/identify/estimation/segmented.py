@@ -26,6 +26,7 @@ from ..thresholds import (
     NOISE_FREE,
     PARAMETER_RANGE,
     PROCESS_NOISE,
+    RESTARTS_KEPT,
     RTOL,
     RTOL_COARSE,
     RTOL_OVER_NOISE,
@@ -284,6 +285,7 @@ class SegmentedData:
         tolerance=1e-3,
         hopeless=math.inf,
         outlook=0,
+        followed=0,
     ) -> FitResult:
         """Fit the named parameters over the segments fitted (or those of `view`)."""
         view = view or self.train
@@ -291,7 +293,7 @@ class SegmentedData:
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
             error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
-            robust=self.robust, rtol=self.rtol_of(block),
+            robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
     def rtol_of(self, block) -> float:
@@ -339,7 +341,11 @@ class SegmentedData:
             model = near.model
         starts = same_begins(near, view.segments)
         near = rough.fit(model, (), view=getattr(rough, name), starts=starts, iterations=3)
-        return self.fit(model, (), view=view, starts=near.starts, iterations=1)
+        found = self.fit(model, (), view=view, starts=near.starts, iterations=1)
+        if not any(e.nonsmooth for e in model.effects):
+            return found
+        # single segments may have begun in a wrong minimum: each goes on by itself
+        return self.fit(model, (), view=view, starts=found.starts, iterations=1, followed=RESTARTS_KEPT)
 
 
 def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
