@@ -455,7 +455,7 @@ class Problem:
                 pieces.append((k, solved))
 
         def back(step):
-            moved = [self.within_reach(k, a.copy()) for k, a in enumerate(nuisance)]
+            moved = [a.copy() for a in nuisance]
             for k, solved in pieces:
                 there = nuisance[k] + solved[:, :, p] - solved[:, :, :p] @ step
                 moved[k] = self.within_reach(k, there)

@@ -54,20 +54,31 @@ def restart_segments(problem, theta) -> bool:
             shift, gain = _shift(held, some, e, simulator.position_dependent)
             powers.append(some.means(e**2) - gain)
             trial[:, 0] += shift
-        order, alone = np.argsort(powers, axis=0, kind="stable"), problem.alone(theta, slice(k, k + 1))
-        for rank in range(max(problem.followed, 1)):
-            begun = np.array([trials[i][w] for w, i in enumerate(order[rank])])
-            ended = np.take_along_axis(np.array(powers), order[rank : rank + 1], axis=0)[0]
-            if problem.followed:
-                alone.stage([some], problem.thin, [begun], problem.rtol)
-                alone.solve(np.zeros(0), 5, 1e-2, False, restarts=False)
-                begun, ended = alone.nuisance[0], some.means(alone.last[0] ** 2)
+        for begun, ended in _ends(problem, theta, k, some, trials, np.array(powers)):
             better = ended < least
             chosen[better], least = begun[better], np.minimum(least, ended)
             found = found or bool(better.any())
         starts[bad] = chosen
-        problem.count(len(tries) * len(some) / len(segments) + alone.nfev)
+        problem.count(len(tries) * len(some) / len(segments))
     return found
+
+
+def _ends(problem, theta, k, some, trials, powers):
+    """Yield where segments `some` of a record may begin, the best tries first, and their mean squared errors.
+
+    `powers`: (tries, nw), those of the tries as they are. Followed to their end where the problem says so.
+    """
+    order = np.argsort(powers, axis=0, kind="stable")
+    begun = [np.array([trials[i][w] for w, i in enumerate(row)]) for row in order[: max(problem.followed, 1)]]
+    if not problem.followed:
+        yield begun[0], powers.min(axis=0)
+        return
+    alone = problem.alone(theta, slice(k, k + 1))
+    for start in begun:
+        alone.stage([some], problem.thin, [start], problem.rtol)
+        alone.solve(np.zeros(0), 5, 1e-2, False, restarts=False)
+        yield alone.nuisance[0], some.means(alone.last[0] ** 2)
+    problem.count(alone.nfev)
 
 
 def scan_gap_state(problem, theta):
