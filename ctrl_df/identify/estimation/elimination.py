@@ -22,7 +22,7 @@ def products_of(states, others, weights, segments: Segments) -> np.ndarray:
     return products
 
 
-def states_for(products, precision, damping=0.0, off=None) -> np.ndarray:
+def states_for(products, precision, damping: float | np.ndarray = 0.0, off=None) -> np.ndarray:
     """Return the states (nw, ns, m) of every segment that come nearest to each of the other columns.
 
     Parameters

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..thresholds import NOISE_KNOWN, NOISE_PASSES, NOISE_SHARE
 from .noise_model import noise_model
-
-_PASSES = 300  # of the multiplicative steps; no density moves by a hundredth after that many
-_SHARE = 0.1  # of a frequency's power: above that much taken away, it is worked out exactly
 
 
 @dataclass(frozen=True)
@@ -91,8 +89,8 @@ def noise_spectrum(residual, absorbed, floor: float = 0.0) -> NoiseSpectrum:
     weights = width / bins
     sizes = _sizes(seen, expected, weights)
     left = sizes[:, None] * expected / np.maximum(sizes @ expected, 1e-300)
-    # Fisher's information of the logarithms of the sizes; none is known worse than by a factor of e
-    errors = np.linalg.inv((left * weights) @ left.T + 0.25 * np.eye(len(left)))
+    # Fisher's information of the logarithms of the sizes; each is known within a factor beforehand
+    errors = np.linalg.inv((left * weights) @ left.T + np.eye(len(left)) / NOISE_KNOWN**2)
     return NoiseSpectrum(sizes[:, None] * densities + floor / len(densities), errors)
 
 
@@ -102,7 +100,7 @@ def _expected(densities, transform, taken, n) -> np.ndarray:
     Of ``(1 - Q Q') Omega (1 - Q Q')``: what other frequencies hand over is counted where much is taken.
     """
     left = densities * np.maximum(1 - taken, 1e-3)
-    much = np.flatnonzero(taken > _SHARE)
+    much = np.flatnonzero(taken > NOISE_SHARE)
     there, weights = transform[much], _integral(np.ones(len(taken)))[much]
     for row, density in zip(left, densities[:, much], strict=True):
         inner = np.real((there.conj() * (density * weights)[:, None]).T @ there)
@@ -116,7 +114,7 @@ def _sizes(seen, expected, weights) -> np.ndarray:
     sizes = np.mean(seen) / np.mean(expected, axis=1) / len(expected)
     if not np.any(sizes):
         return sizes
-    for _ in range(_PASSES):
+    for _ in range(NOISE_PASSES):
         density = sizes @ expected
         sizes = sizes * (expected @ (weights * seen / density**2)) / (expected @ (weights / density))
     return sizes
