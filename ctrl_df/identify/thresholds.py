@@ -199,8 +199,8 @@ NOISE_SHARE = 0.1
 rest is off by the square of it, a hundredth."""
 
 NOISE_KNOWN = 2.0
-"""Natural logarithm of the factor, 7, within which the size of each part of the noise is known: a random walk,
-the steepest noise of a sensor, falls by a factor of 4 from one octave, and so from one part, to the next."""
+"""Natural logarithm of the factor, 7, within which the size of each part of the noise is known: a random
+walk, the steepest noise of a sensor, falls by 4 from one octave, and so from one part, to the next."""
 
 HORIZONS = 8
 """Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
