@@ -9,9 +9,8 @@ from ..compiler.views import lean
 from ..dynamics.flow import combine, rates
 from ..dynamics.modes import event, settle
 from ..program.layout import H_OUT, H_TRACK
+from ..thresholds import HEIGHT
 from .locate import complete
-
-HEIGHT = 1e-10  # relative flight below which a bounce has ended
 
 
 @njit(error_model="numpy")
