@@ -16,9 +16,7 @@ from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, constant_drive
 from ...simulate.kernel.look import look_at
 from ...simulate.program import layout as L
-
-_PROBES = 24
-_TOL = 1e-9
+from ..thresholds import ALIKE, PROBES, RIPPLED, SHIFTS
 
 
 @dataclass
@@ -124,7 +122,7 @@ class Probe:
         return dx[0], g[0], y[0]
 
     def at_all(self, x, u, t=0.0):
-        """Return rates (m, n), margins (sorted within each node) and outputs at states x (m, n), inputs u (m,).
+        """Return rates (m, n), margins (sorted within each node), outputs at states x (m, n), inputs u (m,).
 
         Modes are settled first.
         """
@@ -143,7 +141,7 @@ class Probe:
     def states(self):
         """Random states over several decades, bodies within their gaps, some of them at rest."""
         n = self.engine.nstates
-        for i in range(_PROBES):
+        for i in range(PROBES):
             x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(-4, 1, size=n) * self.sizes.states
             u = self.rng.normal() * 10.0 ** self.rng.uniform(-1, 2) * self.sizes.force
             for node in _mechanisms(self.prog):
@@ -194,26 +192,26 @@ def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> S
         direction = np.zeros(n, bool)
         direction[places] = True
         if not stopped and _unmoved(
-            probe, samples, direction, probe.rng.normal() * 1.7 * probe.sizes.states[at]
+            probe, samples, direction, probe.rng.normal() * SHIFTS["place"] * probe.sizes.states[at]
         ):
             free[at] = False
             positions[places] = True
             shifts.append(direction)
             speeds = np.zeros(n, bool)
             speeds[places + 1] = True
-            if _unmoved(probe, samples, speeds, 0.37 * probe.sizes.states[at + 1], direction):
+            if _unmoved(probe, samples, speeds, SHIFTS["speed"] * probe.sizes.states[at + 1], direction):
                 free[at + 1] = False
                 inertial[at + 1] = True
         elif not stopped:
             for length in _wavelengths(block):
-                if _unmoved(probe, samples, direction, length, tol=1e-6):
+                if _unmoved(probe, samples, direction, length, tol=RIPPLED):
                     wrap[at] = length
     mine = np.zeros(n, bool)
     for node in _mechanisms(prog):
         mine[node[L.X] : node[L.X] + 2 * prog.ints[node[L.AUX] + L.A_BODIES]] = True
     for i in np.flatnonzero(~mine):
         direction = np.arange(n) == i
-        if _unmoved(probe, samples, direction, 0.83 * probe.sizes.states[i]):
+        if _unmoved(probe, samples, direction, SHIFTS["state"] * probe.sizes.states[i]):
             free[i] = False
             positions[i] = True
             shifts.append(direction)
@@ -228,7 +226,7 @@ def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> S
     )  # fmt: skip
 
 
-def _unmoved(probe, samples, direction, shift, rate=None, tol=_TOL):
+def _unmoved(probe, samples, direction, shift, rate=None, tol=ALIKE):
     """Whether a shift of some states changes no margin and no rate (but `rate`, which shifts along)."""
     other, other_g, _ = probe.at_all(samples.x + shift * direction, samples.u)
     expected = samples.dx if rate is None else samples.dx + shift * rate
@@ -253,12 +251,12 @@ def _on_motor(gaps):
 
 
 def _autonomous(probe, samples):
-    half = _PROBES // 2
+    half = PROBES // 2
     times = probe.rng.uniform(1, 100, half) / probe.sizes.rate
     return _close(probe.at_all(samples.x[:half], samples.u[:half], times)[0], samples.dx[:half])
 
 
-def _close(a, b, tol=_TOL):
+def _close(a, b, tol=ALIKE):
     """Whether two arrays agree, entry by entry: their units differ."""
     finite = np.isfinite(b)
     if not np.array_equal(finite, np.isfinite(a)):
