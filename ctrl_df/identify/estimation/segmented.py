@@ -21,6 +21,7 @@ from ..thresholds import (
     BRIEF,
     FILTERED,
     FULL_SAMPLES,
+    GROWTH,
     HOLDOUT_PARTS,
     LEVELS,
     NOISE_FREE,
@@ -321,6 +322,18 @@ class SegmentedData:
             found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance,
             hopeless=hopeless,
         )  # fmt: skip
+
+    def reached(self, found: FitResult, hopeless=math.inf) -> FitResult:
+        """As `moved`, and begun once more where the error grows: the model may have left its minimum.
+
+        What a parameter is off by grows with at least the square of the length of segments, and over long
+        ones minima are narrow.
+        """
+        there = self.moved(found, hopeless=hopeless)
+        if there.rmse <= GROWTH * found.rmse:
+            return there
+        again = self.fit(found.model, found.names, followed=RESTARTS_KEPT, hopeless=there.rmse)
+        return min(there, again, key=lambda f: f.rmse)
 
     def validate(self, tried: CandidateFit) -> CandidateFit:
         """Run a fitted model over the segments to validate on, from initial states of their own."""

@@ -135,11 +135,12 @@ class StructureSearch(Search):
             base, found = self._look(classes, executor, self.data.sampled)
             self.course.known(found)
         longest = self.segmentations[-1]
-        there = base.rmse if self.data.disturbed else longest.moved(base).rmse
-        if there > GROWTH * base.rmse:
+        there = base if self.data.disturbed else longest.reached(base)
+        if there.rmse > GROWTH * base.rmse:
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
             self.course.stage("the same over long segments")
-            moved = self._over_long_windows(base.rmse, there, found)
+            self.base = CandidateFit("", there)
+            moved = self._over_long_windows(base.rmse, there.rmse, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
                 found = _best_of(base, [*moved, *again])
@@ -284,7 +285,7 @@ class StructureSearch(Search):
         errors = [math.inf if f is None else f.rmse for f in before]
         ahead = [0, *([1 + int(np.argmin(errors[1:]))] if len(errors) > 1 else [])]
         found: list[Any] = [None] * len(fits)
-        for i, f in zip(ahead, side_by_side(data.moved, [fits[i] for i in ahead]), strict=True):
+        for i, f in zip(ahead, side_by_side(data.reached, [fits[i] for i in ahead]), strict=True):
             found[i] = f
         hopeless = HOPELESS * min(found[i].rmse for i in ahead)
         others = [i for i, e in enumerate(errors) if i not in ahead and e < hopeless]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from ..thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_STEP
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import RippleSpectrum, Wave
@@ -25,9 +26,8 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
     """
     span = float(np.ptp(screen.motion.x))
     amplitude = 0.01 * screen.scales.force
-    total = float(screen.residual @ screen.residual)
-    scored = []
-    for turn in np.geomspace(0.6, 6.0, 20):
+    left, found = {}, {}
+    for turn in np.arange(0.6, LONG_WAVE_TURNS, RIPPLE_STEP):
         pair = []
         for phase in (0.0, math.pi / 2):
             block = extended(screen.block, make(amplitude, span / turn, phase))
@@ -38,13 +38,15 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
         if len(pair) < 2:
             continue
         matrix = np.array(pair).T
-        weights, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
-        left = screen.residual - matrix @ weights
-        scored.append((float(left @ left) / total, turn, weights))
-    scored.sort(key=lambda x: x[0])
-    return [
-        (amplitude * float(np.hypot(*w)), span / turn, math.atan2(w[1], w[0])) for _, turn, w in scored[:5]
-    ]
+        w, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
+        left[turn] = float(np.sum((screen.residual - matrix @ w) ** 2))
+        found[turn] = amplitude * float(np.hypot(*w)), span / turn, math.atan2(w[1], w[0])
+    best = []
+    for turn in sorted(left, key=left.__getitem__):
+        # nearer than a turn it is the same wave
+        if len(best) < LONG_WAVES and all(abs(turn - b) > 1.0 for b in best):
+            best.append(turn)
+    return [found[turn] for turn in best]
 
 
 def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
