@@ -24,7 +24,7 @@ if "--jobs" in sys.argv:
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import rigs
-from units_apart import SCALES, alike, diagnosed
+from units_apart import alike, diagnosed, scales_of
 from user_copies import copied
 
 import ctrl_df as cdf
@@ -45,7 +45,7 @@ def in_units(name) -> Row:
     """Return a line of `row` for an effect in other systems of units."""
     began, differs = time.process_time(), []
     before = diagnosed(name, [name])
-    for force, length in SCALES:
+    for force, length in scales_of(name):
         try:
             alike(before, diagnosed(name, [name], force, length), (force, length))
         except AssertionError as error:
@@ -86,8 +86,8 @@ def main() -> int:
     args = parser.parse_args()
     names = [n for n in rigs.ORDER if args.only in n]
     jobs = [(n, args.whole) for n in names]
-    if args.units:  # the sine of an angle knows no other unit of it
-        jobs = names = [n for n in names if not cdf.effect_library()[n].turns]
+    if args.units:
+        jobs = names
     same = 0
     with ProcessPoolExecutor(args.jobs) as pool:
         for name, verdict, called, evidence, differs, seconds in pool.map(

@@ -26,7 +26,10 @@ def block(model, force, length):
 def record(data, force, length):
     """Return a record likewise."""
     velocity = None if data.velocity is None else data.velocity * length
-    return cdf.Measurement(data.t, data.u * force, data.y * length, name=data.name, velocity=velocity)
+    return cdf.Measurement(
+        data.t, data.u * force, data.y * length, name=data.name, velocity=velocity,
+        input_unit=data.input_unit, output_unit=data.output_unit,
+    )  # fmt: skip
 
 
 def back(candidate, force, length):

@@ -178,7 +178,7 @@ def test_a_law_that_raises_in_a_worker_is_that_error_and_the_rest_is_kept(tmp_pa
 
 
 def test_no_more_is_submitted_than_is_needed(monkeypatch):
-    monkeypatch.setattr(executors, "_AHEAD", 2)
+    monkeypatch.setattr(executors, "PARTS_AHEAD", 2)
     waiting, most = [0], [0]
 
     class Counts(Plain):

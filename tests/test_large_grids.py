@@ -81,7 +81,7 @@ def test_cells_are_the_same_in_blocks(monkeypatch):
     values[rng.random(values.shape) < 0.1] = np.nan
     whole = crossings._may_hold_zero(values)
     for points in (1, 41, 200):
-        monkeypatch.setattr(crossings, "_AT_ONCE", points)
+        monkeypatch.setattr(crossings, "CELLS_AT_ONCE", points)
         assert np.array_equal(crossings._may_hold_zero(values), whole)
 
 
@@ -97,7 +97,7 @@ def test_where_the_search_is_cut_short_it_looks_where_zeros_are_likeliest(monkey
     values[:40:2, ::2] = np.nan  # every cell around may hold anything
     values[1:40:2, :] *= 0.3
     whole = find_crossings(D, p, q, values)
-    monkeypatch.setattr(crossings, "_MOST_STARTS", 20)
+    monkeypatch.setattr(crossings, "MOST_STARTS", 20)
     few = find_crossings(D, p, q, values)
     assert few.truncated and len(whole.crossings) == len(few.crossings) == 1
     assert few.crossings[0].omega == pytest.approx(whole.crossings[0].omega, rel=1e-10)
@@ -122,7 +122,7 @@ def zeros_one_by_one(log_a, log_w, values, chosen):
 
 
 def test_zeros_of_the_interpolant_are_found_all_at_once(monkeypatch):
-    monkeypatch.setattr(crossings, "_AT_ONCE", 100)
+    monkeypatch.setattr(crossings, "CELLS_AT_ONCE", 100)
     rng = np.random.default_rng(2)
     a, w = np.sort(rng.random(40)), np.sort(rng.random(30))
     values = rng.normal(size=(40, 30)) + 1j * rng.normal(size=(40, 30))

@@ -1,11 +1,29 @@
-"""Tuned numbers of identification stand in one file, and those that follow from others do."""
+"""Tuned numbers of a package stand in one file, each with its reason; those that follow from others do."""
 
 import ast
 import math
 from pathlib import Path
 
+import pytest
+
 import ctrl_df
 from ctrl_df.identify import thresholds
+
+PACKAGE = Path(ctrl_df.__file__).parent
+
+MATHEMATICS = {
+    "simulate": {
+        "program/layout.py",  # what stands where in arrays
+        "compiler/packed.py",  # the same, for LLVM
+    },
+    "df": {
+        "closed_form/kronrod.py",  # nodes and weights
+        "closed_form/friction.py: 24.0",  # of a quadratic equation
+    },
+    "limit_cycles": set(),
+    "gains": set(),
+}
+"""Files, and numbers in them, that are no choice, of the packages that have their tuned ones in one place."""
 
 ELSEWHERE = {
     "_PREPARED",  # a size of memory
@@ -38,7 +56,7 @@ def numbers_of(path):
 
 
 def test_they_stand_in_one_place():
-    root = Path(ctrl_df.__file__).parent / "identify"
+    root = PACKAGE / "identify"
     found = [
         f"{path.relative_to(root)}: {name}"
         for room in ROOMS
@@ -59,3 +77,68 @@ def test_what_follows_follows():
     assert 0.009 < bump < 0.01
     assert thresholds.COARSE > 1 / math.sqrt(12)
     assert max(thresholds.LEVELS) == thresholds.SHORTEST < thresholds.BRIEF
+
+
+def reasons(path):
+    """Yield the names of a file's constants, and whether a docstring follows."""
+    body = ast.parse(path.read_text()).body
+    for node, after in zip(body, [*body[1:], None], strict=True):
+        if isinstance(node, ast.Assign):
+            told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            yield from ((n.id, told) for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name))
+
+
+def literals(path):
+    """Yield lines and numbers of a file that look chosen: no small multiple of an eighth, no bound of a loop.
+
+    A number that a formula divides by, divides or raises to a power belongs to the formula. Defaults of
+    arguments stand in signatures, where users look for them; indices, shapes and texts choose nothing.
+    """
+    tree = ast.parse(path.read_text())
+    passed_over, limits = set(), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arguments):
+            passed_over |= {id(n) for d in [*node.defaults, *node.kw_defaults] if d for n in ast.walk(d)}
+        elif isinstance(node, ast.JoinedStr | ast.Subscript):
+            inside = node.values if isinstance(node, ast.JoinedStr) else [node.slice]
+            passed_over |= {id(n) for part in inside for n in ast.walk(part)}
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
+            passed_over |= {id(n) for n in (node.left, node.right) if whole(n)}
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            passed_over |= {id(node.left)} if whole(node.left) else set()
+        elif isinstance(node, ast.Compare):
+            limits |= {id(n) for n in [node.left, *node.comparators]}
+        elif isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("range", "min", "max"):
+            limits |= {id(n) for n in node.args}
+        elif isinstance(node, ast.keyword):
+            limits.add(id(node.value))
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and not any(isinstance(n, ast.Call) for n in ast.walk(node.value)):
+            limits |= {id(n) for n in ast.walk(node.value)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and id(node) not in passed_over:
+            chosen = isinstance(node.value, float) and not (node.value < 10 and node.value % 0.125 == 0)
+            if chosen or (type(node.value) is int and node.value >= 10 and id(node) in limits):
+                yield node.lineno, node.value
+
+
+def whole(node):
+    """Whether a node of a formula is a whole number."""
+    return isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value % 1 == 0
+
+
+@pytest.mark.parametrize("package", MATHEMATICS)
+def test_every_tuned_number_of_a_package_has_its_place_and_its_reason(package):
+    root = PACKAGE / package
+    files = {str(p.relative_to(root)): p for p in sorted(root.rglob("*.py")) if p.name != "thresholds.py"}
+    found = [
+        f"{package}/{name}:{line}: {value}"
+        for name in files.keys() - MATHEMATICS[package]
+        for line, value in literals(files[name])
+        if f"{name}: {value}" not in MATHEMATICS[package]
+    ]
+    assert not found, found
+    named = dict(reasons(root / "thresholds.py"))
+    assert all(named.values()), [name for name, told in named.items() if not told]
+    text = "".join(p.read_text() for p in [*files.values(), root / "thresholds.py"])
+    assert not [name for name in named if text.count(name) < 2], "nobody asks for it"

@@ -291,7 +291,7 @@ def test_a_motion_that_slows_down_by_a_ratio_each_swing_comes_to_rest():
 
 
 def test_a_simulation_that_spends_its_work_is_undecided(monkeypatch):
-    monkeypatch.setattr(swings, "_WORK", 30)
+    monkeypatch.setattr(swings, "WORK", 30)
     finder = OrbitFinder(cdf.closed_loop(ct.tf([8], [1, 2, 2, 1]), np.tanh))
     assert {row.fate for row in finder.explorer.explore(edges=False)} == {"undecided"}
 

@@ -8,15 +8,11 @@ import functools
 import pytest
 import rigs
 import test_own_effects as copies
-from units_apart import SCALES, alike, diagnosed
-
-import ctrl_df as cdf
+from units_apart import SCALES, alike, diagnosed, scales_of
 
 RIVALS = ("quadratic_drag", "asymmetric_coulomb")
-# the sine of an angle knows no other unit of it
-LINEAR = [e for e in rigs.ORDER if not cdf.effect_library()[e].turns]
 # a threshold, a damping, a stiffness of another power, a channel's level, a time
-KINDS = [e for e in LINEAR if e not in (*copies.FAST, *copies.SLOW)][2::3]
+KINDS = [e for e in rigs.ORDER if e not in (*copies.FAST, *copies.SLOW)][2::3]
 
 
 @functools.cache
@@ -33,6 +29,6 @@ def test_rivals_are_ranked_alike(scale):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hidden", "scale"), [(e, SCALES[i % 3]) for i, e in enumerate(KINDS)])
+@pytest.mark.parametrize(("hidden", "scale"), [(e, scales_of(e)[i % 3]) for i, e in enumerate(KINDS)])
 def test_other_units_alter_nothing(hidden, scale):
     alike(first(hidden), diagnosed(hidden, (hidden,), *scale), scale)

@@ -8,15 +8,23 @@ import scaled
 
 import ctrl_df as cdf
 
-# Fits of laws with events have many minima side by side: there the last digit of a number decides between
-# two of them (worst seen: 8e-4 of the evidence, 7e-3 of a restitution).
-CLOSE, ALIKE = 1e-6, 2e-2
+CLOSE = 1e-6
 
 SCALES = [(1.0, 2.0**20), (2.0**-20, 2.0**10), (2.0**20, 2.0**-20)]
-"""Factors of forces and of lengths: powers of two, so that hardly anything rounds otherwise."""
+"""Factors of forces and of lengths from 1e-6 to 1e6: powers of two, so that nothing rounds otherwise.
+
+By powers of ten the last digits differ. That is seen in fits of laws with events alone, whose cost has many
+minima side by side: of all effects by a stiction (6e-6 of the evidence) and a gap (9e-4, 6e-3 of its
+restitution).
+"""
 
 SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow
 LENGTHS = {"hard_stop": 5000, "backlash": 1600}  # samples until stop and gap have been met often enough
+
+
+def scales_of(hidden):
+    """Return the factors: the sine of an angle knows no other unit of it."""
+    return [(force, 1.0 if cdf.effect_library()[hidden].turns else length) for force, length in SCALES]
 
 
 @functools.cache
@@ -40,6 +48,5 @@ def alike(before, after, scale):
     """Assert that verdict, evidence and, converted, parameters are the same."""
     assert after.verdict == before.verdict
     first, second = before.ranking[0], after.ranking[0]
-    close = ALIKE if first.effect.nonsmooth else CLOSE
-    assert second.evidence == pytest.approx(first.evidence, rel=close, abs=1e-6)
-    assert scaled.back(second, *scale) == pytest.approx(dict(first.parameters), rel=close)
+    assert second.evidence == pytest.approx(first.evidence, rel=CLOSE, abs=CLOSE)
+    assert scaled.back(second, *scale) == pytest.approx(dict(first.parameters), rel=CLOSE)

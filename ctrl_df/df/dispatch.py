@@ -26,6 +26,7 @@ from .methods import (
     RateLimiterForm,
     Sampled,
 )
+from .thresholds import SAMPLES
 
 # python-control's own classes, held at import: someone may put ours in their place.
 _SATURATION = descfcn.saturation_nonlinearity
@@ -89,7 +90,7 @@ def method_for(F, output=None, try_method=True, num_points=100, largest=1.0, opt
     static = own is not None or _is_static(law, largest)
     if static:
         return Quadrature(law, own_method=own)
-    return Sampled(law, own_method=own, samples=max(4096, int(num_points)))
+    return Sampled(law, own_method=own, samples=max(SAMPLES, int(num_points)))
 
 
 def translated(F):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from typing import Any
 
-_AHEAD = 256  # parts submitted before the first is taken: what is done and waits takes memory
+from .thresholds import PARTS_AHEAD
 
 
 def check_picklable(executor, example) -> None:
@@ -52,7 +52,7 @@ def by_executor(
         The work cannot be sent to the workers.
     """
     waiting: deque = deque()
-    tasks, ahead = iter(tasks), _AHEAD if ahead is None else ahead
+    tasks, ahead = iter(tasks), PARTS_AHEAD if ahead is None else ahead
     try:
         while True:
             for key, arguments in tasks:

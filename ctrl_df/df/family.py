@@ -16,6 +16,7 @@ from ..table import Table
 from .family_file import FORMAT, read_arrays, write_arrays
 from .journal import is_journal, lines_done, read_header
 from .points import AtPairs
+from .thresholds import ON_GRID
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,12 +105,12 @@ class Family:
             raise ValueError("frd needs frequencies; this family has none. Give omega when computing it.")
         amplitude = number("frd", "amplitude", amplitude)
         low, high = self.amplitudes.min(), self.amplitudes.max()
-        if not low * (1 - 1e-12) <= amplitude <= high * (1 + 1e-12):
+        if not low * (1 - ON_GRID) <= amplitude <= high * (1 + ON_GRID):
             raise ValueError(
                 f"frd needs {low:g} <= amplitude <= {high:g} (the family's grid); got {amplitude!r}. "
                 "Compute a family that reaches it."
             )
-        row = np.nonzero(np.isclose(self.amplitudes, amplitude, rtol=1e-12, atol=0))[0]
+        row = np.nonzero(np.isclose(self.amplitudes, amplitude, rtol=ON_GRID, atol=0))[0]
         if row.size:
             response = self.N[row[0]]
         elif self.at is not None:

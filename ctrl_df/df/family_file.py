@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..checks import path_of
+from .thresholds import COMPRESSED
 
 FORMAT = 2
 """Of saved families: 1 to version 0.1.0; raised when files, or the numbers in them, change their meaning."""
-_COMPRESSED = 64 << 20  # [bytes] up to which a file is made small: beyond, that takes too long
 
 
 def place_for(save) -> Path:
@@ -32,7 +32,7 @@ def write_arrays(path, arrays: Mapping[str, Any]) -> Path:
     """Write arrays as npz through a temporary file beside `path`: a break leaves the old file whole."""
     path = place_for(path)
     arrays = {k: np.asarray(v) for k, v in arrays.items()}
-    write = np.savez_compressed if sum(a.nbytes for a in arrays.values()) < _COMPRESSED else np.savez
+    write = np.savez_compressed if sum(a.nbytes for a in arrays.values()) < COMPRESSED else np.savez
     temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
         with open(temporary, "wb") as file:

@@ -8,6 +8,7 @@ import numpy as np
 
 from .methods import Method, Quadrature
 from .threads import go_on
+from .thresholds import NO_GAIN, SMALL
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
 
@@ -95,11 +96,11 @@ def _slope_at_zero(method, largest, zero_check):
                 f"function must evaluate to zero at zero; got f(0) = {at_zero}. "
                 "Subtract the bias, or pass zero_check=False."
             )
-    small = (largest or 1.0) * np.array([1e-9, 1e-8, 1.0])
+    small = (largest or 1.0) * np.array(SMALL)
     N = method.harmonics(small, None, 1)[0][:, 0, 1]
     if abs(N[0]) > 5 * abs(N[1]):
         return complex(np.inf)
-    return N[0] if abs(N[0]) > 1e-13 * abs(N[2]) else 0j
+    return N[0] if abs(N[0]) > NO_GAIN * abs(N[2]) else 0j
 
 
 def compute_part(method: Method, A, omega, orders):

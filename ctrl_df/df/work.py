@@ -17,11 +17,9 @@ from .journal import Journal, is_journal, read_header
 from .methods import Guarded, Method
 from .points import AtPairs, compute_part
 from .threads import Threads
+from .thresholds import HERE, LARGEST, LAW_ROWS
 
-LARGEST = 2 << 30  # [bytes] of a family in memory
 _REGIME = "U16"
-_HERE = 1 << 14  # points of a quick method in one part: some milliseconds
-_LAW_ROWS = 64  # amplitudes of a static law computed together: its corners are looked for once for them
 
 
 class Work:
@@ -131,7 +129,7 @@ class Work:
         lines = np.nonzero(~self.done)[0]
         if self.method.static:
             return [p for p in np.split(lines, np.searchsorted(lines, _multiples(self.A.size))) if p.size]
-        most = max(1, _HERE // self._omega.size) if self.method.quick and not spread else 1
+        most = max(1, HERE // self._omega.size) if self.method.quick and not spread else 1
         return [lines[i : i + most] for i in range(0, lines.size, most)]
 
     def _grid(self, part):
@@ -250,7 +248,7 @@ def require_room(na: int, nw: int, orders: int) -> None:
 
 
 def _multiples(size):
-    return np.arange(_LAW_ROWS, size, _LAW_ROWS)
+    return np.arange(LAW_ROWS, size, LAW_ROWS)
 
 
 def describe(F) -> str:

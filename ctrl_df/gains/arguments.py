@@ -12,8 +12,7 @@ from ..checks import is_number, number, real_array, shown
 from ..df.dispatch import translated
 from ..units import over
 from .controller import GAINS
-
-_OFF = 0.02  # of the range of ki: how near to zero the loop is asked; below, hunting takes ever so long
+from .thresholds import OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +70,7 @@ class Box:
     def off_the_rim(self, unit) -> np.ndarray:
         """Return points of the unit square (n, 2), moved away from the rim without integral action."""
         away = np.array([name == "ki" and axis[0] == 0 for name, axis in self._both])
-        return np.where(away, np.maximum(unit, _OFF), unit)
+        return np.where(away, np.maximum(unit, OFF), unit)
 
     def rim(self) -> np.ndarray:
         """Return the ends of that rim, in the unit square, (2, 2), or no point."""

@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..limit_cycles.predicted.grade import LOEB
+from ..limit_cycles.thresholds import LOEB
 from .controller import GAINS
 from .plane import Plane
-
-_JUMP = 0.7  # relative change of Z within a triangle, beyond which the block changes between motions there
+from .thresholds import JUMP, POLISH_STEPS, POLISHED, SINGULAR
 
 
 class Segments(NamedTuple):
@@ -61,7 +60,7 @@ def segments(plane: Plane, R) -> Segments:
         tri = tri[:, np.isfinite(flat[tri]).all(axis=0)]
         size = np.abs(need[tri])
         spread = np.abs(need[tri] - need[np.roll(tri, 1, axis=0)]).max(axis=0)
-        found.append(tri[:, spread < _JUMP * size.max(axis=0)])
+        found.append(tri[:, spread < JUMP * size.max(axis=0)])
     tri = np.concatenate(found, axis=1)
     up = above[tri]
     lone = np.where(up[0] == up[1], 2, np.where(up[0] == up[2], 1, 0))
@@ -110,7 +109,9 @@ def settled(sine) -> np.ndarray:
     return np.where(np.abs(sine) < LOEB, np.nan, (sine > 0).astype(float))
 
 
-def polished(plane: Plane, gains, p: float, q: float, steps: int = 12) -> tuple[float, float, float] | None:
+def polished(
+    plane: Plane, gains, p: float, q: float, steps: int = POLISH_STEPS
+) -> tuple[float, float, float] | None:
     """Newton's method from a cycle found on the grid to (ln a, ln omega), and Loeb's sine there."""
     start = np.array([p, q])
     x = start.copy()
@@ -120,11 +121,11 @@ def polished(plane: Plane, gains, p: float, q: float, steps: int = 12) -> tuple[
         J = np.array([[by_p[0].real, by_q[0].real], [by_p[0].imag, by_q[0].imag]])
         if not np.isfinite(J).all() or not np.isfinite(F[0]):
             return None
-        step = np.linalg.lstsq(J, -np.array([F[0].real, F[0].imag]), rcond=1e-9)[0]
+        step = np.linalg.lstsq(J, -np.array([F[0].real, F[0].imag]), rcond=SINGULAR)[0]
         x = x + step
         if (np.abs(x - start) > reach).any():
             return None
-        if np.abs(step).max() < 1e-10:
+        if np.abs(step).max() < POLISHED:
             break
     size = np.linalg.norm(J[:, 0]) * np.linalg.norm(J[:, 1])
     return float(x[0]), float(x[1]), float(np.linalg.det(J) / size)

@@ -10,12 +10,7 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import Delaunay, KDTree
 from scipy.stats import qmc
 
-# An edge is cut by its length times this: between answers that differ as no model has it, across what may be
-# a border, between none. At the ends of the range an edge of 0.2 that nothing is known against waits for
-# borders of 0.025 to be resolved.
-_WORTH = (1.0, 0.35, 0.125)
-_COARSE = 0.1  # length up to which an edge across the line is cut like one with different answers
-_ROUND = 8  # rounds of cutting
+from .thresholds import COARSE, LEAST_SHARE, ON_RIM, ROUND, WITHIN_RIM, WORTH
 
 
 def spread_points(count: int, seed: int) -> np.ndarray:
@@ -74,16 +69,18 @@ class Border:
         lies there, or of the nearest of all.
         """
         places = np.clip(np.atleast_2d(places), self.mesh.min_bound, self.mesh.max_bound)
-        simplex = self.mesh.find_simplex(places, tol=1e-9)
+        simplex = self.mesh.find_simplex(places, tol=ON_RIM)
         lost = simplex < 0  # on the rim, by rounding
         if lost.any():
-            simplex[lost] = self.mesh.find_simplex(0.5 + (places[lost] - 0.5) * (1 - 1e-6), tol=1e-6)
+            simplex[lost] = self.mesh.find_simplex(
+                0.5 + (places[lost] - 0.5) * (1 - WITHIN_RIM), tol=WITHIN_RIM
+            )
         turn, corners = self.mesh.transform[simplex], self.inner[self.mesh.simplices[simplex]]
         share = np.einsum("nij,nj->ni", turn[:, :2], places - turn[:, 2])
         share = np.column_stack([share, 1 - share.sum(axis=1)])
         own = self.side[corners] == side[:, None]
         alike = (self.answers[corners] == self.answers[corners][:, :1]).all(axis=(1, 2))
-        share = np.where(own | (alike & (side >= 0))[:, None], np.maximum(share, 1e-12), 0.0)
+        share = np.where(own | (alike & (side >= 0))[:, None], np.maximum(share, LEAST_SHARE), 0.0)
         weight = share.sum(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
             out = np.einsum("nc,nck->nk", share, self.answers[corners]) / weight[:, None] > 0.5
@@ -106,10 +103,10 @@ class Border:
         length = np.linalg.norm(self.points[one] - self.points[other], axis=1)
         across = self.side[one] != self.side[other]
         # across a line known beforehand it is asked whether the answers change there, not where
-        differ = (self.answers[one, 0] != self.answers[other, 0]) & (~across | (length > _COARSE))
+        differ = (self.answers[one, 0] != self.answers[other, 0]) & (~across | (length > COARSE))
         foreseen = differ & self.right[one] & self.right[other]
         doubted = (self.predicted[one] != self.predicted[other]) | across | foreseen
-        worth = length * np.where(differ & ~foreseen, _WORTH[0], np.where(doubted, _WORTH[1], _WORTH[2]))
+        worth = length * np.where(differ & ~foreseen, WORTH[0], np.where(doubted, WORTH[1], WORTH[2]))
         chosen: list[np.ndarray] = []
         for k in np.argsort(-worth):
             middle = 0.5 * (self.points[one[k]] + self.points[other[k]])
@@ -140,7 +137,7 @@ def refined(
         Predictions (m,) and sides (m,) at points.
     """
     border = Border(first, ask(first), side(first), predict(first))
-    part = max(1, -(-(budget - len(first)) // _ROUND))
+    part = max(1, -(-(budget - len(first)) // ROUND))
     while len(border.points) < budget:
         new = border.worst_edges(min(part, budget - len(border.points)))
         if not len(new):

@@ -12,13 +12,17 @@ import numpy as np
 from ..arclength import correction, tangent
 from .balance import Segments, defect, excess, segments
 from .plane import Plane
-
-_STEP = 0.02  # of the box of gains and of a unit of ln a and ln omega
-_LONGEST = 600  # steps of one curve, either way
-_TRY = 1e-4  # step of difference quotients
-_CLOSED = 1e-7
-_REACH = 0.5  # from a start to the fold it belongs to, in those units
-_BEYOND = 0.05  # of the box, by which a curve is followed out of it
+from .thresholds import (
+    FOLD_BEYOND,
+    FOLD_CLOSED,
+    FOLD_LEAST,
+    FOLD_NUDGE,
+    FOLD_POINTS,
+    FOLD_REACH,
+    FOLD_SINGULAR,
+    FOLD_STEP,
+    POLISH_STEPS,
+)
 
 
 def folds(plane: Plane, free, fixed, axes) -> list[np.ndarray]:
@@ -47,7 +51,7 @@ def folds(plane: Plane, free, fixed, axes) -> list[np.ndarray]:
 
     for start in _starts(plane, free, fixed, axes, box):
         point = _on_fold(equations, start)
-        if point is None or any(_distance(curve, point) < _STEP for curve in curves):
+        if point is None or any(_distance(curve, point) < FOLD_STEP for curve in curves):
             continue
         curve = _followed(equations, plane, point)
         if len(curve) > 2:
@@ -65,7 +69,7 @@ def _starts(plane, free, fixed, axes, box):
                 at = np.empty(2)
                 at[held], at[1 - held] = value, gain
                 unit = (at - box[0]) / box[1]
-                if (unit > -_BEYOND).all() and (unit < 1 + _BEYOND).all():
+                if (unit > -FOLD_BEYOND).all() and (unit < 1 + FOLD_BEYOND).all():
                     yield np.array([p, q, *unit])
 
 
@@ -98,23 +102,23 @@ def _equations(plane, free, fixed, box, u):
 
 def _linearized(equations, u):
     """Equations at a point and their Jacobian (3, 4)."""
-    around = np.concatenate([u[None], u + _TRY * np.eye(4), u - _TRY * np.eye(4)])
+    around = np.concatenate([u[None], u + FOLD_NUDGE * np.eye(4), u - FOLD_NUDGE * np.eye(4)])
     values = equations(around)
-    return values[0], (values[1:5] - values[5:]).T / (2 * _TRY)
+    return values[0], (values[1:5] - values[5:]).T / (2 * FOLD_NUDGE)
 
 
 def _on_fold(equations, start):
     """Newton's method from near a fold onto it; None where there is none."""
     u = start
-    for _ in range(12):
+    for _ in range(POLISH_STEPS):
         G, J = _linearized(equations, u)
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None
-        step = np.linalg.lstsq(J, -G, rcond=1e-10)[0]
+        step = np.linalg.lstsq(J, -G, rcond=FOLD_SINGULAR)[0]
         u = u + step
-        if np.abs(u - start).max() > _REACH:
+        if np.abs(u - start).max() > FOLD_REACH:
             return None
-        if np.abs(step).max() < _CLOSED:
+        if np.abs(step).max() < FOLD_CLOSED:
             return u
     return None
 
@@ -127,12 +131,12 @@ def _followed(equations, plane, point):
 
 
 def _one_way(equations, plane, u, along):
-    begin, points, length = u, [], _STEP
-    for _ in range(_LONGEST):
+    begin, points, length = u, [], FOLD_STEP
+    for _ in range(FOLD_POINTS):
         new = _corrected(equations, u + length * along, along)
         if new is None or np.dot(new - u, along) < 0.5 * length:
             length *= 0.5
-            if length < 1e-2 * _STEP:
+            if length < FOLD_LEAST * FOLD_STEP:
                 break
             continue
         if not _within(plane, new):
@@ -140,8 +144,8 @@ def _one_way(equations, plane, u, along):
         points.append(new)
         J = _linearized(equations, new)[1]
         u, along = new, tangent(J, along) if np.isfinite(J).all() else along
-        length = min(_STEP, 2 * length)
-        if len(points) > 4 and np.linalg.norm(new - begin) < _STEP:  # it is closed
+        length = min(FOLD_STEP, 2 * length)
+        if len(points) > 4 and np.linalg.norm(new - begin) < FOLD_STEP:  # it is closed
             points.append(begin)
             break
     return np.array(points).reshape(-1, 4)
@@ -155,7 +159,7 @@ def _corrected(equations, guess, border):
             return None
         step = correction(J, border, G, np.dot(u - guess, border))
         u = u + step
-        if np.abs(step).max() < _CLOSED:
+        if np.abs(step).max() < FOLD_CLOSED:
             return u
     return None
 
@@ -165,8 +169,8 @@ def _within(plane, u) -> bool:
     return bool(
         plane.log_a[0] <= p <= plane.log_a[-1]
         and plane.log_w[0] <= q <= plane.log_w[-1]
-        and min(unit) >= -_BEYOND
-        and max(unit) <= 1 + _BEYOND
+        and min(unit) >= -FOLD_BEYOND
+        and max(unit) <= 1 + FOLD_BEYOND
     )
 
 

@@ -18,11 +18,9 @@ from .plane import plane_of, require_linear
 from .predicted import at_one, over_grid, summed_up
 from .simulated import Simulated, all_simulated
 from .stability import linear_border, unstable_poles
+from .thresholds import APART, CHECKS_LEAST, SPREAD
 
 _OWNER = "limit_cycle_map"
-_SPREAD = 0.4  # of the exact checks: spread evenly; the others close in on borders
-_LEAST = 8  # exact checks
-_APART = 1e-3  # of the unit square: least distance of two points simulated
 
 
 def limit_cycle_map(
@@ -111,8 +109,8 @@ def limit_cycle_map(
     unknown_keywords(keywords)
     points = count(_OWNER, "n", n, 2, meaning="values of each range")
     checks = count(_OWNER, "exact_check", exact_check, 0, meaning="points simulated")
-    if 0 < checks < _LEAST:
-        raise ValueError(f"{_OWNER} needs exact_check=0, or at least {_LEAST} points; got {checks}.")
+    if 0 < checks < CHECKS_LEAST:
+        raise ValueError(f"{_OWNER} needs exact_check=0, or at least {CHECKS_LEAST} points; got {checks}.")
     box = box_of(_OWNER, {"kp": kp, "ki": ki, "kd": kd}, points)
     tf = number(_OWNER, "tf", tf, "s", lower=0.0, meaning="filter time constant")
     if plant is not None:
@@ -154,9 +152,9 @@ def limit_cycle_map(
 
 def _checked(plane, box, predicted, budget, seed, progress):
     """Simulate at points spread and at points where the answer changes; see `border.refined`."""
-    even = box.off_the_rim(spread_points(max(int(_SPREAD * budget), 4), seed))
+    even = box.off_the_rim(spread_points(max(int(SPREAD * budget), 4), seed))
     deep = [
-        d for d in deep_points(predicted)[: budget // 8] if np.linalg.norm(even - d, axis=1).min() > _APART
+        d for d in deep_points(predicted)[: budget // 8] if np.linalg.norm(even - d, axis=1).min() > APART
     ]
     first = np.concatenate([even, *(d[None] for d in deep), box.rim()])
     found: list[Simulated] = []

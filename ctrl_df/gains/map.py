@@ -19,8 +19,7 @@ from .plane import Plane
 from .predicted import PredictedCycle, at_one, fates, over_grid, summed_up
 from .simulated import Simulated, simulated, worded
 from .stability import unstable_poles
-
-_ENOUGH = 6  # exact cycles from which sizes between them are told
+from .thresholds import CHECKS_ENOUGH
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +280,7 @@ class LimitCycleMap:
         )
         words = words.reshape(grows.shape)
         known = [c for c in self.checks if c.orbit is not None]
-        if len(known) < _ENOUGH:
+        if len(known) < CHECKS_ENOUGH:
             return replace(predicted, verdict=words)
         at = np.array([self.box.to_unit(*(c.gains[name] for name in self.free)) for c in known])
         sizes = np.log([(c.orbit.omega, c.orbit.output_amplitude) for c in known if c.orbit])

@@ -25,13 +25,7 @@ from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.scan_grid import noisy, with_corners
 from ..simulate.engine import Engine
 from .controller import Structure
-
-_BELOW, _ABOVE = 0.03, 1e3  # amplitudes looked at, in units of the scale at which the block bends
-_FASTER = 10.0  # frequencies looked at, beyond the corner frequencies of the loop, either way
-_SIZE = {True: (240, 320), False: (48, 64)}  # points of the plane: of a closed form, of computed orbits
-_CLOSER = 4.0 ** np.arange(-12.0, -1.0)  # relative, from the least amplitude that moves the block on
-_SMALL = 1e-5  # step of difference quotients, in ln a and ln omega
-LARGE = 1e3  # times the largest amplitude: there a law that is linear in the large has become so
+from .thresholds import ABOVE, BELOW, BISECTIONS, CLOSER, FASTER, LARGE, SIZE, SMALL
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +69,7 @@ class Plane:
 
     def slopes(self, p, q) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Z and its derivatives by ln a and ln omega, at pairs."""
-        h = _SMALL if self.method.quick else 0.25 * float(np.diff(self.log_a).min())
+        h = SMALL if self.method.quick else 0.25 * float(np.diff(self.log_a).min())
         p, q = np.atleast_1d(p), np.atleast_1d(q)
         at = self.need(np.concatenate([p, p + h, p - h, p, p]), np.concatenate([q, q, q, q + h, q - h]))
         Z, up, down, right, left = at.reshape(5, -1)
@@ -125,10 +119,10 @@ def plane_of(
     paces, scales = zip(*(_scales(structure, gains) for gains in corners), strict=True)
     scale = float(np.median(scales))
     if amplitude is None:
-        amplitude = _BELOW * min(scales), _ABOVE * max(scales)
+        amplitude = BELOW * min(scales), ABOVE * max(scales)
     if omega is None:
-        omega = min(paces) / _FASTER, max(paces) * _FASTER
-    na, nw = _SIZE[method.quick]
+        omega = min(paces) / FASTER, max(paces) * FASTER
+    na, nw = SIZE[method.quick]
     w = np.geomspace(omega[0], omega[1], nw)
     a = _amplitudes(method, np.geomspace(amplitude[0], amplitude[1], na), w)
     family = describing_function_family(block, a, w, 1, output=structure.output, progress=progress)
@@ -168,10 +162,10 @@ def _amplitudes(method, a, w):
         return a
     high = int(np.argmax(begun))
     low, high = a[high - 1], a[high]
-    for _ in range(50):
+    for _ in range(BISECTIONS):
         mid = np.sqrt(low * high)
         low, high = (low, mid) if moves(mid)[0] else (mid, high)
-    near = high * (1 + _CLOSER)
+    near = high * (1 + CLOSER)
     return np.unique(np.concatenate([a[a > high], near[near < a[-1]]]))
 
 

@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from ..limit_cycles.exact.fate import Fate
 from ..limit_cycles.exact.orbit import Orbit
 from ..limit_cycles.finder import OrbitFinder
 from ..simulate.crew import require_compiled, side_by_side
 from .controller import Structure
-
-STARTS = tuple(np.geomspace(0.03, 30.0, 12))
-"""Sizes of the starts, of that at which the block's nonlinearity matters."""
-# those that meet cycles soonest come first: later starts that end there are not followed to their end
-ORDER = tuple(STARTS[k] for k in (5, 8, 3, 10, 1, 6, 4, 7, 2, 9, 0, 11))
+from .thresholds import ORDER
 
 
 @dataclass(frozen=True)

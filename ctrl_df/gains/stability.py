@@ -6,11 +6,7 @@ import numpy as np
 
 from .controller import GAINS
 from .plane import Plane
-
-_LINE = 400  # points of a straight border
-_DENSE = 2000  # frequencies of a phase count
-_ASIDE = 2e-3  # of the box: how far on either side of a curve the poles are counted
-_NOWHERE = 1e-9  # determinant, relative, below which two gains are one and the same at a frequency
+from .thresholds import ASIDE, BORDER_LINE, BORDER_POINTS, NOWHERE, ON_RIM, PHASES, PHASES_AT_ONCE
 
 
 def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
@@ -20,13 +16,13 @@ def unstable_poles(plane: Plane, kp, ki, kd) -> np.ndarray:
     poles at the origin and n to the right of the axis, ``n + m/2 - phase / pi`` poles of the closed loop lie
     to the right.
     """
-    q = np.linspace(plane.log_w[0], plane.log_w[-1], _DENSE)
+    q = np.linspace(plane.log_w[0], plane.log_w[-1], PHASES)
     far = _interpolated(plane, q)
     shape = np.broadcast_shapes(np.shape(kp), np.shape(ki), np.shape(kd))
     gains = [np.broadcast_to(g, shape).ravel() for g in (kp, ki, kd)]
     terms = plane.structure.terms(np.exp(q))
     out = np.empty(gains[0].size)
-    rows = max(1, (1 << 20) // _DENSE)
+    rows = max(1, PHASES_AT_ONCE // PHASES)
     for k in range(0, out.size, rows):
         C = sum(np.multiply.outer(g[k : k + rows], t) for g, t in zip(gains, terms, strict=True))
         out[k : k + rows] = _count(-C / far, q)
@@ -52,7 +48,7 @@ def _count(L, q):
     return 0.5 * m - turn / np.pi
 
 
-def linear_border(plane: Plane, free, fixed, ranges, points=4000) -> list[np.ndarray]:
+def linear_border(plane: Plane, free, fixed, ranges, points=BORDER_POINTS) -> list[np.ndarray]:
     """Curves in the plane of two gains on which the loop in the large has a pole on the imaginary axis.
 
     The D-partition: at each frequency Z = C is two equations for two gains. Where the two are one (integral
@@ -79,7 +75,7 @@ def linear_border(plane: Plane, free, fixed, ranges, points=4000) -> list[np.nda
     b1, b2 = (terms[GAINS.index(name)] for name in free)
     det = b1.real * b2.imag - b1.imag * b2.real
     curves = []
-    if (np.abs(det) > _NOWHERE * np.abs(b1) * np.abs(b2)).any():
+    if (np.abs(det) > NOWHERE * np.abs(b1) * np.abs(b2)).any():
         with np.errstate(all="ignore"):
             x = (need.real * b2.imag - need.imag * b2.real) / det
             y = (b1.real * need.imag - b1.imag * need.real) / det
@@ -90,12 +86,12 @@ def linear_border(plane: Plane, free, fixed, ranges, points=4000) -> list[np.nda
             share = across[k] / (across[k] - across[k + 1])
             at = np.exp(q[k] + share * (q[k + 1] - q[k]))
             one, other, level = (np.interp(at, w, v.real) for v in (b1 / b1, b2 / b1, need / b1))
-            x = np.linspace(ranges[0][0], ranges[0][1], _LINE)
+            x = np.linspace(ranges[0][0], ranges[0][1], BORDER_LINE)
             curves.append(np.stack([x, (level - one * x) / other], axis=1))
     if "ki" in free and plane.structure.plant is None:
-        line = np.zeros((_LINE, 2))
+        line = np.zeros((BORDER_LINE, 2))
         other = 1 - free.index("ki")
-        line[:, other] = np.linspace(ranges[other][0], ranges[other][1], _LINE)
+        line[:, other] = np.linspace(ranges[other][0], ranges[other][1], BORDER_LINE)
         curves.append(line)
     return [piece for curve in curves for piece in _parting(plane, curve, free, fixed, ranges)]
 
@@ -105,14 +101,14 @@ def _parting(plane, curve, free, fixed, ranges):
     size = np.array([high - low for low, high in ranges])
     low = np.array([r[0] for r in ranges])
     unit = (curve - low) / size
-    inside = np.isfinite(unit).all(axis=1) & (unit >= -1e-9).all(axis=1) & (unit <= 1 + 1e-9).all(axis=1)
+    inside = np.isfinite(unit).all(axis=1) & (unit >= -ON_RIM).all(axis=1) & (unit <= 1 + ON_RIM).all(axis=1)
     along = np.gradient(np.where(np.isfinite(unit), unit, 0), axis=0)
     with np.errstate(all="ignore"):
         normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
     inside &= np.isfinite(normal).all(axis=1)
     sides = []
     for sign in (-1, 1):
-        at = low + size * (unit[inside] + _ASIDE * sign * normal[inside])
+        at = low + size * (unit[inside] + ASIDE * sign * normal[inside])
         gains = {free[0]: at[:, 0], free[1]: at[:, 1], **fixed}
         sides.append(unstable_poles(plane, *(gains[name] for name in GAINS)) > 0)
     keep = inside.copy()

@@ -24,14 +24,20 @@ from .controller import GAINS, Structure
 from .plane import Plane, plane_of, require_linear
 from .simulated import Simulated, simulated, worded
 from .stability import far_loop, unstable_poles
+from .thresholds import (
+    DECADES,
+    EXTREME,
+    FURTHER,
+    GENERATIONS,
+    INTEGRAL,
+    MARGIN_POINTS,
+    MEMBERS,
+    SOFTER,
+    VERIFIED,
+    WIDER,
+)
 
 _OWNER = "tune_pid"
-_WIDER = 1.5  # times the least bandwidth: the greatest, where only one is given
-_INTEGRAL = (0.02, 1.0)  # integral action looked among, ki / (kp bandwidth)
-_EXTREME = 1e9  # an amplitude at which a block is linear that is so in the large; one over it: in the small
-_MEMBERS, _GENERATIONS = 6, 12  # of the search: six members a gain
-_DECADES = 100.0  # frequencies looked at, beyond the bandwidth, either way
-_POINTS = 600  # frequencies at which margins are read
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -198,7 +204,7 @@ def tune_pid(
     unknown_keywords(keywords)
     if np.ndim(bandwidth) == 0:
         least = positive(_OWNER, "bandwidth", bandwidth, "rad/s", meaning="crossover frequency")
-        band = least, _WIDER * least
+        band = least, WIDER * least
     else:
         band = cast("tuple[float, float]", bounds(_OWNER, "bandwidth", bandwidth, "rad/s"))
     limit = number(_OWNER, "max_sensitivity", max_sensitivity, lower=1.0, strict=True)
@@ -209,7 +215,7 @@ def tune_pid(
     linear_at, N = _where_linear(structure, np.array(band))
     need = np.abs(1 / (N * structure.beside(np.array(band))))
     ranges = _ranges(structure, band, need, {"kp": kp, "ki": ki, "kd": kd})
-    omega = band[0] / _DECADES, band[1] * _DECADES
+    omega = band[0] / DECADES, band[1] * DECADES
     plane = plane_of(structure, _corners(ranges), omega=omega, linear_at=linear_at, progress=progress)
     free = [name for name in GAINS if ranges[name][0] < ranges[name][1]]
     search = _Search(plane, ranges, free, band, limit, float(need[0]))
@@ -220,7 +226,7 @@ def tune_pid(
             evolve: Any = differential_evolution  # seed is called rng from SciPy 1.15 on
             found: OptimizeResult = evolve(
                 search.cost, box, constraints=NonlinearConstraint(search.margins, -np.inf, 0.0),
-                popsize=_MEMBERS, maxiter=_GENERATIONS, seed=seed, polish=False, updating="deferred",
+                popsize=MEMBERS, maxiter=GENERATIONS, seed=seed, polish=False, updating="deferred",
                 init="halton",
                 workers=side_by_side,
             )  # fmt: skip
@@ -279,11 +285,11 @@ def _key(gains):
 
 def _ranges(structure, band, need, given: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """Bounds of every gain: those given, the others around what crosses over within the band."""
-    low, high = 0.1 * float(need.min()), float(need.max())
+    low, high = SOFTER * float(need.min()), float(need.max())
     ranges = {
         "kp": (low, high),
-        "ki": (_INTEGRAL[0] * band[0] * low, _INTEGRAL[1] * band[1] * high),
-        "kd": (0.1 * low / band[1], high / band[0]),
+        "ki": (INTEGRAL[0] * band[0] * low, INTEGRAL[1] * band[1] * high),
+        "kd": (SOFTER * low / band[1], high / band[0]),
     }
     units = gain_units(structure.block, structure.output)
     for name, value in given.items():
@@ -304,7 +310,7 @@ def _corners(ranges):
 def _where_linear(structure: Structure, omega) -> tuple[float, np.ndarray]:
     """Return an amplitude at which the block is linear, and N there at some frequencies."""
     method = method_for(structure.block, structure.output)
-    for at, further in ((_EXTREME, 10 * _EXTREME), (1 / _EXTREME, 0.1 / _EXTREME)):
+    for at, further in ((EXTREME, FURTHER * EXTREME), (1 / EXTREME, 1 / FURTHER / EXTREME)):
         by_size = np.sort([at, further])
         N = method.harmonics(by_size, omega if method.needs_omega else None, 1)[0][..., 1]
         with np.errstate(invalid="ignore"):
@@ -321,7 +327,7 @@ def _where_linear(structure: Structure, omega) -> tuple[float, np.ndarray]:
 
 def _margins(plane: Plane, gains) -> tuple[float, float, float]:
     """Crossover frequency [rad/s], largest sensitivity, phase margin [rad] of the loop where it is linear."""
-    q = np.linspace(plane.log_w[0], plane.log_w[-1], _POINTS)
+    q = np.linspace(plane.log_w[0], plane.log_w[-1], MARGIN_POINTS)
     L = far_loop(plane, gains, q)
     size = np.log(np.abs(L))
     falls = np.flatnonzero((size[:-1] >= 0) & (size[1:] < 0))
@@ -339,7 +345,7 @@ def _margins(plane: Plane, gains) -> tuple[float, float, float]:
 def _verified(structure, plane, gains) -> Check:
     """Predict and verify at the gains chosen."""
     a, w = np.exp(plane.log_a), np.exp(plane.log_w)
-    box = np.geomspace(a[0], a[-1], 60), np.geomspace(w[0], w[-1], 80)
+    box = np.geomspace(a[0], a[-1], VERIFIED[0]), np.geomspace(w[0], w[-1], VERIFIED[1])
     response = describing_function_response(
         structure.controller(gains), structure.block, *box, output=structure.output, progress=False
     )  # fmt: skip

@@ -25,14 +25,26 @@ from .pieces import by_pieces
 from .predicted.answer import responder
 from .predicted.linear import LinearPart
 from .predicted.path import End, Path, corrected_near, follow_path
-
-# A prediction and an orbit within these factors of frequency and amplitude are taken for one cycle.
-SAME_CYCLE = (1.25, 2.0)
-_SAME_AS_PATH = (1.1, 1.3)  # the same for the end of a path, which lacks the highest harmonics only
-_AT_ITS_END = 1e-3  # distance of an orbit from the end of its path that harmonics left out may explain
-_PIECES = 8  # of multiple shooting
-_NEAR_MISS = 0.3  # mismatch of a lap, relative to the orbit, from which it is worth following
-_ENOUGH = 6  # swings from which an orbit can be judged
+from .thresholds import (
+    AT_ITS_END,
+    AVERAGE_POINTS,
+    COURSE_RTOL,
+    ENOUGH,
+    EVENTS_KEPT,
+    NEAR_MISS,
+    NOTHING,
+    PIECES,
+    RECENT_CLOSED,
+    REPEATS_LEAST,
+    RETURN_GONE,
+    RETURN_NEAR,
+    RETURN_POINTS,
+    RETURN_RTOL,
+    SAME_AS_PATH,
+    SAME_CYCLE,
+    SWINGS,
+    SWINGS_AVERAGED,
+)
 
 
 def find_limit_cycle(
@@ -197,14 +209,14 @@ class OrbitFinder:
         """Return times after which a simulation from a state comes near it again, nearest first."""
         course = self.swings.follow(x0, 4, until_repeated=False)
         span = course.laps[-1].time if course.laps else self.swings.stride
-        times = np.linspace(0.0, span, 4097)
-        run = self.engine.run(self.engine.start(x0), span, times=times, rtol=1e-9, log=1)
+        times = np.linspace(0.0, span, RETURN_POINTS)
+        run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
         states = run.states[: run.recorded]
-        size = np.maximum(np.max(np.abs(states[np.isfinite(states).all(axis=1)]), axis=0), 1e-300)
+        size = np.maximum(np.max(np.abs(states[np.isfinite(states).all(axis=1)]), axis=0), NOTHING)
         apart = np.max(np.abs(states - x0) / size, axis=1)
         lows = np.flatnonzero((apart[1:-1] <= apart[:-2]) & (apart[1:-1] < apart[2:])) + 1
-        gone = np.flatnonzero(apart > 0.1)
-        lows = lows[(lows > (gone[0] if gone.size else len(times))) & (apart[lows] < 0.5)]
+        gone = np.flatnonzero(apart > RETURN_GONE)
+        lows = lows[(lows > (gone[0] if gone.size else len(times))) & (apart[lows] < RETURN_NEAR)]
         return [float(times[k]) for k in lows[np.argsort(apart[lows])][:most]]
 
     def _paths(self, guess, amplitude, omega):
@@ -247,16 +259,16 @@ class OrbitFinder:
         (start,), period = path_starts(self.loop, path, 1), 2 * np.pi / path.omega
         orbit = self._closed(start, period, name)
         if orbit is None:
-            along = np.array(path_starts(self.loop, path, _PIECES))
+            along = np.array(path_starts(self.loop, path, PIECES))
             orbit = self._closed(along, period, "states all along it", self.closing.close_along)
-        if orbit is None or _distance(orbit, *path.solution) > _AT_ITS_END:
+        if orbit is None or _distance(orbit, *path.solution) > AT_ITS_END:
             at = by_pieces(self.loop, path)
             exact = None if at is None else self._closed(*at, "the pieces it runs through", self._close_here)
             if exact is not None and (
                 orbit is None or _distance(exact, *path.solution) < _distance(orbit, *path.solution)
             ):
                 orbit = exact
-        if orbit is None and self.missed < _NEAR_MISS:
+        if orbit is None and self.missed < NEAR_MISS:
             orbit = self._closed(
                 start, period, "the mismatch after a lap, let shrink", lambda *at: trace(self.closing, *at)
             )
@@ -268,7 +280,7 @@ class OrbitFinder:
     def _belongs(self, orbit, path) -> bool:
         """Whether the orbit closed from the end of a path is the path's own."""
         amplitude, omega = path.solution
-        return _near(orbit, amplitude, omega, _SAME_AS_PATH)
+        return _near(orbit, amplitude, omega, SAME_AS_PATH)
 
     def _start(self, guess, amplitude, omega):
         wanted = getattr(guess, "output_amplitude", None)
@@ -302,7 +314,7 @@ class OrbitFinder:
     def _closed_from(self, x0, course, complete=True) -> Orbit | None:
         """Orbit that a course comes near: closed where it can be, else an average where it is sustained."""
         laps = course.laps
-        if len(laps) < _ENOUGH or course.fate in (RESTS, DIVERGES):
+        if len(laps) < ENOUGH or course.fate in (RESTS, DIVERGES):
             return None
         if not np.all(np.isfinite(laps[-1].state)):
             return None
@@ -311,14 +323,15 @@ class OrbitFinder:
         orbit = self._closed_laps(laps)
         if complete and course.fate == UNDECIDED and orbit is not None and orbit.stable is False:
             orbit = None  # one of many that an irregular motion passes: rounding tells which
-        if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= 1000:
+        if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= SWINGS:
             return self._averaged(x0, laps, False)
         return orbit
 
     def _closed_laps(self, laps):
         """Close the orbit that a course's passages come nearest to repeating, after one lap or a few."""
-        recent = laps[-12:]
-        size = np.maximum(np.max(np.abs([lap.state for lap in recent]), axis=0), 1e-6 * self.swings.units)
+        recent = laps[-RECENT_CLOSED:]
+        least = REPEATS_LEAST * self.swings.units
+        size = np.maximum(np.max(np.abs([lap.state for lap in recent]), axis=0), least)
         for laps_per_period in range(1, 5):
             apart = [
                 float(np.max(np.abs(recent[k].state - recent[k - laps_per_period].state) / size))
@@ -339,7 +352,7 @@ class OrbitFinder:
 
     def _simulated(self, x0, name, search_time=None):
         """Follow the loop from a start; close what it comes to. Returns (orbit or None, course)."""
-        course = self.swings.follow(x0, 1000, search_time)
+        course = self.swings.follow(x0, SWINGS, search_time)
         orbit = self._closed_from(x0, course)
         words = {RESTS: "comes to rest", DIVERGES: "diverges", CYCLES: "repeats"}.get(
             course.fate, "no period"
@@ -367,14 +380,14 @@ class OrbitFinder:
 
     # --- averages -----------------------------------------------------------------------------------------
 
-    def _averaged(self, x0, laps, settled, swings=40) -> Orbit | None:
+    def _averaged(self, x0, laps, settled, swings=SWINGS_AVERAGED) -> Orbit | None:
         """Average over the swings after a transient, for motions that are followed only.
 
         The amplitude is that of the signal the block sees. A block that acts in continuous time sees the held
         steps of a sampled controller; a law without time sees their values alone, the sequence that the
         prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
         """
-        begin = self.engine.run(self.swings.start(x0), laps[-1].time, rtol=1e-8, log=1).state
+        begin = self.engine.run(self.swings.start(x0), laps[-1].time, rtol=COURSE_RTOL, log=1).state
         later = self.swings.follow(begin, min(swings, len(laps)), until_repeated=False).laps
         count = len(later) - 1
         if count < 4:
@@ -383,9 +396,15 @@ class OrbitFinder:
         omega = 2 * np.pi / period
         t0, span = begin.time, count * period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
-        times = t0 + np.linspace(0, min(4, count) * period, 2049)
+        times = t0 + np.linspace(0, min(4, count) * period, AVERAGE_POINTS)
         run = self.engine.run(
-            begin, t0 + span, times=times, rtol=1e-8, spectrum=spectrum, omega=omega, max_step=period / 8
+            begin,
+            t0 + span,
+            times=times,
+            rtol=COURSE_RTOL,
+            spectrum=spectrum,
+            omega=omega,
+            max_step=period / 8,
         )
         if not run.status.ok:
             return None
@@ -395,7 +414,7 @@ class OrbitFinder:
         exact = settled and self.engine.delayed and not self.sampled
         return Orbit(
             float(omega), float(period), float(amplitudes[-1]), float(amplitudes[0]), np.zeros(0, complex),
-            True if exact else None, np.nan, tuple(self.engine.name_events(run.events))[:200],
+            True if exact else None, np.nan, tuple(self.engine.name_events(run.events))[:EVENTS_KEPT],
             Status.CONVERGED if exact else Status.NO_PERIOD, np.nan, times - t0, run.outputs.T, run.states.T,
             self.loop,
         )  # fmt: skip

@@ -13,8 +13,7 @@ from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
 from .predicted.answer import responder
 from .predicted.path import Path
-
-_PERIODS = 40  # of forced motion before it is measured
+from .thresholds import COURSE_RTOL, FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
 
 
 def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, motion=None) -> np.ndarray:
@@ -53,7 +52,7 @@ def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, mo
         a, b = controller.sampled[:2] if held else (np.asarray(controller.A), np.asarray(controller.B))
         if (
             len(U) > 2
-            and abs(Y[0]) > 1e-9 * np.abs(Y).max()
+            and abs(Y[0]) > MEAN_SEEN * np.abs(Y).max()
             and np.linalg.matrix_rank(a - held * np.eye(len(a))) == len(a)
         ):
             x_control[: len(a)] = np.linalg.solve(held * np.eye(len(a)) - a, b[:, 0] * -Y[0].real)
@@ -105,7 +104,7 @@ def _forced_motion(loop, U, omega, wanted):
         starts[0][0] = -reach
         if core.bodies == 2:
             starts[0][2] = -reach
-            for stretch, speed in ((0.1, 0.0), (0.5, 3.0), (0.5, -3.0)):
+            for stretch, speed in FORCED_STARTS:
                 x = starts[0].copy()
                 x[2] += stretch * core.gap
                 x[3] = speed * core.gap * omega
@@ -121,14 +120,14 @@ def _forced_motion(loop, U, omega, wanted):
 
 def _forced_from(engine, core, row, x0, U, omega):
     drive, period = harmonic_drive([U], omega), 2 * np.pi / omega
-    run = engine.run(engine.start(x0), _PERIODS * period, drive, **_options(period, U))
+    run = engine.run(engine.start(x0), FORCED_PERIODS * period, drive, **_options(period, U))
     if not np.all(np.isfinite(run.state.x)):
         return np.zeros(engine.nstates), np.zeros(2, complex)
     return _measured(engine, core, row, run.state, U, omega)
 
 
 def _options(period, U) -> dict[str, Any]:
-    return dict(rtol=1e-8, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=400_000)
+    return dict(rtol=COURSE_RTOL, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=FORCED_STEPS)
 
 
 def _measured(engine, core, row, state, U, omega):

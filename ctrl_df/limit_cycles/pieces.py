@@ -21,11 +21,16 @@ from scipy.linalg import expm
 
 from ..blocks.primitives import PiecewiseAffine, Quantizer
 from .predicted.path import Path
-
-_SAMPLES = 1 << 15  # of the waveform, among which visits are looked for
-_MOST = 60  # pieces of a cycle
-_CLOSED = 1e-11  # defect, relative to the sizes of the orbit
-_ITERATIONS = 30
+from .thresholds import (
+    NOTHING,
+    VISIT_CLOSED,
+    VISIT_ITERATIONS,
+    VISIT_LONGEST,
+    VISIT_RANK,
+    VISIT_SAMPLES,
+    VISIT_SIZE,
+    VISITS,
+)
 
 
 def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
@@ -59,11 +64,11 @@ def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
     k = np.arange(1, path.answer.size)
     swing = [np.linalg.solve(1j * m * path.omega * np.eye(n) - a, -b[:, 0]) for m in k]
     x = np.real(np.array(swing).T @ (path.answer[1:] * np.exp(1j * k * path.omega * begin)))
-    size = np.maximum(np.abs(x), 1e-3 * np.abs(x).max())
+    size = np.maximum(np.abs(x), VISIT_SIZE * np.abs(x).max())
     height = float(np.abs(path.waveform).sum())
     times = np.array(times)
 
-    for _ in range(_ITERATIONS):
+    for _ in range(VISIT_ITERATIONS):
         at, moved = np.append(x, 1.0), np.eye(n + 1)
         defect, J = np.zeros(n + count), np.zeros((n + count, n + count))
         ends = np.zeros((n + 1, count))  # derivatives of the state here by the times so far
@@ -79,30 +84,30 @@ def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
         J[:n, n:] = ends[:n] * times / size[:, None]
         if not np.isfinite(J).all():
             return None
-        if np.abs(defect).max() < _CLOSED:
+        if np.abs(defect).max() < VISIT_CLOSED:
             longest = int(np.argmax(times))
             at = np.append(x, 1.0)
             for i in range(longest):
                 at = expm(modes[i] * times[i]) @ at
             return (expm(0.5 * modes[longest] * times[longest]) @ at)[:n], float(times.sum())
-        change = np.linalg.lstsq(J, -defect, rcond=1e-14)[0]
-        change *= min(1.0, 0.5 / max(float(np.abs(change).max()), 1e-300))
+        change = np.linalg.lstsq(J, -defect, rcond=VISIT_RANK)[0]
+        change *= min(1.0, VISIT_LONGEST / max(float(np.abs(change).max()), NOTHING))
         x, times = x + change[:n] * size, times * np.exp(change[n:])  # times stay positive
     return None
 
 
 def _visits(law, path):
     """Pieces that the waveform runs through, the time on each, and when the first one begins; or None."""
-    full = np.zeros(_SAMPLES // 2 + 1, complex)
-    full[: path.waveform.size] = path.waveform * _SAMPLES / 2
+    full = np.zeros(VISIT_SAMPLES // 2 + 1, complex)
+    full[: path.waveform.size] = path.waveform * VISIT_SAMPLES / 2
     full[0] *= 2
-    u = np.fft.irfft(full, _SAMPLES)
+    u = np.fft.irfft(full, VISIT_SAMPLES)
     at = np.round(u / law.step).astype(int) if isinstance(law, Quantizer) else np.searchsorted(law.corners, u)
     changes = np.flatnonzero(at != np.roll(at, 1))
-    if not 2 <= changes.size <= _MOST or np.abs(at[changes] - at[changes - 1]).max() > 1:
+    if not 2 <= changes.size <= VISITS or np.abs(at[changes] - at[changes - 1]).max() > 1:
         return None
-    tick = 2 * np.pi / path.omega / _SAMPLES
-    spans = np.diff(np.append(changes, changes[0] + _SAMPLES)) * tick
+    tick = 2 * np.pi / path.omega / VISIT_SAMPLES
+    spans = np.diff(np.append(changes, changes[0] + VISIT_SAMPLES)) * tick
     return [int(v) for v in at[changes]], spans, changes[0] * tick
 
 

@@ -13,8 +13,9 @@ from .check import Check, Row, in_band
 from .exact.fate import Fate
 from .exact.known import KnownOrbits
 from .exact.orbit import NoOrbit, Orbit
-from .finder import SAME_CYCLE, OrbitFinder
+from .finder import OrbitFinder
 from .predicted.grade import LimitCycle
+from .thresholds import CONFIRMED_WITHIN, COURSE_RTOL, LEFT_ALONE, SAME_CYCLE, SWINGS_VERIFIED
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
@@ -23,10 +24,6 @@ MISSED = "missed by the describing function"
 DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simulation judges."
 
 _UNHELD = "Newton from the motion it stands on closes no orbit near"
-
-# Within 5 % in frequency and amplitude a prediction is called confirmed; beyond that it is the same cycle,
-# shifted.
-CONFIRMED_WITHIN = 0.05
 
 
 def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Check:
@@ -181,7 +178,7 @@ def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
 
 
 def simulated(
-    finder: OrbitFinder, orbit: Orbit, laps: int = 200, kick: float = 0.01
+    finder: OrbitFinder, orbit: Orbit, laps: int = SWINGS_VERIFIED, kick: float = 0.01
 ) -> tuple[float, float] | None:
     """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves."""
     if orbit.stable is False:
@@ -201,10 +198,15 @@ def simulated(
     spectrum = np.zeros((engine.noutputs, 2), complex)
     period = 2 * np.pi / omega
     run = engine.run(
-        engine.start(swings[-1][1]), period, rtol=1e-8, max_step=period / 8, spectrum=spectrum, omega=omega
+        engine.start(swings[-1][1]),
+        period,
+        rtol=COURSE_RTOL,
+        max_step=period / 8,
+        spectrum=spectrum,
+        omega=omega,
     )
     amplitude = 2 * abs(spectrum[0, 1]) / period
-    if not run.status.ok or not 0.2 < amplitude / orbit.output_amplitude < 5:
+    if not run.status.ok or not LEFT_ALONE[0] < amplitude / orbit.output_amplitude < LEFT_ALONE[1]:
         return None
     return omega, float(amplitude)
 

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..checks import choice, count, flag, real_array, shown, unknown_keywords
 from ..status import Status
-from .engine import EVENT_KINDS, RTOL, Engine, Event
+from .engine import EVENT_KINDS, Engine, Event
 from .groups import Group, groups_of
 from .program.parameters import checked_parameters
 from .response import EventResponse, checked_limits, checked_times, misplaced
 from .runs import Drives, Runs, harmonic_drives, run_many, sampled_drives
+from .thresholds import LARGEST, MAX_STEPS, RTOL
 
 _OWNER = "batch_response"
-LARGEST = 2 << 30  # [bytes] of outputs and states in memory
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -129,7 +129,7 @@ def batch_response(
     rtol=RTOL,
     atol=None,
     max_step=None,
-    max_steps=20_000_000,
+    max_steps=MAX_STEPS,
     keep_events=False,
     return_states=False,
     **keywords,

@@ -17,9 +17,7 @@ from .kernel.driver import copy
 from .kernel.space import space_at
 from .program import pointers
 from .program.layout import H_NG, Drive
-
-_AT_ONCE = 100_000  # steps after which a run is begun anew from where it is, as it would be alone
-_MOST = 20_000_000  # steps of one state
+from .thresholds import HEIGHT, MAX_STEPS, STEPS_AT_ONCE_MANY
 
 
 def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float) -> np.ndarray:
@@ -33,7 +31,7 @@ def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float
     with pointers.interruptible():
         _flow(
             driver.address(), engine.program, drive, clock, x, state.mode, state.time + span, rtol,
-            max(rtol, 1e-10), scale, int(state.fresh), engine._space.at, np.zeros(0),
+            max(rtol, HEIGHT), scale, int(state.fresh), engine._space.at, np.zeros(0),
             np.zeros((0, engine.nstates)), np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64),
             np.zeros(1, np.int64), np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex),
             clock.copy(), state.mode.copy(), scale.copy(),
@@ -64,11 +62,11 @@ def _flow(
                 (
                     prog, drive, my_clock, x[row], my_mode, end, lean(none), lean(none_x),
                     lean(none_y), 8, rtol, 0.0, math.inf, False, False, -1, 0.0, -1, height,
-                    min(_MOST - int(my_clock[3]), _AT_ONCE), lean(log_t), lean(log_n), lean(log_k),
-                    lean(before), my_scale, begin, space, lean(spectrum), 0.0,
+                    min(MAX_STEPS - int(my_clock[3]), STEPS_AT_ONCE_MANY), lean(log_t), lean(log_n),
+                    lean(log_k), lean(before), my_scale, begin, space, lean(spectrum), 0.0,
                 ),
             )  # fmt: skip
             begin = 0
-            if reason != driver.STEPS or int(my_clock[3]) >= _MOST:
+            if reason != driver.STEPS or int(my_clock[3]) >= MAX_STEPS:
                 break
             memo[2] = 1.0

@@ -20,15 +20,20 @@ from .program import layout, pointers
 from .program.flatten import flatten
 from .program.layout import EVENT_KINDS, Drive
 from .program.pack import pack
-
-RTOL = 1e-9
-"""Default relative tolerance; the absolute one is a thousandth of it."""
-
-_CHUNK_TIME = 0.2
-"""Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed."""
-_FIRST_CHUNK = 10_000  # steps of a small system until the pace is known
-FAR = 1e50  # a state beyond has run away: NaN is then no mistake of a law
-_MOST_OUTPUTS = 100_000  # recorded in one go
+from .thresholds import (
+    CHUNK_CHANGE,
+    CHUNK_LEAST,
+    CHUNK_TIME,
+    FAR,
+    FEWEST_STEPS,
+    HEIGHT,
+    LOG,
+    MAX_STEPS,
+    MOST_OUTPUTS,
+    RTOL,
+    STEPS_AT_ONCE,
+    steps_at_once,
+)
 
 STATUS = {
     driver.DONE: Status.CONVERGED,
@@ -191,8 +196,8 @@ class Engine:
         level: float = 0.0,
         direction: int = 1,
         height: float | None = None,
-        max_steps: int = 20_000_000,
-        log: int = 4096,
+        max_steps: int = MAX_STEPS,
+        log: int = LOG,
         spectrum: np.ndarray | None = None,
         omega: float = 0.0,
     ) -> Run:
@@ -236,7 +241,7 @@ class Engine:
             Ctrl-C, within a fraction of a second.
         """
         atol = 0.0 if atol is None else atol
-        height = max(rtol, 1e-10) if height is None else height
+        height = max(rtol, HEIGHT) if height is None else height
         if drive is None:
             drive = constant_drive(np.zeros(self.ninputs))
         spectrum = np.zeros((self.noutputs, 0), complex) if spectrum is None else spectrum
@@ -258,7 +263,7 @@ class Engine:
         memo[2] = 0.0
         if len(times) + len(drive.time) > 2:
             keep_pace(self.program, space)
-        chunk = max(int(_FIRST_CHUNK / (1 + (self.nstates / 6) ** 2)), 10)
+        chunk = steps_at_once(STEPS_AT_ONCE, self.nstates)
         past = history.stored(self.program, space.work[0])
         if self.delayed and not fresh:
             if now.history is None:
@@ -271,8 +276,8 @@ class Engine:
             # Python sees Ctrl-C between the chunks only: none may take long
             began = perf_counter()
             until = t_end
-            if len(times) - int(clock[1]) > _MOST_OUTPUTS:
-                until = min(t_end, times[int(clock[1]) + _MOST_OUTPUTS])
+            if len(times) - int(clock[1]) > MOST_OUTPUTS:
+                until = min(t_end, times[int(clock[1]) + MOST_OUTPUTS])
             with pointers.interruptible():
                 reason = driver.run(
                     address, self.program, drive, clock, now.x, now.mode, until, times, xout, yout, order,
@@ -281,8 +286,8 @@ class Engine:
                     space.at, spectrum, omega,
                 )  # fmt: skip
             pointers.raise_kept()
-            pace = _CHUNK_TIME / max(perf_counter() - began, 1e-6)
-            chunk = max(int(chunk * min(max(pace, 0.05), 4.0)), 10)
+            pace = CHUNK_TIME / max(perf_counter() - began, CHUNK_LEAST)
+            chunk = max(int(chunk * min(max(pace, CHUNK_CHANGE[0]), CHUNK_CHANGE[1])), FEWEST_STEPS)
             fresh = 0
             used = min(int(clock[5]), len(log_t))
             if log > 1 and used:

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..column import Column, Differs
 from .engine import Engine
-
-_SPLITS = 64  # of one batch: beyond, systems are packed one by one
+from .thresholds import SPLITS
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,7 @@ def _parts(owner, system, values, runs):
             )
         except Differs as question:
             splits += 1
-            if splits <= _SPLITS:
+            if splits <= SPLITS:
                 waiting += [rows[~question.mask], rows[question.mask]]
                 continue
             agreed = False

@@ -12,9 +12,7 @@ from .crew import Elsewhere, Stopped, flag
 from .kernel.imposed import answer, room
 from .program.imposed import laws_of
 from .program.pointers import raise_kept
-
-RTOL = 1e-7
-"""Relative tolerance of hidden states: forces are then right to about six digits."""
+from .thresholds import IMPOSED_RTOL, PLACE_GRAIN, TURN_INSIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +80,7 @@ def _turns(v0, b, c):
         root = np.sqrt(b * b - 4 * c * v0)
         q = -0.5 * (b + np.where(b >= 0, root, -root))
         found = [q / c, v0 / q]
-    inside = [np.isfinite(s) & (s > 1e-9) & (s < 1 - 1e-9) & (root > 0) for s in found]
+    inside = [np.isfinite(s) & (s > TURN_INSIDE) & (s < 1 - TURN_INSIDE) & (root > 0) for s in found]
     pieces = np.concatenate([np.flatnonzero(i) for i in inside])
     return pieces, np.concatenate([s[i] for s, i in zip(found, inside, strict=True)])
 
@@ -90,7 +88,7 @@ def _turns(v0, b, c):
 def _directions(x, still: float) -> np.ndarray:
     """Return the direction of the piece before each node, (m,), by the positions x at the nodes."""
     # what rounding leaves of a place is no motion either
-    least = max(still, 1e-14 * float(np.max(np.abs(x))))
+    least = max(still, PLACE_GRAIN * float(np.max(np.abs(x))))
     steps = np.sign(np.diff(x))
     tops = np.flatnonzero(np.diff(steps)) + 1
     way = np.ones(len(x))
@@ -112,7 +110,7 @@ def _directions(x, still: float) -> np.ndarray:
 
 
 def imposed_forces(
-    cores: Sequence[Core], path: Path, z0: np.ndarray, *, rtol: float = RTOL, states: bool = False
+    cores: Sequence[Core], path: Path, z0: np.ndarray, *, rtol: float = IMPOSED_RTOL, states: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the forces of blocks that differ in their values alone, and their hidden states.
 

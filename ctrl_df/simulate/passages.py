@@ -15,16 +15,20 @@ from .compiler.compiled import njit
 from .compiler.native import call_native
 from .compiler.views import lean
 from .dynamics import history
-from .engine import FAR, STATUS, Engine, State, constant_drive
+from .engine import STATUS, Engine, State, constant_drive
 from .kernel import driver
 from .kernel.space import space_at, workspace
 from .program import pointers
 from .program.layout import H_NG
-
-_PEEKS = 129  # in a stride of about four passages, from which the peak of an output is read
-_TOGETHER = 64  # strides at once
-_AT_ONCE = 100_000  # steps of a small system after which the interpreter is asked whether to go on
-_MOST = 400_000  # steps of a stride
+from .thresholds import (
+    FAR,
+    HEIGHT,
+    STEPS_AT_ONCE_MANY,
+    STRIDE_PEEKS,
+    STRIDE_STEPS,
+    TOGETHER_STRIDES,
+    steps_at_once,
+)
 
 
 class Stride(NamedTuple):
@@ -77,23 +81,24 @@ def strides(
         history.stored(program, space.work[0])[:] = now.history
     scale = np.zeros((4, int(program.ints[H_NG]) + 1)) if now.scale is None else now.scale
     clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
-    together = 1 if engine.calls_python else _TOGETHER
+    together = 1 if engine.calls_python else TOGETHER_STRIDES
     none, counts, drive = np.zeros(1), np.zeros(1, np.int64), constant_drive(np.zeros(engine.ninputs))
-    times, seen = np.zeros(_PEEKS), (np.zeros((_PEEKS, n)), np.zeros((_PEEKS, engine.noutputs)))
+    times = np.zeros(STRIDE_PEEKS)
+    seen = np.zeros((STRIDE_PEEKS, n)), np.zeros((STRIDE_PEEKS, engine.noutputs))
     spectrum, last = np.zeros((engine.noutputs, 0), complex), np.array([0.0, 0.0, 0.0, float(now.fresh)])
     ends, states, numbers = (
         np.zeros((together, 2)),
         np.zeros((together, n)),
         np.zeros((together, 2), np.int64),
     )
-    budget = max(int(_AT_ONCE / (1 + (n / 6) ** 2)), 10)
+    budget = steps_at_once(STEPS_AT_ONCE_MANY, n)
     while clock[0] < limit:
         pointers.raised.clear()
         pointers.gave_nan.clear()
         with pointers.interruptible():
             done = _pass_on(
                 driver.address(), program, drive, clock, now.x, now.mode, times, *seen, rtol, signal, row,
-                max(rtol, 1e-10), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space.at,
+                max(rtol, HEIGHT), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space.at,
                 spectrum, first, limit, last, ends, states, numbers, budget,
             )  # fmt: skip
         pointers.raise_kept()
@@ -139,12 +144,12 @@ def _pass_on(
                 engine,
                 (
                     prog, drive, clock, x, mode, until, times, xout, yout, 8, rtol, 0.0, math.inf, True,
-                    False, signal, 0.0, -1, height, min(_MOST - int(clock[3]), budget), log_t, log_n, log_k,
-                    before, scale, int(last[3]), space, spectrum, 0.0,
+                    False, signal, 0.0, -1, height, min(STRIDE_STEPS - int(clock[3]), budget), log_t, log_n,
+                    log_k, before, scale, int(last[3]), space, spectrum, 0.0,
                 ),
             )  # fmt: skip
             last[3] = 0.0
-            if reason != driver.STEPS or int(clock[3]) >= _MOST:
+            if reason != driver.STEPS or int(clock[3]) >= STRIDE_STEPS:
                 break
             memo[2] = 1.0
         peak = 0.0

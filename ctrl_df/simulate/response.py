@@ -18,11 +18,11 @@ from ..checks import choice, count, flag, mapping, number, positive, real_array,
 from ..drawing import draw
 from ..status import Status
 from ..table import Table
-from .engine import RTOL, Engine, Event, callback_drive, constant_drive, sampled_drive
+from .engine import Engine, Event, callback_drive, constant_drive, sampled_drive
 from .program import layout as L
 from .program.parameters import checked_parameters, with_values
+from .thresholds import LOG, MAX_STEPS, ROUNDED, RTOL, RTOL_RANGE, SHOWN
 
-SHOWN = 10  # events in a notebook
 _kept = threading.local()  # the mechanism that each thread has simulated last, and its engine
 
 
@@ -103,7 +103,7 @@ def event_response(
     rtol=RTOL,
     atol=None,
     max_step=None,
-    max_steps=20_000_000,
+    max_steps=MAX_STEPS,
     keep_events=True,
     return_states=None,
     squeeze=None,
@@ -182,7 +182,7 @@ def event_response(
     if max_step is None and callable(inputs):
         limits["max_step"] = 5 * float(np.median(np.diff(times)))
     run = engine.run(
-        engine.start(x0, times[0]), times[-1], drive, times, log=4096 if keep_events else 1, **limits
+        engine.start(x0, times[0]), times[-1], drive, times, log=LOG if keep_events else 1, **limits
     )
     del keep
     if isinstance(sys, Mechanism) and params is None:
@@ -263,7 +263,7 @@ def misplaced(engine, par: np.ndarray, x0: np.ndarray) -> tuple[int, str] | None
         joint = ints[aux + L.A_JOINT]
         if ints[aux + L.A_BODIES] == 2 and joint in (L.J_RIGID, L.J_IMPACT):
             gap = par[:, number_at + L.P_GAP] * (joint == L.J_IMPACT)
-            delta, slack = driven - x, 1e-12 * (gap + abs(x) + abs(driven))
+            delta, slack = driven - x, ROUNDED * (gap + abs(x) + abs(driven))
             for i in np.flatnonzero(~((-slack <= delta) & (delta <= gap + slack)))[:1]:
                 found.append((int(i), (
                     f"the initial state of {name} needs 0 <= x_motor - x <= {gap[i]:g} m (the clearance of "
@@ -282,7 +282,7 @@ def misplaced(engine, par: np.ndarray, x0: np.ndarray) -> tuple[int, str] | None
 def checked_limits(owner: str, rtol, atol, max_step, max_steps, span: float) -> dict[str, Any]:
     """Return the checked tolerances and bounds as keywords of `Engine.run`; `span` [s] has to be covered."""
     rtol = number(
-        owner, "rtol", rtol, lower=1e-14, upper=0.1, meaning="relative tolerance",
+        owner, "rtol", rtol, lower=RTOL_RANGE[0], upper=RTOL_RANGE[1], meaning="relative tolerance",
         remedy=f"Leave it out for {RTOL:g}; floats resolve no less than 1e-14.",
     )  # fmt: skip
     if atol is not None:

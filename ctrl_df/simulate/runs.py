@@ -14,14 +14,14 @@ import numpy as np
 from ..status import Status
 from . import crew
 from .crew import processors
-from .engine import FAR, RTOL, STATUS
+from .engine import STATUS
 from .groups import Group
 from .kernel import driver, many
 from .kernel.many import Drives, How, Rows
 from .program import pointers
 from .program.layout import H_AFFINE
+from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, TOGETHER_RUNS
 
-_MOST_TOGETHER = 256  # runs between two looks at what is left to do
 _ready: set[int] = set()  # kinds of laws (`H_AFFINE`) for which this process has the machine code
 _SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time
 
@@ -76,7 +76,7 @@ def run_many(
     atol: float | None = None,
     max_step: float = np.inf,
     height: float | None = None,
-    max_steps: Any = 20_000_000,
+    max_steps: Any = MAX_STEPS,
     states: bool = False,
     events: bool = False,
     threads: int | None = None,
@@ -131,7 +131,7 @@ def run_many(
     rows = _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine)
     kept = np.empty((len(rows.outputs) if states else int(rows.count.max(initial=0)), engine.nstates))
     atol = 0.0 if atol is None else float(atol)
-    height = max(rtol, 1e-10) if height is None else float(height)
+    height = max(rtol, HEIGHT) if height is None else float(height)
     how = How(int(order), float(rtol), atol, float(max_step), height)
     work = _Work(groups, rows, drives, how, kept, states, events)
     if any(g.engine.calls_python for g in groups):
@@ -244,7 +244,7 @@ class _Work:
     def _parts(self, threads):
         """Yield (group, runs) in parts small enough to be shared out evenly."""
         for group in self.groups:
-            size = min(max(len(group.runs) // (_SHARES * threads), 1), _MOST_TOGETHER)
+            size = min(max(len(group.runs) // (_SHARES * threads), 1), TOGETHER_RUNS)
             for i in range(0, len(group.runs), size):
                 yield group, group.runs[i : i + size].astype(np.int64)
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulate.compiler.compiled import njit
+from ..thresholds import FIRST_PHASE, IMPACT_STARTS, MOST_PERIODS, VAGUE
 from .friction import _require, checked_orders, positive_axis
 from .wall_map import two_impact as _two_impact
 from .wall_map import two_impact_harmonics as _two_impact_harmonics
@@ -33,17 +34,11 @@ from .wall_orbits import measure as _measure
 from .wall_orbits import polish as _polish  # noqa: F401 - tested through this module
 from .wall_orbits import settle as _settle
 
-_MOST_PERIODS = 2000  # a subharmonic motion longer than that is followed by no search here
 BACKLASH_REGIMES = (
     "impact", "contact", "asymmetric", "subharmonic", "aperiodic", "free",
-    *(f"subharmonic {k}" for k in range(2, _MOST_PERIODS)),
+    *(f"subharmonic {k}" for k in range(2, MOST_PERIODS)),
 )  # fmt: skip
 IMPACT, CONTACT, ASYMMETRIC, SUBHARMONIC, APERIODIC, FREE = range(6)
-
-VAGUE = 0.5  # spread from which an average says little: other starts may lead to a motion with a period
-
-# Starts (phi, w in units of 1 + A) tried in turn: from sustained contact, then from impacts of some speed.
-_STARTS = np.array([[_RELEASE, 0.0], [-1.0, 0.7], [0.9, 0.4], [2.2, 1.3], [-2.6, 0.2]])
 
 
 def backlash_family(
@@ -116,7 +111,7 @@ def backlash_family(
             float(restitution),
             int(periods),
             int(transient),
-            _STARTS,
+            IMPACT_STARTS,
             harmonics[i],
             regime[i],
             residual[i],
@@ -190,7 +185,7 @@ def backlash_attractors(A, restitution, phases=8, speeds=5, periods=600, transie
     _require("restitution", restitution, 0.0, upper=1.0)
     A, eps = float(A), float(restitution)
     starts = [(_RELEASE, 0.0)]
-    for phase in np.arange(phases) * (2 * math.pi / phases) + 0.1:
+    for phase in np.arange(phases) * (2 * math.pi / phases) + FIRST_PHASE:
         starts += [(phase, speed) for speed in np.linspace(0, 2, speeds + 1)[1:] * (1 + A)]
     found: list[list] = []
     out = np.zeros(2, dtype=complex)
@@ -288,4 +283,4 @@ def _name(lap, contact):
         return ASYMMETRIC
     # an odd number of half periods mirrors the motion: it repeats after twice as many
     periods = lap if lap % 2 == 1 else lap // 2
-    return min(FREE - 1 + periods, FREE + _MOST_PERIODS - 2)
+    return min(FREE - 1 + periods, FREE + MOST_PERIODS - 2)

@@ -25,21 +25,28 @@ import numpy as np
 
 from ...simulate.compiler.compiled import njit
 from ..branch import Branch, Motions
-from .backlash import _STARTS, BACKLASH_REGIMES, _name
-from .wall_map import EXACT, flight, stays, wrap
+from ..thresholds import (
+    AROUND,
+    BRANCH_TRANSIENT,
+    CLOSES,
+    COEXISTING,
+    EXACT,
+    FOLLOWED,
+    FOLLOWED_LEAST,
+    FOLLOWS,
+    GRID_STEP,
+    IMPACT_STARTS,
+    LEAST_FOLD,
+    MOST_NODES,
+    MOST_PLACES,
+    SAME_CURVE,
+)
+from .backlash import BACKLASH_REGIMES, _name
+from .wall_map import flight, stays, wrap
 from .wall_map import two_impact_harmonics as _two_impact_harmonics
 from .wall_orbits import measure, polish, settle, shortest
 
 SYMMETRIC = "symmetric motion with two impacts a period"
-_STEP = 0.02  # of s, in the grids
-_LEAST_A0 = 1e-9  # without dissipation (eps = 1) the fold lies at A = 0
-_SPACING = 0.01  # of ln A: how densely coexisting motions are looked for
-_AROUND = 5  # steps of that spacing on either side of the places of interest
-_MOST_PLACES = 800
-_FOLLOWED = 0.004  # of ln A: steps along a motion that attracts
-_FINEST = 1e-4
-_TRANSIENT = 100  # periods; coexisting motions that attract any slower are left to the family
-_SAME = 1e-3  # relative distance of n between a motion found and a curve known: one curve
 
 
 def backlash_branches(block, A, omega, near_A, near_omega) -> list[Branch]:
@@ -87,9 +94,9 @@ def symmetric_branch(motor_mass, load_mass, gap, restitution, highest) -> Branch
     """
     eps = min(float(restitution), 1.0)
     least = _fold(eps)
-    low = -math.acosh(max(highest / least, 1.0)) - _STEP
+    low = -math.acosh(max(highest / least, 1.0)) - GRID_STEP
     high = math.acosh(max(0.5 / least, 1.0))
-    grid = np.linspace(low, high, max(8, math.ceil((high - low) / _STEP)))
+    grid = np.linspace(low, high, max(8, math.ceil((high - low) / GRID_STEP)))
 
     def curve(s, orders):
         A, tau, v = _impact_of(s, eps)
@@ -109,7 +116,7 @@ def symmetric_branch(motor_mass, load_mass, gap, restitution, highest) -> Branch
 
 
 def _fold(eps):
-    return max((1.0 - eps) / math.hypot(math.pi * (1.0 + eps), 2.0 * (1.0 - eps)), _LEAST_A0)
+    return max((1.0 - eps) / math.hypot(math.pi * (1.0 + eps), 2.0 * (1.0 - eps)), LEAST_FOLD)
 
 
 def _impact_of(s, eps):
@@ -136,7 +143,7 @@ def _symmetric(A, eps, tau, v, n, exists, multiplier):
         if stays(A[i], eps, -cs, -sn, eps * v[i]):
             continue
         kind, time, speed = flight(A[i], -cs, -sn, eps * v[i], EXACT)
-        exists[i] = kind == 1 and abs(time - math.pi) + abs(speed - v[i]) / v[i] < 1e-6
+        exists[i] = kind == 1 and abs(time - math.pi) + abs(speed - v[i]) / v[i] < CLOSES
 
 
 def _state(A, y, rate, omega, motor_mass, load_mass, gap):
@@ -166,8 +173,8 @@ def coexisting_branches(motor_mass, load_mass, gap, restitution, A) -> list[Bran
     """
     places = _sampled(np.asarray(A, dtype=float))
     eps = float(restitution)
-    met = np.zeros((places.size * _STARTS.shape[0], 8))
-    met = met[: _periodic(places, eps, _STARTS, _TRANSIENT, met)]
+    met = np.zeros((places.size * IMPACT_STARTS.shape[0], 8))
+    met = met[: _periodic(places, eps, IMPACT_STARTS, BRANCH_TRANSIENT, met)]
     curves: list[_Followed] = []
     for motion in met:
         if not any(curve.holds(motion) for curve in curves):
@@ -183,9 +190,9 @@ def _sampled(A):
     """Return amplitudes near those of A, evenly spread in ln A."""
     if not A.size:
         return A
-    spread = np.arange(-_AROUND, _AROUND + 1)
-    steps = np.unique(np.unique(np.round(np.log(A) / _SPACING).astype(int))[:, None] + spread)
-    return np.exp(steps[:: math.ceil(steps.size / _MOST_PLACES)] * _SPACING)
+    spread = np.arange(-AROUND, AROUND + 1)
+    steps = np.unique(np.unique(np.round(np.log(A) / COEXISTING).astype(int))[:, None] + spread)
+    return np.exp(steps[:: math.ceil(steps.size / MOST_PLACES)] * COEXISTING)
 
 
 class _Followed:
@@ -195,8 +202,8 @@ class _Followed:
         self.eps = eps
         self.lap, self.count, self.contact = int(motion[1]), int(motion[2]), bool(motion[3])
         parts = []
-        for step in (-_FOLLOWED, _FOLLOWED):
-            nodes = np.zeros((2000, 5))
+        for step in (-FOLLOWED, FOLLOWED):
+            nodes = np.zeros((MOST_NODES, 5))
             kept = _follow(
                 motion[0], eps, motion[4], motion[5], self.count, self.lap, self.contact, step, nodes
             )
@@ -204,7 +211,7 @@ class _Followed:
         self.nodes = np.concatenate([parts[0][:0:-1], parts[1]])  # ln A, phi, w, n
         self.nodes[:, 1] = np.unwrap(self.nodes[:, 1])
         low, high = self.nodes[0, 0], self.nodes[-1, 0]
-        self.grid = np.linspace(low, high, max(6, math.ceil((high - low) / _STEP)))
+        self.grid = np.linspace(low, high, max(6, math.ceil((high - low) / GRID_STEP)))
         self.regime = BACKLASH_REGIMES[_name(self.lap, self.contact)]
         period = "a period" if self.lap <= 2 else f"in {self.lap / (1 if self.lap % 2 else 2):g} periods"
         impacts = self.count * (2 if self.lap % 2 else 1)
@@ -215,17 +222,17 @@ class _Followed:
         """Whether a motion met lies on this curve."""
         s = math.log(motion[0])
         if (motion[1], motion[2], motion[3]) != (self.lap, self.count, self.contact) or not (
-            self.nodes[0, 0] - _FINEST <= s <= self.nodes[-1, 0] + _FINEST
+            self.nodes[0, 0] - FOLLOWED_LEAST <= s <= self.nodes[-1, 0] + FOLLOWED_LEAST
         ):
             return False
         n, its = complex(*self._between(s, slice(3, 5))), complex(motion[6], motion[7])
-        return abs(n - its) < _SAME * abs(its)
+        return abs(n - its) < SAME_CURVE * abs(its)
 
     def __call__(self, s, orders):
         n = np.full((s.size, orders + 1), np.nan + 0j)
         exists, multiplier = np.zeros(s.size, dtype=bool), np.full(s.size, np.nan)
         start = self._between(s, slice(1, 3)).T.copy()
-        inside = (s >= self.nodes[0, 0] - _FINEST) & (s <= self.nodes[-1, 0] + _FINEST)
+        inside = (s >= self.nodes[0, 0] - FOLLOWED_LEAST) & (s <= self.nodes[-1, 0] + FOLLOWED_LEAST)
         _at(np.exp(s), self.eps, start, self.count, self.lap, inside, n, exists, multiplier)
         return np.exp(s), n, exists, multiplier
 
@@ -251,7 +258,7 @@ def _periodic(places, eps, starts, transient, met):
             new = True
             for m in range(first, kept):
                 known = complex(met[m, 6], met[m, 7])
-                new = new and not (met[m, 2] == count and abs(known - out[1]) < 1e-6 * abs(known))
+                new = new and not (met[m, 2] == count and abs(known - out[1]) < CLOSES * abs(known))
             if new:
                 met[kept, 0], met[kept, 1], met[kept, 2], met[kept, 3] = A, lap, count, contact
                 met[kept, 4], met[kept, 5], met[kept, 6], met[kept, 7] = phi, w, out[1].real, out[1].imag
@@ -268,11 +275,11 @@ def _follow(A, eps, phi, w, count, lap, contact, step, nodes):
     while kept < nodes.shape[0]:
         a = math.exp(s + h)
         ok, p, v, con, radius, closing = polish(a, eps, phi + dphi * h, max(w + dw * h, 0.0), count, lap)
-        near = abs(wrap(p - phi)) < 0.05 and abs(v - w) < 0.05 * (1.0 + a)
+        near = abs(wrap(p - phi)) < FOLLOWS and abs(v - w) < FOLLOWS * (1.0 + a)
         if ok and near:  # where a doubled period ends, the single one is another motion
             near = shortest(a, eps, p, v, count, lap, con, radius, closing)[1] == lap
         if not ok or con != contact or not near:
-            if kept == 0 or abs(h) < 2.0 * _FINEST:
+            if kept == 0 or abs(h) < 2.0 * FOLLOWED_LEAST:
                 return kept
             h *= 0.5
             continue

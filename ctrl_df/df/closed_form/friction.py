@@ -29,16 +29,13 @@ import math
 import numpy as np
 
 from ...simulate.compiler.compiled import njit, part
+from ..thresholds import ARC_NODES, ARC_STEPS, DIGIT, PANEL, SERIES, SERIES_END, SERIES_TERMS, SHORT_ARC
 
 FRICTION_REGIMES = ("slip", "stick-slip", "stuck")
 SLIP, STICK_SLIP, STUCK = 0, 1, 2
 
-# Below this arc [rad] the closed form of its harmonics cancels (velocity ~ arc^3, force ~ arc^2): the arc is
-# integrated by Gauss's rule instead, which loses nothing.
-_SHORT = 0.5
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(ARC_NODES)
 _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
-_PANEL = 8.0  # phase [rad] of the highest harmonic that 16 nodes integrate to 1e-15
 
 
 def friction_family(mass, coulomb, viscous, static, A, omega, orders=9):
@@ -170,7 +167,7 @@ def _slip(kappa, beta, falls, E, S, C, out):
     if beta > 1.0:
         c = -kappa * math.tanh(x) * math.sqrt(1.0 + 1.0 / beta / beta)
     else:
-        ratio = math.tanh(x) / x if x > 1e-8 else 1.0
+        ratio = math.tanh(x) / x if x > SERIES else 1.0
         c = -kappa * 0.5 * math.pi * ratio * math.sqrt(1.0 + beta * beta)
     s = -math.sqrt(max((1.0 - c) * (1.0 + c), 0.0))
     norm = math.hypot(1.0, beta)
@@ -200,7 +197,7 @@ def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
     if beta > 0.0:
         s = min(s, low + 1.0 / beta)
     left = 0.0
-    for _ in range(60):
+    for _ in range(ARC_STEPS):
         E, S, C, sn, vs = _responses(beta, s)
         left = rise * E + sigma * C + sine * S
         slope = rise - sigma * vs + sine * sn - beta * left
@@ -213,10 +210,10 @@ def _stick_slip(kappa, sigma, rise, sine, delta, falls, beta, out):
         new = s - left / slope if slope < 0.0 else low
         if not low < new < high:
             new = 0.5 * (low + high)
-        if abs(new - s) <= 4e-16 * s:
+        if abs(new - s) <= DIGIT * s:
             break
         s = new
-    if s >= _SHORT:
+    if s >= SHORT_ARC:
         _long_arc(kappa, delta, s, beta, out)
     else:
         _short_arc(sigma, rise, sine, delta, s, beta, out)
@@ -254,7 +251,7 @@ def _short_arc(sigma, rise, sine, delta, s, beta, out):
     """Gauss's rule over the velocity, or over the force where the velocity has a boundary layer."""
     damped = beta * s >= 1.0
     orders = out.size - 1
-    panels = 1 + int(orders * s / _PANEL)
+    panels = 1 + int(orders * s / PANEL)
     width = s / panels
     for p in range(panels):
         for n in range(_NODES.size):
@@ -296,19 +293,19 @@ def _responses(beta, s):
     vs = 2.0 * math.sin(0.5 * s) ** 2
     x = beta * s
     lost = -math.expm1(-x)
-    E = lost / beta if x > 1e-8 else s * (1.0 - 0.5 * x)
+    E = lost / beta if x > SERIES else s * (1.0 - 0.5 * x)
     if x >= 1.0:
         S = (sn + (vs - lost) / beta) / (beta + 1.0 / beta)
         return E, S, (S - vs) / beta, sn, vs
-    if s >= _SHORT:
+    if s >= SHORT_ARC:
         S = (beta * sn + vs - lost) / (1.0 + beta * beta)
         return E, S, (beta * (lost - vs) + sn) / (1.0 + beta * beta) - E, sn, vs
     # Taylor: S' = sin - beta S, C' = -S
     sine, term, S, C = s, 0.5 * s * s, 0.0, 0.0
-    for n in range(2, 24):
+    for n in range(2, SERIES_TERMS):
         S += term
         C -= term * s / (n + 1)
-        if abs(term) + abs(s * sine) < 1e-17 * S:
+        if abs(term) + abs(s * sine) < SERIES_END * S:
             break
         even = n % 2 == 0
         term = ((0.0 if even else s * sine) - x * term) / (n + 1)

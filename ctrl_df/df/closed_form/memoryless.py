@@ -17,9 +17,8 @@ import math
 import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer, RateLimiter, Smooth
+from ..thresholds import ANALYTIC, EVEN_SEEN, MOST_STAIRS, NOTHING, ROOT
 from .quadrature import sample_error, static_harmonics
-
-ANALYTIC = 1e-15  # residual stated for closed forms: rounding
 
 
 def element_harmonics(element, amplitudes, omega=None, orders: int = 9):
@@ -69,8 +68,8 @@ def element_harmonics(element, amplitudes, omega=None, orders: int = 9):
 
 def static_regimes(y) -> list[str]:
     """Name the regime of memoryless answers: asymmetric if the mean or an even harmonic is there."""
-    size = np.abs(y).max(axis=1) + 1e-300
-    even = np.abs(y[:, ::2]).max(axis=1) > 1e-9 * size
+    size = np.abs(y).max(axis=1) + NOTHING
+    even = np.abs(y[:, ::2]).max(axis=1) > EVEN_SEEN * size
     return ["asymmetric" if e else "memoryless" for e in even]
 
 
@@ -140,16 +139,13 @@ def _cubic(a, c, orders):
     return y
 
 
-_MOST_STAIRS = 2_000_000
-
-
 def _quantizer(a, step, orders):
     """Each stair edge (m - 1/2) step is a relay pair: Y_k = 4 step / (pi k) sum sin(k theta_m), k odd."""
     y = np.zeros((a.size, orders + 1), dtype=complex)
     odd = np.arange(1, orders + 1, 2)
     for i, amplitude in enumerate(a):
         stairs = math.floor(amplitude / step + 0.5)
-        if stairs > _MOST_STAIRS:  # N - 1 is of order (step/a)^(3/2), below 4e-10 here
+        if stairs > MOST_STAIRS:  # N - 1 is of order (step/a)^(3/2), below 4e-10 here
             y[i, 1] = 1.0
             continue
         theta = np.arccos(np.minimum((np.arange(1, stairs + 1) - 0.5) * step / amplitude, 1.0))
@@ -236,7 +232,7 @@ def _rate_limiter(excess: float, orders: int):
         def ahead(theta):
             return math.cos(leave) - slope * (theta - leave) - math.cos(theta)
 
-        meet = brentq(ahead, math.pi / 2, leave + math.pi, xtol=1e-15, rtol=np.float64(1e-15))
+        meet = brentq(ahead, math.pi / 2, leave + math.pi, xtol=ROOT, rtol=np.float64(ROOT))
         arcs = [
             (leave, meet, math.cos(leave) + slope * leave, 0.0, -slope),
             (meet, leave + math.pi, 0.0, 1.0, 0.0),

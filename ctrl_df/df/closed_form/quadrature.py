@@ -6,50 +6,24 @@ import math
 
 import numpy as np
 
-# Gauss-Kronrod 7/15 on [-1, 1]: nodes and weights of the positive half (Kronrod, 1965).
-_NODES = np.array(
-    [
-        0.991455371120812639206854697526329,
-        0.949107912342758524526189684047851,
-        0.864864423359769072789712788640926,
-        0.741531185599394439863864773280788,
-        0.586087235467691130294144691693013,
-        0.405845151377397166906606412076961,
-        0.207784955007898467600689403773245,
-        0.0,
-    ]
+from ..thresholds import (
+    CORNER,
+    CORNER_HALVINGS,
+    CORNER_LEAST,
+    DEPTH,
+    DIGIT,
+    INTERVAL_SHARE,
+    JUMPS,
+    LAW_PROBES,
+    MOST_CORNERS,
+    MOST_INTERVALS,
+    NOTHING,
+    NULL_SHARE,
+    ROOT,
+    SCAN_LEAST,
+    SHARPENED,
 )
-_KRONROD = np.array(
-    [
-        0.022935322010529224963732008058970,
-        0.063092092629978553290700663189204,
-        0.104790010322250183839876322541518,
-        0.140653259715525918745189590510238,
-        0.169004726639267902826583426598550,
-        0.190350578064785409913256402421014,
-        0.204432940075298892414161999234649,
-        0.209482141084727828012999174891714,
-    ]
-)
-_GAUSS = np.array(
-    [
-        0.129484966168869693270611432679082,
-        0.279705391489276667901467771423780,
-        0.381830050505118944950369775488975,
-        0.417959183673469387755102040816327,
-    ]
-)
-X = np.concatenate([-_NODES[:-1], _NODES[::-1]])
-WK = np.concatenate([_KRONROD[:-1], _KRONROD[::-1]])
-WG = np.zeros(15)
-WG[1::2] = np.concatenate([_GAUSS[:-1], _GAUSS[::-1]])
-# What polynomials up to degree 11 leave of 15 samples: a jump shows here even where both rules agree by
-# chance.
-_NULL = np.linalg.qr(np.polynomial.legendre.legvander(X, 14))[0][:, 12:]
-
-_DEPTH = 52
-_MOST_INTERVALS = 20_000
-_MOST_CORNERS = 600
+from .kronrod import NULL, WG, WK, X
 
 
 def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
@@ -90,9 +64,9 @@ def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
     k = np.arange(orders + 1)
     total = np.zeros((amplitudes.size, orders + 1))
     error = np.zeros(amplitudes.size)
-    scale = np.full(amplitudes.size, 1e-300)
+    scale = np.full(amplitudes.size, NOTHING)
     calls = 0
-    for depth in range(_DEPTH + 1):
+    for depth in range(DEPTH + 1):
         half = 0.5 * (right - left)
         theta = 0.5 * (left + right)[:, None] + half[:, None] * X
         y = law(amplitudes[owner][:, None] * np.cos(theta))
@@ -100,13 +74,13 @@ def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
         basis = np.cos(k[None, :, None] * theta[:, None, :]) * y[:, None, :]
         kronrod = (basis @ WK) * half[:, None]
         gap = np.abs((basis @ (WK - WG)) * half[:, None]).max(axis=1)
-        gap = np.maximum(gap, 0.1 * np.abs(basis @ _NULL).max(axis=(1, 2)) * half)
+        gap = np.maximum(gap, NULL_SHARE * np.abs(basis @ NULL).max(axis=(1, 2)) * half)
         # The classical sharpening: the Kronrod sum is far better than its distance to the Gauss sum.
-        size = np.abs(y).max(axis=1) * half + 1e-300
-        estimate = size * np.minimum(1.0, (200 * gap / size) ** 1.5)
-        good = (estimate <= 0.02 * rtol * scale[owner]) | (gap <= 4e-16 * scale[owner])
+        size = np.abs(y).max(axis=1) * half + NOTHING
+        estimate = size * np.minimum(1.0, (SHARPENED * gap / size) ** 1.5)
+        good = (estimate <= INTERVAL_SHARE * rtol * scale[owner]) | (gap <= DIGIT * scale[owner])
         calls += owner.size
-        if depth == _DEPTH or calls > _MOST_INTERVALS * amplitudes.size:
+        if depth == DEPTH or calls > MOST_INTERVALS * amplitudes.size:
             good[:] = True
         np.add.at(total, owner[good], kronrod[good])
         np.add.at(error, owner[good], estimate[good])
@@ -157,7 +131,7 @@ class Law:
 
     def _accepts_arrays(self, u):
         flat = u.ravel()
-        probe = flat[np.linspace(0, flat.size - 1, min(flat.size, 25)).astype(int)]
+        probe = flat[np.linspace(0, flat.size - 1, min(flat.size, LAW_PROBES)).astype(int)]
         single = self._point_by_point(probe)
         try:
             with np.errstate(all="ignore"):
@@ -169,7 +143,7 @@ class Law:
 
 def find_corners(law, smallest: float, largest: float, points: int = 401) -> np.ndarray:
     """Locate kinks and jumps of `law` on [-largest, largest], as far as a scan shows them."""
-    fine = np.geomspace(max(smallest, 1e-6 * largest), largest, points // 4)
+    fine = np.geomspace(max(smallest, SCAN_LEAST * largest), largest, points // 4)
     side = np.unique(np.concatenate([fine, np.linspace(largest / points, largest, points)]))
     u = np.concatenate([-side[::-1], [0.0], side])
     y = law(u)
@@ -178,22 +152,22 @@ def find_corners(law, smallest: float, largest: float, points: int = 401) -> np.
     if bend.size < 7:
         return np.zeros(0)
     around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(bend, 3, mode="edge"), 7), axis=1)
-    strong = np.nonzero(bend > 20 * around + 1e-7 * np.abs(slope).max())[0]
-    strong = np.sort(strong[np.argsort(bend[strong])[::-1][:_MOST_CORNERS]])
+    strong = np.nonzero(bend > CORNER * around + CORNER_LEAST * np.abs(slope).max())[0]
+    strong = np.sort(strong[np.argsort(bend[strong])[::-1][:MOST_CORNERS]])
     corners = [_bisect_corner(law, u[i], u[i + 2]) for i in strong]
     return np.unique(np.array([c for c in corners if c is not None]))
 
 
 def _bisect_corner(law, left, right):
     """Close in on the half that departs more from a straight line."""
-    scale = np.abs(law(np.array([left, right]))).max() + 1e-300
-    for _ in range(60):
+    scale = np.abs(law(np.array([left, right]))).max() + NOTHING
+    for _ in range(CORNER_HALVINGS):
         q = np.linspace(left, right, 5)
         if not (q[0] < q[1] < q[2] < q[3] < q[4]):
             break
         y = law(q)
         low, high = abs(y[1] - 0.5 * (y[0] + y[2])), abs(y[3] - 0.5 * (y[2] + y[4]))
-        if max(low, high) <= 1e-15 * scale:
+        if max(low, high) <= ROOT * scale:
             return q[2]
         left, right = (q[0], q[2]) if low > high else (q[2], q[4])
     return 0.5 * (left + right)
@@ -213,5 +187,5 @@ def _first_intervals(amplitudes, corners):
 def sample_error(y) -> float:
     """Estimate the error of a uniform Fourier sum over samples with jumps between them."""
     steps = np.abs(np.diff(np.concatenate([y, y[:1]])))
-    jumps = steps[steps > 10 * np.median(steps) + 1e-300]
+    jumps = steps[steps > JUMPS * np.median(steps) + NOTHING]
     return float(2 * jumps.sum() / y.size + np.ptp(y) / y.size**2)

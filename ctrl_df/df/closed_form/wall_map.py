@@ -19,13 +19,17 @@ import math
 import numpy as np
 
 from ...simulate.compiler.compiled import njit, part
-
-CHATTER = 3e-4  # [rad] remaining time of a chatter below which contact is sustained
-# The time of an impact is taken when Halley's step is this part of it, and the step is still made: it is then
-# good to the cube. Rough serves where a motion is only followed.
-EXACT, ROUGH = 1e-6, 1e-3
-LONGEST = 1e4  # periods of one flight beyond which the motion counts as free of contact
-
+from ..thresholds import (
+    CHATTER,
+    CLOSES,
+    DIGIT,
+    EXACT,
+    IMPACT_STEPS,
+    LAG_SERIES,
+    LONGEST_FLIGHT,
+    NEAR_ELASTIC,
+    TURNED,
+)
 
 # --- the symmetric motion with two impacts a period -------------------------------------------------------
 
@@ -44,7 +48,7 @@ def two_impact(A, eps):
     for branch in range(2):
         tau = lead + (math.asin(level) if branch == 0 else math.pi - math.asin(level))
         sn, cs = math.sin(tau), math.cos(tau)
-        if eps < 0.9:
+        if eps < NEAR_ELASTIC:
             v = 2.0 * A * sn / (1.0 - eps)
         else:
             v = 2.0 * (1.0 + 2.0 * A * cs) / (math.pi * (1.0 + eps))
@@ -58,7 +62,7 @@ def two_impact(A, eps):
             continue
         kind, time, speed = flight(A, -cs, -sn, eps * v, EXACT)
         closing = abs(time - math.pi) + abs(speed - v) / v
-        if kind == 1 and closing < 1e-6:
+        if kind == 1 and closing < CLOSES:
             return True, tau, v, closing
     return False, 0.0, 0.0, 0.0
 
@@ -106,7 +110,7 @@ def flight(A, c, s, w, near):
         return impact(A, c, s, w, top, bottom, 0, near)
     step = 2.0 * math.pi * drift  # shift of the extremes from period to period
     gap = 1.0 - peak if drift > 0.0 else low
-    if gap > LONGEST * abs(step):
+    if gap > LONGEST_FLIGHT * abs(step):
         return 2, 0.0, 0.0
     late = 2.0 * math.pi * math.ceil(gap / abs(step))
     if drift > 0.0:
@@ -135,7 +139,7 @@ def impact(A, c, s, w, low, high, kind, near):
     if kind == 0:
         r = min(r, 2.0 * low)  # steady pressing: twice the time to the top
     v = 0.0
-    for _ in range(80):
+    for _ in range(IMPACT_STEPS):
         h, g = math.sin(0.5 * r), math.cos(0.5 * r)
         sn, versine = 2.0 * h * g, 2.0 * h * h
         miss = sign * (w * r + A * (c * versine - s * lag(r, sn)) - target)
@@ -154,7 +158,7 @@ def impact(A, c, s, w, low, high, kind, near):
             new = 0.5 * (low + high)
         move = new - r
         r = new
-        if abs(move) <= 4e-16 * r:
+        if abs(move) <= DIGIT * r:
             break
         if inside and abs(move) <= near * r and abs(move * force) <= near * v:
             # the next step would be near^2 of this one
@@ -173,7 +177,7 @@ def place(A, c, s, w, r):
 @part
 def lag(r, sn):
     """Return r - sin(r) without cancellation: chatter is made of very short flights."""
-    if r > 0.3:
+    if r > LAG_SERIES:
         return r - sn
     x = r * r
     return r * x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0 * (1.0 - x / 110.0))))
@@ -187,7 +191,7 @@ def stays(A, eps, c, s, w):
     if w == 0.0:
         return True
     left = 2.0 * w / (-A * c * (1.0 - eps)) if eps < 1.0 else np.inf
-    return left < CHATTER and left * abs(s) < 0.01 * -c
+    return left < CHATTER and left * abs(s) < TURNED * -c
 
 
 @njit(cache=True)

@@ -10,13 +10,28 @@ import math
 import numpy as np
 
 from ...simulate.compiler.compiled import njit, part
-from .wall_map import EXACT, ROUGH, flight, lag, place, stays, wrap
+from ..thresholds import (
+    BLOCKS,
+    DIVERGES,
+    ELASTIC_RADIUS,
+    EXACT,
+    IMPACTS,
+    LAP_OFF,
+    MEMORIES,
+    MEMORY_LEAST,
+    MOST_APART,
+    MOST_TRIES,
+    NOTHING,
+    POLISH_STEPS,
+    POLISHED,
+    POLISHED_LATE,
+    RARE,
+    RECURS,
+    ROUGH,
+    SETTLED_IMPACTS,
+)
+from .wall_map import flight, lag, place, stays, wrap
 
-NEAR = 1e-5  # distance of a recurrence from which Newton's method is tried
-BLOCKS = 8  # an average's spread is estimated from that many parts
-RARE = 8  # impacts in each of those parts, at least
-IMPACTS = 200  # bound on impacts per period of the budget, chatter included
-SETTLED = 200  # impacts given to settle where they are rare, besides 20 times the memory 1/(1 - eps) of them
 RELEASE = -0.5 * math.pi  # phi at which a pressing acceleration changes sign
 
 
@@ -50,7 +65,7 @@ def settle(A, eps, phi, w, transient):
     ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
     c, s = math.cos(phi), math.sin(phi)
     # a weak force needs many periods from wall to wall: what counts then is impacts
-    enough = SETTLED + 20.0 / max(1.0 - eps, 0.01)
+    enough = SETTLED_IMPACTS + MEMORIES / max(1.0 - eps, MEMORY_LEAST)
     for n in range(IMPACTS * transient):
         kind, time, rest, phi, c, s, w, _ = event(A, eps, phi, c, s, w, ROUGH)
         if kind == 2:
@@ -58,16 +73,16 @@ def settle(A, eps, phi, w, transient):
         since += 1
         elapsed += time + rest
         clock += time + rest
-        if abs(wrap(phi - ref_phi)) < NEAR and abs(w - ref_w) < NEAR * (1.0 + A) and tries < 100:
+        if abs(wrap(phi - ref_phi)) < RECURS and abs(w - ref_w) < RECURS * (1.0 + A) and tries < MOST_TRIES:
             lap = round(elapsed / math.pi)
-            if lap >= 1 and abs(elapsed - lap * math.pi) < 2.0 * NEAR:
+            if lap >= 1 and abs(elapsed - lap * math.pi) < 2.0 * RECURS:
                 tries += 1
                 ok, p, v, contact, radius, closing = polish(A, eps, phi, w, since, lap)
                 if ok:
                     return shortest(A, eps, p, v, since, lap, contact, radius, closing)
         if since == power:
             ref_phi, ref_w, since, elapsed = phi, w, 0, 0.0
-            power = min(2 * power, 4096)
+            power = min(2 * power, MOST_APART)
         if clock > 2.0 * math.pi * transient and n > enough:
             break
     return 0, 0, 0, phi, w, False, 0.0, 0.0
@@ -79,7 +94,7 @@ def shortest(A, eps, phi, w, count, lap, contact, radius, closing):
     for parts in range(lap, 1, -1):
         if lap % parts == 0 and count % parts == 0:
             ok, p, v, con, rad, clo = polish(A, eps, phi, w, count // parts, lap // parts)
-            if ok and abs(wrap(p - phi)) < NEAR and abs(v - w) < NEAR * (1.0 + A):
+            if ok and abs(wrap(p - phi)) < RECURS and abs(v - w) < RECURS * (1.0 + A):
                 return 1, lap // parts, count // parts, p, v, con, rad, clo
     return 1, lap, count, phi, w, contact, radius, closing
 
@@ -91,7 +106,7 @@ def polish(A, eps, phi, w, count, lap):
     Returns whether a stable orbit was found, phi, w, contact, largest multiplier, closing error.
     """
     before = np.inf
-    for _ in range(15):
+    for _ in range(POLISH_STEPS):
         p, c, s, v, total, contact = phi, math.cos(phi), math.sin(phi), w, 0.0, False
         j11, j12, j21, j22 = 1.0, 0.0, 0.0, 1.0
         for _ in range(count):
@@ -121,14 +136,14 @@ def polish(A, eps, phi, w, count, lap):
                 )
         dp, dw = wrap(p - phi), v - w
         size = abs(dp) + abs(dw) / (1.0 + A)
-        if abs(total - lap * math.pi) > 0.01:
+        if abs(total - lap * math.pi) > LAP_OFF:
             return False, phi, w, False, 0.0, 0.0
-        if size < 1e-14 or (size < 1e-10 and size > 0.25 * before):
+        if size < POLISHED or (size < POLISHED_LATE and size > 0.25 * before):
             half, det = 0.5 * (j11 + j22), j11 * j22 - j12 * j21
             root = half * half - det
             radius = abs(half) + math.sqrt(root) if root >= 0.0 else math.sqrt(max(det, 0.0))
-            return radius < 1.0 + 1e-9 * (eps == 1.0), phi, w, contact, radius, size
-        if size > 10.0 * before:
+            return radius < 1.0 + ELASTIC_RADIUS * (eps == 1.0), phi, w, contact, radius, size
+        if size > DIVERGES * before:
             return False, phi, w, False, 0.0, 0.0
         before = size
         det = (1.0 - j11) * (1.0 - j22) - j12 * j21
@@ -231,7 +246,7 @@ def average(A, eps, phi, w, periods, out):
         out[k] = (mark[k] - out[k]) * (2.0 / (span * A * k * k) if k > 0 else -1.0 / (span * A))
     mean = 0.5 * abs(out[1]) * length * A
     error = max(squares / blocks - mean * mean, 0.0) / (blocks - 1)
-    return 2.0 * math.sqrt(error) / max(mean, 1e-300)
+    return 2.0 * math.sqrt(error) / max(mean, NOTHING)
 
 
 @part

@@ -12,16 +12,24 @@ from __future__ import annotations
 import numpy as np
 
 from ...simulate.engine import State
-from .orbit_search import RTOL, OutOfWork
-
-FINE = 2e-13  # tolerance of shots
-GOOD = 3e-10  # last step, relative, from which an orbit counts as closed
-POOR = 1e-3  # the same where rounding forbids more: the residual says so
-NEUTRAL = 1e-6  # by how much a multiplier may exceed one: central differences are that good
-_STEP = 2e-5  # of differences, relative
-_ITERATIONS = 40
-_SETTLED = 1e-5, 0.3  # a step so short that shrinks no more than so far is what rounding leaves
-_LEAST_SHARE = {True: 1e-3, False: 0.3}  # of a Newton step that is tried, by patience
+from ..thresholds import (
+    BETTER,
+    FAR_FORGETS,
+    FAR_ITERATIONS,
+    FAR_SETTLED,
+    FAR_STEP,
+    FINE,
+    FINE_LATE,
+    GOOD,
+    GOOD_LATE,
+    HOPELESS,
+    LEAST_SHARE,
+    NEUTRAL,
+    POOR,
+    RTOL,
+    SHORTENED,
+)
+from .orbit_search import OutOfWork
 
 
 def close_far(
@@ -55,18 +63,19 @@ def close_far(
         f = map_.mismatch(y)
         size = map_.size.copy()
         best, error, last, jacobian = None, np.inf, np.inf, None
-        for _ in range(_ITERATIONS):
-            size = np.maximum(map_.size, 0.1 * size)
+        for _ in range(FAR_ITERATIONS):
+            size = np.maximum(map_.size, FAR_FORGETS * size)
             jacobian = map_.jacobian(y, size)
             step = _solve(jacobian, f, size[free])
             if step is None:
                 return None
             now = _length(step, size[free])
-            if not patient and now > 30:
+            if not patient and now > HOPELESS:
                 return None
             if best is None or now < error:
                 best, error = y, now
-            if now < 1e-3 * GOOD or (now < _SETTLED[0] and now > _SETTLED[1] * last):  # rounding rules
+            rounding = now < FAR_SETTLED[0] and now > FAR_SETTLED[1] * last
+            if now < BETTER * GOOD or rounding:
                 break
             last = now
             share = 1.0
@@ -81,8 +90,8 @@ def close_far(
                     f_trial, ahead = f, None
                 if ahead is not None and _length(ahead, size[free]) <= (1 - 0.25 * share) * now:
                     break
-                share *= 0.5 if share > 0.1 else 0.25
-                if share < _LEAST_SHARE[patient]:
+                share *= 0.5 if share > SHORTENED else 0.25
+                if share < LEAST_SHARE[patient]:
                     trial = None
                     break
             if trial is None:
@@ -95,7 +104,7 @@ def close_far(
             return None
         y = best
         miss = _length(map_.mismatch(y), size[free])
-        if not (error < 30 * GOOD or (error < POOR and miss < 100 * FINE)):
+        if not (error < GOOD_LATE * GOOD or (error < POOR and miss < FINE_LATE * FINE)):
             return None
         radius = np.max(np.abs(np.linalg.eigvals(jacobian * size[free] / size[free][:, None])))
         if not repelling and not radius < 1.0 + NEUTRAL:
@@ -173,7 +182,7 @@ class _Map:
             ends, spread = [], 0.0
             for side in (-1, 1):
                 z = y.copy()
-                z[i] += side * _STEP * size[i]
+                z[i] += side * FAR_STEP * size[i]
                 z = self.clipped(z)
                 spread += side * z[i]
                 ends.append(self.shot(z)[1])

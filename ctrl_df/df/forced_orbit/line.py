@@ -6,11 +6,9 @@ import numpy as np
 
 from ...simulate.engine import State, harmonic_drive
 from ..threads import go_on
-from .orbit_search import RTOL
+from ..thresholds import AT_ONCE, FIRST_STEP, RTOL
 from .shooting import address
 from .sweep import sweep
-
-_AT_ONCE = 64  # points of a line between two chances to interrupt it
 
 
 class Line:
@@ -40,11 +38,11 @@ class Line:
         """Close the orbits from point `first` on, whose predecessor the solver has; return how many."""
         s, state = self.solver, self.solver.previous
         self._past[0, : len(state.x)] = state.x / self._units(first - 1)
-        self._past[3, 0] = 0.02
+        self._past[3, 0] = FIRST_STEP
         self._mode, self._known = state.mode.copy(), 1
         p = first
         while p < len(self.A):  # compiled code hears no Ctrl-C: some points at a time
-            end = min(p + _AT_ONCE, len(self.A))
+            end = min(p + AT_ONCE, len(self.A))
             done, _, self._known = sweep(
                 address(), s.shot.at, self._drive, self._scratch, self.A[p:end], self.omega[p:end],
                 self._power, self._past, self._mode, self._known, s.mirrored, RTOL,

@@ -13,11 +13,8 @@ from typing import Any
 import numpy as np
 
 from ...simulate.program import layout as L
+from ..thresholds import FORCED, RESONANT, TRAVEL, UNIT, UNSTABLE_POLE
 from .symmetries import Probe, Symmetries
-
-_LARGE = 2.0**200  # unit of the states and inputs probed: exact, and no constant force is seen beside it
-_ROUNDING = 64 * np.finfo(float).eps
-_TRAVEL = 1e-6  # way in a period, relative to the amplitude, from which a motion is called drifting
 
 
 @dataclass(frozen=True)
@@ -54,9 +51,9 @@ class LinearOrbit:
         """Return (Y_k for k = 0..orders, regime, state at t = 0); NaN where no periodic motion attracts."""
         y, omega = np.full(orders + 1, np.nan + 0j), float(omega)
         size = np.max(np.abs(self.poles), initial=0.0)
-        if self.runaway or np.any(self.poles.real > 1e-9 * size):
+        if self.runaway or np.any(self.poles.real > UNSTABLE_POLE * size):
             return y, "diverged", None
-        if np.any(np.abs(self.poles - 1j * omega) <= _ROUNDING * max(size, omega)):
+        if np.any(np.abs(self.poles - 1j * omega) <= RESONANT * max(size, omega)):
             return y, "resonance", None
         matrix = 1j * omega * np.eye(len(self.b)) - self.a
         x = np.linalg.solve(matrix, self.b)
@@ -64,7 +61,7 @@ class LinearOrbit:
         x = A * unit * np.linalg.solve(matrix * unit / unit[:, None], self.b / unit)
         y[:] = 0.0
         y[0], y[1] = self.mean, self.c @ x + A * self.d
-        travels = abs(self.travel) * 2 * np.pi / omega > _TRAVEL * abs(y[1])
+        travels = abs(self.travel) * 2 * np.pi / omega > TRAVEL * abs(y[1])
         return y, "drifting" if travels else "smooth", self.center + x.real
 
 
@@ -89,10 +86,10 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
     base, _, y0 = probe.at(np.zeros(n), 0.0)
     a, c = np.empty((n, n)), np.empty(n)
     for j in range(n):
-        rates, _, y = probe.at(_LARGE * (np.arange(n) == j), 0.0)
-        a[:, j], c[j] = rates / _LARGE, y[row] / _LARGE
-    rates, _, y = probe.at(np.zeros(n), _LARGE)
-    b, d = rates / _LARGE, float(y[row] / _LARGE)
+        rates, _, y = probe.at(UNIT * (np.arange(n) == j), 0.0)
+        a[:, j], c[j] = rates / UNIT, y[row] / UNIT
+    rates, _, y = probe.at(np.zeros(n), UNIT)
+    b, d = rates / UNIT, float(y[row] / UNIT)
     # coordinates that must repeat stand by themselves; what they and constant forces do to the free ones
     free = s.free
     turned, steady = s.transform @ a @ s.inverse, s.transform @ base
@@ -106,7 +103,7 @@ def linear_orbit(engine, s: Symmetries, row: int, free_row: bool) -> LinearOrbit
     speed, tied = np.zeros(n), np.abs(turned) @ np.abs(center) + np.abs(steady)
     for direction in s.shifts:
         speed[direction] = rates[np.flatnonzero(direction)[0]]
-    runaway = runaway or bool(np.any(np.abs(rates) > 1e-12 * tied, where=s.inertial))
+    runaway = runaway or bool(np.any(np.abs(rates) > FORCED * tied, where=s.inertial))
     center = s.inverse @ center
     poles = np.linalg.eigvals(inner) if len(free) else np.zeros(0, complex)
     mean = 0.0 if free_row else float(y0[row] + c @ center)

@@ -11,29 +11,37 @@ from ...simulate.engine import Engine, State, harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.program import layout, pointers
 from ...simulate.program.layout import EVENT_KINDS
+from ...simulate.thresholds import FAR
 from ...status import Status
 from ..threads import go_on
+from ..thresholds import (
+    ACQUAINT_STEPS,
+    AT_ONCE,
+    BINS,
+    BLOCKS,
+    COARSE,
+    FAMILIAR,
+    FIRST_STEP,
+    KNOCKED,
+    KNOCKS,
+    LINEAR,
+    NAN_AHEAD,
+    NUDGE,
+    NUDGED,
+    PUSHED,
+    RTOL,
+    RUNS_AWAY,
+    SHIFTS,
+    SHOTS_ALONE,
+    SIZE_AT_FIRST,
+    WITHIN,
+)
 from . import shooting
 from .linear_orbit import linear_orbit
 from .shooting import CLOSED, SPENT, UNSTABLE, close_orbit
 from .shot import follow, make_shot, set_state, shoot
 from .symmetries import Probe, Sizes, find_symmetries
 
-RTOL = 5e-10
-_FAMILIAR = 1e3  # factor between sizes of motion for which laws need not be asked anew
-_BINS = 2  # decades of force and of frequency: within them sizes, up to A / omega^2, differ by _FAMILIAR
-_COARSE = 1e-7  # tolerance while a transient is followed
-_AT_ONCE = 64  # shots between two chances to interrupt them
-_START = 0.02  # of a period: first step of a shot
-_WITHIN = 0.3  # of a gap, off its faces and its middle: where a motion from rest begins
-_NUDGE = 1e-3  # of the size of each coordinate: far above rounding, within the reach of Newton's method
-_KNOCKS = ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2))
-# Face of a gap to begin at, and speed to leave it with over that which crosses it in a radian: none, and some
-# below and above; one that stays in touch is enough
-_PUSHED = 1e-6  # speed gained in a period, over that of a free inertia: beyond the error of a closed orbit
-_LINEAR = 1e-3  # change of a speed's growth from the one half to the other that is steady
-LONGEST = 12  # periods of a subharmonic motion that is recognised
-BLOCKS = 8  # an average's spread is estimated from that many parts
 BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
 TOUCH = BIT["impact"] | BIT["contact"] | BIT["release"]
 
@@ -111,9 +119,9 @@ class OrbitSearch:
 
         With `whatever_before` what they were asked before makes no difference: answers do not depend on it.
         """
-        if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), _FAMILIAR):
+        if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), FAMILIAR):
             return
-        about = tuple(_BINS * np.round(np.log10([A, omega]) / _BINS))
+        about = tuple(BINS * np.round(np.log10([A, omega]) / BINS))
         if about == self._about:
             return
         self._about = about
@@ -122,7 +130,10 @@ class OrbitSearch:
             states = self._motion(force, rate)
             # states that belong to no mechanism are as large as they get in a few periods
             run = self.engine.run(
-                self.engine.start(), 6 * np.pi / rate, harmonic_drive([[0.0, force]], rate), max_steps=20_000
+                self.engine.start(),
+                6 * np.pi / rate,
+                harmonic_drive([[0.0, force]], rate),
+                max_steps=ACQUAINT_STEPS,
             )
             seen = np.maximum(np.abs(run.state.x), self.shot.space.size)
             pointers.raised.clear()
@@ -159,7 +170,7 @@ class OrbitSearch:
         probe, x = Probe(self.engine), np.zeros(self.engine.nstates)
         at_zero = probe.at(x, 0.0)[2][self.row]
         size = sizes.states
-        return any(probe.at(x + 3.7 * size * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
+        return any(probe.at(x + SHIFTS["output"] * size * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
 
     def forget(self):
         """Start the next point from rest."""
@@ -194,7 +205,7 @@ class OrbitSearch:
         y = np.zeros(n)
         for node in self.mechanisms:
             if self.engine.program.ints[node[layout.AUX]] == 2:
-                y[node[layout.X] + 2] = _WITHIN * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
+                y[node[layout.X] + 2] = WITHIN * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
         state = self._state(y)
         self._resize(A)
         return state
@@ -202,7 +213,7 @@ class OrbitSearch:
     def _resize(self, A):
         n = self.engine.nstates
         self.shot.space.size[:] = (
-            1e-3 * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
+            SIZE_AT_FIRST * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
         )
         self.shot.size[:n] = 0.0
         self.shot.scale[:] = 0.0
@@ -217,10 +228,10 @@ class OrbitSearch:
     def _nudged(self, state):
         """Return the state a little off: no motion stays on a repelling orbit by the grace of rounding."""
         y = self.symmetries.transform @ state.x
-        y[self.symmetries.free] += _NUDGE * self.shot.size[self.symmetries.free]
+        y[self.symmetries.free] += NUDGE * self.shot.size[self.symmetries.free]
         return self._state(y, state.mode)
 
-    def _follow(self, state, periods, rtol=_COARSE):
+    def _follow(self, state, periods, rtol=COARSE):
         """Return the state after some periods (twice as many shots where mirrored)."""
         state = state.copy()
         self._trail(state, periods * 2 if self.mirrored else periods, rtol)
@@ -229,11 +240,11 @@ class OrbitSearch:
     def _trail(self, state, shots, rtol=RTOL):
         """Coordinates before each of some shots of the state, in place."""
         trail = np.empty((shots, len(state.x)))
-        for first in range(0, shots, _AT_ONCE):
+        for first in range(0, shots, AT_ONCE):
             reason, spent = follow(
                 self.shot.at, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
-                self._hmax(1) * self.period, _START * self.period, self.budget,
-                trail[first : first + _AT_ONCE],
+                self._hmax(1) * self.period, FIRST_STEP * self.period, self.budget,
+                trail[first : first + AT_ONCE],
             )  # fmt: skip
             self.budget -= spent
             self._checked(reason, state)
@@ -249,8 +260,8 @@ class OrbitSearch:
         """One shot of the state, in place."""
         shot = self.shot
         orders = 1 if spectrum is None else spectrum.shape[1] - 1
-        if not 0.0 < shot.clock[2] <= 5 * _START * self.period:
-            shot.clock[2] = _START * self.period
+        if not 0.0 < shot.clock[2] <= 5 * FIRST_STEP * self.period:
+            shot.clock[2] = FIRST_STEP * self.period
         reason = shoot(
             shot.at, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
             self._hmax(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum, self.budget,
@@ -271,11 +282,11 @@ class OrbitSearch:
         spectrum = np.zeros((self.row + 1, orders + 1), complex)
         if not near:
             shot.jacobian[:] = np.nan
-        shot.clock[2] = _START * self.period
+        shot.clock[2] = FIRST_STEP * self.period
         outcome, miss = close_orbit(
             shooting.address(), shot.at, self.drive, self._span(periods), state.x, state.mode,
             self.mirrored, RTOL, self.atol, self._hmax(orders) * self.period, spectrum,
-            self.budget, 24, False,
+            self.budget, SHOTS_ALONE, False,
         )  # fmt: skip
         self.budget -= int(shot.clock[3]) * 4
         go_on()
@@ -311,7 +322,7 @@ class OrbitSearch:
         if self.mirrored or self.drive.harmonics[0, 0] != 0:
             return
         gained = np.abs(step[self.symmetries.inertial])
-        if np.max(gained, initial=0.0) > _PUSHED * self.A / (self.inertia * self.omega):
+        if np.max(gained, initial=0.0) > PUSHED * self.A / (self.inertia * self.omega):
             raise OutOfWork(Status.DIVERGED)
 
     def _touching(self, orders):
@@ -324,18 +335,18 @@ class OrbitSearch:
         node = next(m for m in self.mechanisms if prog.par[m[layout.PAR] + layout.P_GAP] > 0)
         at, gap = node[layout.X], prog.par[node[layout.PAR] + layout.P_GAP]
         speed = gap * self.omega + self.A / (prog.par[node[layout.PAR] + layout.P_M0 + 1] * self.omega)
-        for face, leaving in _KNOCKS:
+        for face, leaving in KNOCKS:
             self.mirrored = self.symmetric
             y = np.zeros(self.engine.nstates)
             y[at + 2], y[at + 3] = face * gap, leaving * speed
             self._resize(self.A)
-            state = self._follow(self._state(y), 20)
+            state = self._follow(self._state(y), KNOCKED)
             if not self.shot.tally[2] & TOUCH:
                 continue
             orbit = self._periodic(state, orders=orders)
             if orbit is None and self.symmetric:
                 self.mirrored = False
-                state = self._follow(self._nudged(state), 30)
+                state = self._follow(self._nudged(state), NUDGED)
                 if not self.shot.tally[2] & TOUCH:
                     continue
                 orbit = self._periodic(state, orders=orders)
@@ -348,7 +359,8 @@ class OrbitSearch:
     def _stop_if_running_away(self, y):
         """Raise where a state grows out of all bounds, or a free body steadily gains speed."""
         half, y = len(y) // 2, y / self._unit
-        if np.max(np.abs(y[-1])) > 100 * np.max(np.abs(y[half])) > 1e4 * np.max(np.abs(y[0])):
+        late, early = RUNS_AWAY
+        if np.max(np.abs(y[-1])) > late * np.max(np.abs(y[half])) > early * np.max(np.abs(y[0])):
             raise OutOfWork(Status.DIVERGED)
         s = self.symmetries
         for i in range(len(s.power)):
@@ -356,7 +368,7 @@ class OrbitSearch:
                 continue
             early, late = y[half, i] - y[0, i], y[-1, i] - y[-1 - half, i]
             spread = np.max(np.abs(np.diff(y[:, i]) - early / half))
-            if abs(early) > _LINEAR and abs(late / early - 1) < _LINEAR and spread < 0.5 * abs(early / half):
+            if abs(early) > LINEAR and abs(late / early - 1) < LINEAR and spread < 0.5 * abs(early / half):
                 raise OutOfWork(Status.DIVERGED)
 
     # --- what was found -------------------------------------------------------------------------------
@@ -409,11 +421,11 @@ class OrbitSearch:
         if reason in (driver.STEPS, driver.DONE, driver.CHATTER, driver.FULL):
             return OutOfWork(Status.WORK_LIMIT)
         x = state.x
-        if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < 1e50:
+        if np.all(np.isfinite(x)) and np.max(np.abs(x), initial=0.0) < FAR:
             force = self.A * np.cos(self.omega * self.shot.clock[0])
             with np.errstate(all="ignore"):
                 slope = self._rates(x, force)
-                ahead = self._rates(x + slope * 1e-6 * self.period, force)
+                ahead = self._rates(x + slope * NAN_AHEAD * self.period, force)
             pointers.raised.clear()
             if not (np.all(np.isfinite(slope)) and np.all(np.isfinite(ahead))):
                 return user_error(self.block, ValueError(f"a law returned NaN or inf near the state {x}"))

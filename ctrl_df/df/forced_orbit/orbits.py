@@ -17,9 +17,26 @@ from ...blocks.mechanism import Mechanism
 from ...simulate.engine import State
 from ...simulate.program import layout
 from ...status import Status
+from ..thresholds import (
+    BLOCKS,
+    EVEN_LEAST,
+    EVEN_MISS,
+    EVENS,
+    LATER,
+    LATEST,
+    LONGER_BETTER,
+    LONGER_LEAST,
+    LONGEST_PERIOD,
+    NOTHING,
+    RTOL,
+    SLOW_CHANGE,
+    STEADY_SLOPE,
+    TRAVEL,
+    WAITS,
+)
 from .far_newton import close_far
 from .line import Line
-from .orbit_search import BIT, BLOCKS, LONGEST, RTOL, TOUCH, OrbitSearch, OutOfWork
+from .orbit_search import BIT, TOUCH, OrbitSearch, OutOfWork
 
 ORBIT_REGIMES = (
     "slip",
@@ -36,7 +53,7 @@ ORBIT_REGIMES = (
     "drifting",
     "free",
     "resonance",
-    *(f"subharmonic {k}" for k in range(2, LONGEST + 1)),
+    *(f"subharmonic {k}" for k in range(2, LONGEST_PERIOD + 1)),
 )
 """Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
 without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
@@ -44,9 +61,7 @@ periods, with their number; none; no dry friction and no contact; the state runs
 work was hit (NaN); the mass travels steadily besides swinging (the ramp is no part of the harmonics);
 a load never touched; an undamped linear mechanism driven at its natural frequency, which swings wider and
 wider (NaN)."""
-_WAITS = (64, 256, 1024, 4096)  # periods followed where a motion is seen to be still on its way
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
-_EVEN = 1e-2  # a motion that repeats so much better after two half periods than after one is not symmetric
 
 
 def orbit_family(
@@ -121,7 +136,7 @@ def _steady(means, sizes) -> bool:
         slope = at @ values / (at @ at)
         rest = values - values.mean() - slope * at
         error = np.sqrt(rest @ rest / (len(at) - 2) / (at @ at))
-        if abs(slope) > 4 * error and abs(slope) * len(at) > 1e-6:
+        if abs(slope) > 4 * error and abs(slope) * len(at) > STEADY_SLOPE:
             return False
     return True
 
@@ -225,7 +240,7 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             orbit = self._periodic(self._follow(state, self.transient), orders=orders)
         if orbit is None:
-            state = self._follow(state, 27)
+            state = self._follow(state, LATER)
             trail = self._trail(state, 5)
             orbit = self._periodic(state, orders=orders)
             if orbit is None and self.symmetric and self._alternates(trail):
@@ -236,7 +251,7 @@ class OrbitSolver(OrbitSearch):
                 orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
         if orbit is None and self.symmetric:
             self.mirrored = False
-            state = self._follow(self._nudged(state), 40)
+            state = self._follow(self._nudged(state), LATEST)
             orbit = self._periodic(state, orders=orders)
         if self.gap and orbit is not None and not self.kinds & TOUCH and self._given is None:
             mirrored, within = self.mirrored, orbit[0]
@@ -255,15 +270,15 @@ class OrbitSolver(OrbitSearch):
     def _unperiodic(self, state, orders):
         """Look for a longer period; else follow the motion until it is steady, and average."""
         self.mirrored, self.simple = False, False
-        state = self._follow(state, 40, RTOL)
-        y = self._trail(state, 2 * LONGEST + 1)
+        state = self._follow(state, LATEST, RTOL)
+        y = self._trail(state, 2 * LONGEST_PERIOD + 1)
         self._stop_if_running_away(y)
         found = self._longer_period(state, y, orders)
         if found is not None:
             return found
         orbit = close_far(self, state, orders=orders, patient=self._slow(y))
         if orbit is None:
-            for periods in _WAITS:
+            for periods in WAITS:
                 means, sizes = self._averages(state, orders)
                 if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
                     break
@@ -283,37 +298,37 @@ class OrbitSolver(OrbitSearch):
         if self.gap and not self.touched:
             return mean, "free", 0.0
         error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
-        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), 1e-300))
+        return mean, "aperiodic", float(2 * error / max(abs(mean[1]), NOTHING))
 
     def _alternates(self, y):
         """Whether a motion repeats after two of the shots it is followed by, and not after one."""
         once, twice = (np.max(np.abs(self._apart(y, k)[-1]), initial=0.0) for k in (1, 2))
-        return bool(twice < _EVEN * once and once > _EVEN)
+        return bool(twice < EVENS * once and once > EVENS)
 
     def _apart(self, y, shots):
         """Return changes over so many shots of the coordinates that have to repeat, in their sizes."""
         s, steps = self.symmetries, y[shots:] - y[:-shots]
         wrap = np.where(s.wrap > 0, s.wrap, 1.0)
         steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)
-        return (steps / np.maximum(np.max(np.abs(y), axis=0), 1e-300))[:, s.free]
+        return (steps / np.maximum(np.max(np.abs(y), axis=0), NOTHING))[:, s.free]
 
     def _slow(self, y):
         """Whether a motion changes little, and steadily, from shot to shot: a transient, not chaos."""
         steps = np.max(np.abs(self._apart(y, 1)), axis=1, initial=0.0)[-4:]
-        return bool(np.max(steps) < 0.3 and np.max(steps) < 2 * np.min(steps))
+        return bool(np.max(steps) < SLOW_CHANGE and np.max(steps) < 2 * np.min(steps))
 
     def _longer_period(self, state, y, orders):
         """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
         s = self.symmetries
         size = np.where(self.shot.size > 0, self.shot.size, 1.0)
-        least = 3e-3  # mismatch of the shorter periods: a multiple that closes no better is not tried
-        for periods in range(1, LONGEST + 1):
+        least = LONGER_LEAST
+        for periods in range(1, LONGEST_PERIOD + 1):
             gap = (y[-1] - y[-1 - periods]) / size
             gap -= np.where(
                 s.wrap > 0, np.round(gap * size / np.where(s.wrap > 0, s.wrap, 1)) * s.wrap / size, 0
             )
             apart = np.max(np.abs(gap[s.free]), initial=0.0)
-            if apart < 0.3 * least:
+            if apart < LONGER_BETTER * least:
                 least = apart
                 orbit = self._periodic(state, periods, orders)
                 if orbit is not None:
@@ -353,10 +368,10 @@ class OrbitSolver(OrbitSearch):
         if self.gap and not kinds & TOUCH:
             return "free"
         drift = abs(ends[1] - ends[0]) if not self.mirrored else 0.0
-        if drift > 1e-6 * abs(y[1]) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
+        if drift > TRAVEL * abs(y[1]) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
             return "drifting"
         even = np.max(np.abs(y[2::2]), initial=0.0)
-        if self.symmetric and even > max(1e-7, 1e3 * miss) * abs(y[1]):
+        if self.symmetric and even > max(EVEN_LEAST, EVEN_MISS * miss) * abs(y[1]):
             return "asymmetric"
         rigid = kinds & (BIT["impact"] | BIT["stop"])
         if kinds & BIT["stop contact"] or (kinds & BIT["contact"] and not self._elastic()):

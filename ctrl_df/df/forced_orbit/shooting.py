@@ -21,15 +21,26 @@ from ...simulate.dynamics.matrices import multiply
 from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.driver import copy
+from ..thresholds import (
+    EXPECTED,
+    FAR_OFF,
+    NEUTRAL_SHOT,
+    NOISE,
+    PIVOT,
+    ROUGHLY,
+    SHARP,
+    SHARPER,
+    SHRINKS,
+    SHRINKS_FIRST,
+    SIZE_KEPT,
+    SQUARINGS,
+    STILL,
+    TOLERANCE,
+)
 from .shot import coordinates, place, shot_at
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
-
-TOLERANCE = 3e-10  # error of an orbit's state, relative to its size
-SHOTS = 20  # for one orbit, beside those for Jacobians: while it comes nearer, no other start is cheaper
-NOISE = 4.0  # errors in tolerances of a shot below which it is the shots that differ, not the states
-ROUGHLY = 1e-7  # tolerance of shots far from the orbit
 
 
 @functools.cache
@@ -84,13 +95,13 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
     previous, best = math.inf, math.inf
     jacobians = sharp = 0
     take, centered = eager, False
-    expected = 1e-2  # closing error of the shot to come
+    expected = EXPECTED  # closing error of the shot to come
     for _ in range(shots):
         copy(x, x0)
         copy(mode, m0)
         coordinates(shot, x, y0)
         # far from the orbit coarse shots do
-        tolerance = rtol if take else max(rtol, min(1e-3 * expected, ROUGHLY))
+        tolerance = rtol if take else max(rtol, min(SHARPER * expected, ROUGHLY))
         first = shot.clock[2]
         reason = call_native(
             shot.take,
@@ -127,7 +138,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
         if not rests and (
             error < TOLERANCE
             or (take and stale and error < NOISE * rtol)
-            or (sharp > 1 and stale and miss < 100 * rtol and error < 1e3 * rtol)
+            or (sharp > 1 and stale and miss < SHARP[0] * rtol and error < SHARP[1] * rtol)
         ):
             copy(x0, x)
             copy(m0, mode)
@@ -195,9 +206,9 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             if y0[i] != y1[i]:
                 moved = False  # clipped
         # errors shrink by the same ratio once more, or faster
-        ratio = min(miss / previous, 0.1) if previous < math.inf else 0.01
+        ratio = min(miss / previous, SHRINKS) if previous < math.inf else SHRINKS_FIRST
         take = take or ratio * miss < TOLERANCE
-        expected = miss * min(ratio, 0.01)
+        expected = miss * min(ratio, SHRINKS_FIRST)
         previous = miss
     return OPEN, best
 
@@ -216,7 +227,7 @@ def _center(shot, step, x):
                 if amount == 0.0:
                     amount = 0.5 * step[j]
                     travel = shot.offset[j] - step[j] - 2.0 * x[j]
-                    far = far or abs(amount) > 0.1 * abs(travel)
+                    far = far or abs(amount) > FAR_OFF * abs(travel)
                 x[j] += amount
     return far
 
@@ -229,7 +240,7 @@ def _broyden(shot, jacobian, change, before, after):
     for f in range(nf):
         scaled = change[f] / shot.size[shot.free[f]]
         total += scaled * scaled
-    if total < 1e-14:  # a step so small measures rounding
+    if total < STILL:
         return
     for r in range(nf):
         i = shot.free[r]
@@ -307,7 +318,7 @@ def _newton_step(shot, jacobian, step, change):
         for r in range(c + 1, nf):
             if abs(a[r, c]) > abs(a[p, c]):
                 p = r
-        if not abs(a[p, c]) > 1e-9:
+        if not abs(a[p, c]) > PIVOT:
             return False
         if p != c:
             for k in range(nf):
@@ -338,7 +349,7 @@ def spectral_radius(shot, jacobian):
         for c in range(nf):
             ratio = shot.size[shot.free[c]] / shot.size[shot.free[r]] if r != c else 1.0
             a[r, c] = jacobian[r, c] * ratio if jacobian[r, c] != 0.0 else 0.0
-    for _ in range(12):
+    for _ in range(SQUARINGS):
         norm = 0.0
         for r in range(nf):
             for c in range(nf):
@@ -361,7 +372,7 @@ def spectral_radius(shot, jacobian):
 
 @part
 def _attracts(shot, jacobian):
-    return spectral_radius(shot, jacobian) < 1.0 + 1e-3  # neutral directions, differenced, come out near 1
+    return spectral_radius(shot, jacobian) < 1.0 + NEUTRAL_SHOT
 
 
 @part
@@ -375,7 +386,7 @@ def _mismatch(shot, y0, y1):
             size = shot.upper[i] - shot.lower[i]
         elif shot.transform[i, i] == 1.0:
             size = max(size, seen[i])
-        shot.size[i] = max(size, 0.05 * shot.size[i])
+        shot.size[i] = max(size, SIZE_KEPT * shot.size[i])
     worst = 0.0
     for i in range(n):
         y1[i] -= y0[i]

@@ -23,8 +23,8 @@ from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.space import Space
 from ...simulate.program import layout as L
-
-_CHATTER_ROOM = 60  # runs go on where the event log is full
+from ...simulate.thresholds import HEIGHT
+from ..thresholds import CHATTER_ROOM, FIRST_STALE, SHOT_EVENTS, SIZE_FORGOTTEN, TOUCHING
 
 
 class Shot(NamedTuple):
@@ -81,7 +81,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     modes = engine._modes.copy()
     none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
     no_spectrum = np.zeros((rows, 0), complex)
-    log_t, log_n, log_k = np.zeros(256), np.zeros(256, np.int64), np.zeros(256, np.int64)
+    log_t, log_n, log_k = (np.zeros(SHOT_EVENTS, kind) for kind in (float, np.int64, np.int64))
     shot = Shot(
         driver.address(), 0, engine.program, engine._space, np.zeros((4, ng)), np.zeros(10),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
@@ -131,7 +131,7 @@ def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget,
     reason, spent = driver.DONE, 0
     for k in range(trail.shape[0]):
         coordinates(shot, x, trail[k])
-        if not 0.0 < shot.clock[2] <= 5.0 * step:
+        if not 0.0 < shot.clock[2] <= FIRST_STALE * step:
             shot.clock[2] = step
         reason = call_native(
             shot.take,
@@ -159,7 +159,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
     clock[8] = -1.0
     for j in range(x.shape[0]):
         # tolerances refer to the size of this motion; that of a larger one before it must be forgotten
-        shot.space.size[j] = max(abs(x[j]), 0.1 * shot.space.size[j])
+        shot.space.size[j] = max(abs(x[j]), SIZE_FORGOTTEN * shot.space.size[j])
     settle(prog, drive, 0, 0.0, x, mode, work, shot.space.dx)
     wanted = spectrum.shape[1] > 0
     if wanted:
@@ -169,12 +169,12 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
         _outputs(shot, drive, 0.0, x, mode, 0)
     reason = driver.DONE
     kinds = 0
-    for _ in range(_CHATTER_ROOM):
+    for _ in range(CHATTER_ROOM):
         reason = call_native(
             shot.run,
             (
                 prog, drive, clock, x, mode, time, shot.none, shot.none_x, shot.none_y, 8, rtol, atol, hmax,
-                True, False, -1, 0.0, -1, max(rtol, 1e-10), budget, shot.log_t, shot.log_n, shot.log_k,
+                True, False, -1, 0.0, -1, max(rtol, HEIGHT), budget, shot.log_t, shot.log_n, shot.log_k,
                 shot.before, shot.scale, 0, shot.space.at, spectrum, drive.omega,
             ),
         )  # fmt: skip
@@ -276,7 +276,8 @@ def place(shot, y, x, mode):
             gap = prog.par[prog.nodes[k, L.PAR] + L.P_GAP]
             face = gap if mode[at + L.JOINT] > 0 else 0.0
             # contact survives what rounding leaves of it
-            if abs(y[first + 2] - face) > 1e-9 * gap or abs(y[first + 3]) > 1e-9 * shot.size[first + 3]:
+            apart = abs(y[first + 2] - face) > TOUCHING * gap
+            if apart or abs(y[first + 3]) > TOUCHING * shot.size[first + 3]:
                 mode[at + L.JOINT] = 0
             else:
                 x[first + 2] = x[first] + face

@@ -12,7 +12,8 @@ from ...simulate.compiler.views import lean
 from ...simulate.kernel.driver import copy
 from ...simulate.program import layout as L
 from ...simulate.program.layout import Drive
-from .shooting import CLOSED, SHOTS
+from ..thresholds import FIRST_LONGEST, SHOTS
+from .shooting import CLOSED
 from .shot import coordinates, place, shot_at
 
 
@@ -64,7 +65,7 @@ def sweep(
             ),
         )  # fmt: skip
         miss[p] = shot.error[0]
-        past[3, 0] = min(shot.clock[2] / period, 0.1)
+        past[3, 0] = min(shot.clock[2] / period, FIRST_LONGEST)
         if outcome != CLOSED:
             return p, outcome, known
         eager = shot.tally[0] <= 2

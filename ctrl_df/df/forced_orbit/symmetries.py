@@ -8,16 +8,15 @@ would not hold for effects that users write; the compiled rates are evaluated at
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, constant_drive
-from ...simulate.kernel.look import look
+from ...simulate.kernel.look import look_at
 from ...simulate.program import layout as L
-
-_PROBES = 24
-_TOL = 1e-9
+from ..thresholds import ALIKE, PROBES, RIPPLED, SHIFTS
 
 
 @dataclass
@@ -98,6 +97,16 @@ class Sizes:
         return bool(ratios.max() <= factor and ratios.min() >= 1 / factor)
 
 
+class Samples(NamedTuple):
+    """What the laws answer at random states `x` (m, n) and inputs `u` (m,): rates, margins, outputs."""
+
+    x: np.ndarray
+    u: np.ndarray
+    dx: np.ndarray
+    g: np.ndarray
+    y: np.ndarray
+
+
 class Probe:
     """Rates and margins of an engine at given states and input."""
 
@@ -107,25 +116,32 @@ class Probe:
         self.ng = int(self.prog.ints[L.H_NG])
         self.rng = np.random.default_rng(20)
 
-    def at(self, x, u, t=0.0, mode=None):
-        """Return rates, margins (sorted within each node) and outputs, modes settled first."""
+    def at(self, x, u):
+        """Return rates, margins and outputs at one state."""
+        dx, g, y = self.at_all(x[None], np.array([u]))
+        return dx[0], g[0], y[0]
+
+    def at_all(self, x, u, t=0.0):
+        """Return rates (m, n), margins (sorted within each node), outputs at states x (m, n), inputs u (m,).
+
+        Modes are settled first.
+        """
         engine, prog = self.engine, self.prog
-        x = x.copy()
-        mode = engine._modes.copy() if mode is None else mode.copy()
-        drive = constant_drive(np.full(engine.ninputs, u))
-        work, dx, g = engine._space.work, np.zeros(len(x)), np.full(self.ng + 1, np.inf)
-        y = np.zeros(engine.noutputs)
-        look(prog, drive, t, x, mode, work, dx, g, y, True, 0.0)
+        m, x = len(x), np.array(x, order="C")
+        dx, g, y = np.zeros(x.shape), np.full((m, self.ng + 1), np.inf), np.zeros((m, engine.noutputs))
+        drive, times = constant_drive(np.zeros(engine.ninputs)), np.broadcast_to(t, m).astype(float)
+        inputs = np.asarray(u, float)
+        look_at(prog, drive, times, x, inputs, engine._modes, engine._space.work, dx, g, y)
         for node in prog.nodes:
             mine = slice(node[L.G], node[L.G] + node[L.NG])
             # what a quantizer does with its steps shows in the rates, or it does nothing
-            g[mine] = np.inf if node[L.KIND] == L.QUANTIZER else np.sort(g[mine])
+            g[:, mine] = np.inf if node[L.KIND] == L.QUANTIZER else np.sort(g[:, mine], axis=1)
         return dx, g, y
 
     def states(self):
         """Random states over several decades, bodies within their gaps, some of them at rest."""
         n = self.engine.nstates
-        for i in range(_PROBES):
+        for i in range(PROBES):
             x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(-4, 1, size=n) * self.sizes.states
             u = self.rng.normal() * 10.0 ** self.rng.uniform(-1, 2) * self.sizes.force
             for node in _mechanisms(self.prog):
@@ -154,7 +170,8 @@ def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> S
     low, high, gaps = lower.copy(), upper.copy(), np.zeros(n)
     free, positions, inertial = np.ones(n, bool), np.zeros(n, bool), np.zeros(n, bool)
     wrap, shifts = np.zeros(n), []
-    samples = [(x, u, probe.at(x, u)) for x, u in probe.states()]
+    states, inputs = (np.array(column) for column in zip(*probe.states(), strict=True))
+    samples = Samples(states, inputs, *probe.at_all(states, inputs))
     for node in _mechanisms(prog):
         at, aux, par = node[L.X], node[L.AUX], node[L.PAR]
         bodies, joint = prog.ints[aux + L.A_BODIES], prog.ints[aux + L.A_JOINT]
@@ -175,26 +192,26 @@ def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> S
         direction = np.zeros(n, bool)
         direction[places] = True
         if not stopped and _unmoved(
-            probe, samples, direction, probe.rng.normal() * 1.7 * probe.sizes.states[at]
+            probe, samples, direction, probe.rng.normal() * SHIFTS["place"] * probe.sizes.states[at]
         ):
             free[at] = False
             positions[places] = True
             shifts.append(direction)
             speeds = np.zeros(n, bool)
             speeds[places + 1] = True
-            if _unmoved(probe, samples, speeds, 0.37 * probe.sizes.states[at + 1], direction):
+            if _unmoved(probe, samples, speeds, SHIFTS["speed"] * probe.sizes.states[at + 1], direction):
                 free[at + 1] = False
                 inertial[at + 1] = True
         elif not stopped:
             for length in _wavelengths(block):
-                if _unmoved(probe, samples, direction, length, tol=1e-6):
+                if _unmoved(probe, samples, direction, length, tol=RIPPLED):
                     wrap[at] = length
     mine = np.zeros(n, bool)
     for node in _mechanisms(prog):
         mine[node[L.X] : node[L.X] + 2 * prog.ints[node[L.AUX] + L.A_BODIES]] = True
     for i in np.flatnonzero(~mine):
         direction = np.arange(n) == i
-        if _unmoved(probe, samples, direction, 0.83 * probe.sizes.states[i]):
+        if _unmoved(probe, samples, direction, SHIFTS["state"] * probe.sizes.states[i]):
             free[i] = False
             positions[i] = True
             shifts.append(direction)
@@ -209,29 +226,20 @@ def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> S
     )  # fmt: skip
 
 
-def _unmoved(probe, samples, direction, shift, rate=None, tol=_TOL):
+def _unmoved(probe, samples, direction, shift, rate=None, tol=ALIKE):
     """Whether a shift of some states changes no margin and no rate (but `rate`, which shifts along)."""
-    for x, u, (dx, g, _) in samples:
-        other, other_g, _ = probe.at(x + shift * direction, u)
-        expected = dx if rate is None else dx + shift * rate
-        if not (_close(other, expected, tol) and _close(other_g, g, tol)):
-            return False
-    return True
+    other, other_g, _ = probe.at_all(samples.x + shift * direction, samples.u)
+    expected = samples.dx if rate is None else samples.dx + shift * rate
+    return _close(other, expected, tol) and _close(other_g, samples.g, tol)
 
 
 def _is_odd(probe, samples, offset):
-    compared = 0
-    for x, u, (dx, g, y) in samples:
-        if not np.all(np.isfinite(dx)):
-            continue
-        other, other_g, other_y = probe.at(offset - x, -u)
-        center = probe.at(offset / 2, 0.0)[2] if np.any(offset) else 0.0
-        if not (_close(other, -dx) and _close(other_g, g)):
-            return False
-        if not np.any(offset) and not _close(other_y - 2 * center, -y):
-            return False
-        compared += 1
-    return compared > 0
+    told = np.all(np.isfinite(samples.dx), axis=1)
+    x, u, dx, g, y = (column[told] for column in samples)
+    other, other_g, other_y = probe.at_all(offset - x, -u)
+    if not (len(x) and _close(other, -dx) and _close(other_g, g)):
+        return False
+    return bool(np.any(offset)) or _close(other_y, -y)
 
 
 def _on_motor(gaps):
@@ -243,14 +251,13 @@ def _on_motor(gaps):
 
 
 def _autonomous(probe, samples):
-    for x, u, (dx, _, _) in samples[: _PROBES // 2]:
-        if not _close(probe.at(x, u, t=probe.rng.uniform(1, 100) / probe.sizes.rate)[0], dx):
-            return False
-    return True
+    half = PROBES // 2
+    times = probe.rng.uniform(1, 100, half) / probe.sizes.rate
+    return _close(probe.at_all(samples.x[:half], samples.u[:half], times)[0], samples.dx[:half])
 
 
-def _close(a, b, tol=_TOL):
-    """Whether two vectors agree, entry by entry: their units differ."""
+def _close(a, b, tol=ALIKE):
+    """Whether two arrays agree, entry by entry: their units differ."""
     finite = np.isfinite(b)
     if not np.array_equal(finite, np.isfinite(a)):
         return False

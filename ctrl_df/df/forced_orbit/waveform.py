@@ -11,6 +11,7 @@ from ...blocks.mechanism import Mechanism
 from ...blocks.transparent import without_delays
 from ...simulate.engine import Engine
 from ...simulate.program import layout
+from ..thresholds import WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE
 from .far_newton import close_far
 from .orbit_search import OrbitSearch, OutOfWork
 
@@ -81,11 +82,11 @@ class WaveformOrbit:
         if self.motion is not None:
             yield self.motion, dict(near=True)
             if gap > 0:  # any other start may lead to another motion
-                yield self.motion, dict(periods=20)
+                yield self.motion, dict(periods=WAVE_PERIODS_GAP)
                 return
         n = search.engine.nstates
         if core is None or gap == 0:
-            for periods in (3, 30):
+            for periods in (WAVE_PERIODS, WAVE_PERIODS_MORE):
                 yield search.engine.start(np.zeros(n)), dict(periods=periods)
             return
         driven = search.A / (sum(core.masses) * search.omega)
@@ -93,7 +94,7 @@ class WaveformOrbit:
         for speed in (3.0 * driven, crossing, -crossing, 2.0 * crossing, -driven):
             x = np.zeros(n)
             x[2], x[3] = 0.5 * gap, speed
-            yield search.engine.start(x), dict(periods=20, far=True)
+            yield search.engine.start(x), dict(periods=WAVE_PERIODS_GAP, far=True)
 
     def _closed(self, state, orders, periods=0, near=False, far=False):
         """Close an orbit, attracting or not, from where a state is after some periods; its state or None."""

@@ -9,17 +9,28 @@ import numpy as np
 from ...simulate.engine import Engine, Event
 from ...simulate.program.layout import AUX, KIND, MECHANISM, MODE
 from ...status import Status
-from .monodromy import RTOL, Tracer
+from ..thresholds import (
+    ACCEPTED,
+    CLOSED,
+    COURSE_RTOL,
+    FREE_POINTS,
+    LAP_RTOL,
+    MOST_LAPS,
+    NEWTON_LONGEST,
+    NOTHING,
+    ON_CIRCLE,
+    ORBIT_POINTS,
+    RANK,
+    REPEATED,
+    STALLED,
+    STALLS,
+    STILL,
+    STRETCH,
+)
+from .monodromy import Tracer
 from .multiple_shooting import shoot
 from .orbit import Orbit
 from .symmetry import shift_directions, transverse
-
-CLOSED = 3e-10  # mismatch after a lap, relative to the size of each state
-_ACCEPTED = 1e-7  # the same where events limit what can be reached
-_STRETCH = 4.0  # of the period on the way
-_STILL = 1e-6  # swing, relative to the motion that Newton started from, below which there is no orbit
-_MOST_LAPS = 32  # an orbit closed after so many laps or fewer is told from the one of a single lap
-_ON_CIRCLE = 1e-6  # distance from the unit circle below which a multiplier says nothing of stability
 
 
 class NoClosure(Exception):
@@ -72,19 +83,19 @@ class Closing:
             if mismatch < CLOSED:
                 status, best = Status.CONVERGED, mismatch
                 break
-            if mismatch > 0.9 * best:
+            if mismatch > STALLED * best:
                 grown += 1
-                if grown > 6:
+                if grown > STALLS:
                     break
             best = min(best, mismatch)
             step = self._newton(start, lap, period, size, beside, residual)
             period += step[-1]
-            if not first / _STRETCH < period < first * _STRETCH:
+            if not first / STRETCH < period < first * STRETCH:
                 raise NoClosure("Newton left for another period", best)
             start = self.rebuilt(start.x + step[:-1])
         if lap is None or self._at_rest(start, lap, period, size):
             raise NoClosure("Newton ended at rest")
-        if status is not Status.CONVERGED and best > _ACCEPTED:
+        if status is not Status.CONVERGED and best > ACCEPTED:
             raise NoClosure(f"Newton came no nearer than {best:.1g} of the orbit's size", best)
         lap, period = self._single(start, period, lap, size, beside)
         return self._finished(start, period, lap, size)
@@ -110,20 +121,20 @@ class Closing:
         system[:n, n] = f_end * period / size
         system[n, :n] = f_start * period / size
         system[:n] = beside @ system[:n]
-        change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=1e-12)[0]
-        shorten = min(1.0, 0.3 / max(float(np.max(np.abs(change))), 1e-300))
+        change = np.linalg.lstsq(system, -np.append(residual, 0.0), rcond=RANK)[0]
+        shorten = min(1.0, NEWTON_LONGEST / max(float(np.max(np.abs(change))), NOTHING))
         return shorten * change * scale
 
     def _single(self, start, period, lap, size, beside):
         """Return the lap and period of an orbit that may have been closed after going round several times."""
-        parts = np.arange(_MOST_LAPS, 1, -1)
-        run = self.engine.run(start, period, times=np.sort(period / parts), rtol=RTOL, log=1)
+        parts = np.arange(MOST_LAPS, 1, -1)
+        run = self.engine.run(start, period, times=np.sort(period / parts), rtol=LAP_RTOL, log=1)
         mismatch = np.max(np.abs(((run.states - start.x) / size) @ beside.T), axis=1)
         for k in np.argsort(period / parts):  # the shortest first
             part = int(parts[k])
-            if mismatch[k] < 100 * _ACCEPTED:
+            if mismatch[k] < REPEATED * ACCEPTED:
                 short = self.tracer.lap(start, period / part, size=size)
-                if np.max(np.abs(beside @ ((short.end.x - start.x) / size))) < 100 * _ACCEPTED:
+                if np.max(np.abs(beside @ ((short.end.x - start.x) / size))) < REPEATED * ACCEPTED:
                     return short, period / part
         return lap, period
 
@@ -133,8 +144,8 @@ class Closing:
         lap = self.tracer.lap(state, period, differentiate=False)
         if not lap.status.ok or not lap.segments:
             raise NoClosure(f"no lap could be followed ({lap.status.name.lower().replace('_', ' ')})")
-        times = np.linspace(0, period, 65)[1:]
-        run = self.engine.run(self.engine.start(x0), period, times=times, rtol=1e-8, log=1)
+        times = np.linspace(0, period, FREE_POINTS)[1:]
+        run = self.engine.run(self.engine.start(x0), period, times=times, rtol=COURSE_RTOL, log=1)
         largest = np.max(np.abs([s.start.x for s in lap.segments] + [lap.end.x]), axis=0)
         largest = np.maximum(largest, np.nanmax(np.abs(run.states), axis=0))
         if stay:
@@ -145,7 +156,7 @@ class Closing:
         length, k = max((s.length, i) for i, s in enumerate(lap.segments) if constraints[i] == least)
         begin = lap.segments[k].start
         size = self.tracer.sizes(begin, period, largest)
-        middle = self.engine.run(begin, begin.time + 0.5 * length, rtol=RTOL, locate=False, log=1).state
+        middle = self.engine.run(begin, begin.time + 0.5 * length, rtol=LAP_RTOL, locate=False, log=1).state
         middle.time, middle.mode = 0.0, begin.mode.copy()
         middle.fresh = True
         return self.tracer.settle(middle), size
@@ -167,7 +178,7 @@ class Closing:
         """Whether Newton ended on an equilibrium, which is periodic with any period."""
         speed = np.abs(self.tracer.rate(start.time, start.x, start.mode)) * period
         moved = np.max([np.abs(s.start.x - start.x) for s in lap.segments], axis=0)
-        return bool(np.max(speed / size) < 1e-6) and bool(np.max(moved / size) < 1e-6)
+        return bool(np.max(speed / size) < STILL) and bool(np.max(moved / size) < STILL)
 
     def rebuilt(self, x):
         """Return a state in freshly settled modes: rigid joints closed, within gaps and stops."""
@@ -193,13 +204,13 @@ class Closing:
         return x
 
     def _finished(self, start, period, lap, size) -> Orbit:
-        times = np.linspace(0.0, period, 1025)
+        times = np.linspace(0.0, period, ORBIT_POINTS)
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         run = self.engine.run(
-            start, period, times=times, rtol=RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
+            start, period, times=times, rtol=LAP_RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
         )
-        if np.max(np.ptp(run.states, axis=0) / size) < _STILL:
+        if np.max(np.ptp(run.states, axis=0) / size) < STILL:
             raise NoClosure("Newton ended at rest")  # an equilibrium, periodic with any period
         # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
         across = transverse(shift_directions(self.tracer, lap.segments, size))
@@ -208,10 +219,10 @@ class Closing:
         trivial = int(np.argmin(np.abs(values - 1.0)))
         floquet = np.delete(values, trivial)
         floquet = floquet[np.argsort(-np.abs(floquet))]
-        if np.any(np.abs(floquet - 1.0) < _ON_CIRCLE):
+        if np.any(np.abs(floquet - 1.0) < ON_CIRCLE):
             raise Centre("motions of every size repeat (a centre)")
         outside = np.abs(floquet) - 1.0
-        stable = None if np.any(np.abs(outside) < _ON_CIRCLE) else bool(np.all(outside < 0.0))
+        stable = None if np.any(np.abs(outside) < ON_CIRCLE) else bool(np.all(outside < 0.0))
         residual = float(np.max(np.abs(across.T @ ((lap.end.x - start.x) / size)), initial=0.0))
         events, t = [], 0.0
         for s in lap.segments:

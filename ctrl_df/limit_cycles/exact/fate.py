@@ -7,15 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .kicks import FACTORS
+from ..thresholds import ASKED, FACTORS, HALVINGS, LINGERS, NOTHING, SWINGS, WIDTH, WOUND
 from .known import KnownOrbits
 from .orbit import Orbit
 from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, Swings
-
-_SWINGS = 1000  # of one simulation
-_HALVINGS = 40  # of the interval between two starts of different fate
-_ASKED = (6, 12, 18, 26, 40)  # halvings after which the motion on the border is tried for an orbit
-_WIDTH = 1e-3  # of a border whose orbit is known, relative
 
 
 @dataclass(frozen=True)
@@ -166,7 +161,7 @@ class Explorer:
         known = KnownOrbits(self.swings, []) if known is None else known
         rows = []
         for size, x0 in kicks.all(factors):
-            course = self.swings.follow(x0, _SWINGS, longest, decided=known.ending)
+            course = self.swings.follow(x0, SWINGS, longest, decided=known.ending)
             orbit = known.reached(course) or known.kept(self.close(x0, course, True))
             rows.append(self._row(size, course, orbit, x0))
             _once(met, orbit)
@@ -197,25 +192,25 @@ class Explorer:
         if not any(getattr(e, "corners", ()) for e, _ in core.input_channel):
             return 1.0
         gains = np.abs(course.end) / self.swings.units
-        return float(max(gains[:nc].max() / max(gains[nc:].max(), 1e-300), 1.0 + 1e-9))
+        return float(max(gains[:nc].max() / max(gains[nc:].max(), NOTHING), 1.0 + WOUND))
 
     def _border(self, low: Start, high: Start, longest, known) -> Border:
         below, above, fates, orbit = low.size, high.size, (low.fate, high.fate), None
-        for count in range(1, _HALVINGS + 1):
-            if orbit is not None and above < (1 + _WIDTH) * below:
+        for count in range(1, HALVINGS + 1):
+            if orbit is not None and above < (1 + WIDTH) * below:
                 break
             middle = float(np.sqrt(below * above))
             if not below < middle < above:
                 break
             x0 = self.swings.kicks.state(middle)
-            course = self.swings.follow(x0, _SWINGS, longest, decided=known.ending)
+            course = self.swings.follow(x0, SWINGS, longest, decided=known.ending)
             if course.fate == fates[0]:
                 below = middle
             elif course.fate == fates[1]:
                 above = middle
             else:
                 break
-            if orbit is None and count in _ASKED:
+            if orbit is None and count in ASKED:
                 orbit = self._slowest(x0, course, known)
         return Border(below, above, fates, orbit)
 
@@ -225,12 +220,12 @@ class Explorer:
         if len(laps) < 4:
             return None
         change = [
-            float(np.max(np.abs(b.state - a.state) / self.swings.units) / max(b.peak, 1e-300))
+            float(np.max(np.abs(b.state - a.state) / self.swings.units) / max(b.peak, NOTHING))
             for a, b in zip(laps[:-1], laps[1:], strict=True)
         ]
         k = int(np.argmin(change))
         orbit = known.beside(laps[k])
-        if orbit is not None or change[k] > 0.3:
+        if orbit is not None or change[k] > LINGERS:
             return orbit
         near = laps[max(k - 4, 0) : k + 2]
         padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near

@@ -10,10 +10,20 @@ import numpy as np
 from ...blocks.core import level
 from ...blocks.element import Element
 from ...simulate.sampled import Sampled
-
-FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)  # of the scale, in the order tried
-_DECADES = np.arange(-40.0, 41.0)  # over which a smooth law is asked where it bends
-_BENT = 0.01  # change of a slope, relative, from which on a law counts as bent
+from ..thresholds import (
+    BEND_HALVINGS,
+    BENT,
+    DECADES,
+    FACTORS,
+    INSIDE_STOPS,
+    JUMPED,
+    POLE_AT_ZERO,
+    REAL_ROOT,
+    ROUNDED,
+    SAMPLED_PACE,
+    SAMPLED_POINTS,
+    SAMPLED_SLOWEST,
+)
 
 
 class Kicks:
@@ -76,7 +86,7 @@ class Kicks:
         if core.stop is not None:
             low, high = core.stop.span
             places = slice(offset, offset + 2 * core.bodies, 2)
-            x[places] = np.clip(x[places], 0.9 * low, 0.9 * high)
+            x[places] = np.clip(x[places], INSIDE_STOPS * low, INSIDE_STOPS * high)
         return x
 
     def _swung(self, size):
@@ -114,12 +124,12 @@ class Kicks:
             return size
         if self.block.nstates:
             return 1.0
-        least = 10.0 ** _DECADES[0]
+        least = 10.0 ** DECADES[0]
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
         # over six decades any power of the argument grows by more than twofold, unless a jump hides it
-        if jump > 0.5 * abs(law(1e6 * least)):
+        if jump > 0.5 * abs(law(JUMPED * least)):
             return jump * gain or 1.0
         bend = _bend(law, 1 / gain if gain else 0.0)
         self.straight = bend or 0.0
@@ -181,19 +191,19 @@ def _bend(law, least=0.0):
         except Exception:  # a law of the user's may raise beyond its range: there it is not asked
             return np.nan
 
-    straight = secant(10.0 ** _DECADES[0])
+    straight = secant(10.0 ** DECADES[0])
     if not np.isfinite(straight):
         return None
-    for u in 10.0**_DECADES:
+    for u in 10.0**DECADES:
         slope = secant(u)
         if not np.isfinite(slope):
             return None
-        if np.isfinite(slope) and abs(slope - straight) > _BENT * max(abs(straight), least):
+        if np.isfinite(slope) and abs(slope - straight) > BENT * max(abs(straight), least):
             low, high = u / 10.0, u
-            for _ in range(60):  # to the argument itself: decades belong to a unit
+            for _ in range(BEND_HALVINGS):  # to the argument itself: decades belong to a unit
                 middle = np.sqrt(low * high)
                 now = secant(middle)
-                if abs(now - straight) > _BENT * max(abs(straight), least):
+                if abs(now - straight) > BENT * max(abs(straight), least):
                     high = middle
                 else:
                     low = middle
@@ -208,10 +218,10 @@ def _pole_frequency(controller) -> float:
         return 1.0
     poles = np.linalg.eigvals(a)
     if dt:
-        poles = np.log(poles[np.abs(poles) > 1e-12]) / dt
+        poles = np.log(poles[np.abs(poles) > ROUNDED]) / dt
     sizes = np.abs(poles)
-    sizes = sizes[sizes > 1e-9 * sizes.max(initial=0.0)]
-    return float(np.exp(np.mean(np.log(sizes)))) if sizes.size else (1.0 if not dt else 0.1 / dt)
+    sizes = sizes[sizes > POLE_AT_ZERO * sizes.max(initial=0.0)]
+    return float(np.exp(np.mean(np.log(sizes)))) if sizes.size else (1.0 if not dt else SAMPLED_PACE / dt)
 
 
 def corner_frequency(parts) -> float:
@@ -229,9 +239,9 @@ def corner_frequency(parts) -> float:
         num, den = (np.asarray(p[0][0], float) for p in (rational.num, rational.den))
         gap = np.polysub(_power(num), mass**2 * np.concatenate([_power(den), [0.0, 0.0, 0.0, 0.0]]))
         roots = np.roots(np.trim_zeros(gap, "f"))
-        real = roots[(np.abs(roots.imag) < 1e-6 * np.abs(roots)) & (roots.real > 0)].real
+        real = roots[(np.abs(roots.imag) < REAL_ROOT * np.abs(roots)) & (roots.real > 0)].real
         return float(real.max()) if real.size else 1.0
-    omega = np.geomspace(1e-6, 1.0, 600) * np.pi / dt
+    omega = np.geomspace(SAMPLED_SLOWEST, 1.0, SAMPLED_POINTS) * np.pi / dt
     gain = np.abs(np.asarray(controller(np.exp(1j * omega * dt))).ravel())
     above = gain > mass * omega**2
     return float(omega[np.flatnonzero(above)[-1]]) if above.any() else float(omega[0])

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
 from .orbit import Orbit
 from .swings import CYCLES, Course, Lap, Swings
-
-_THERE = 1e-3  # of an orbit's size: a passage so near a stable one, and coming nearer, ends on it
-_BESIDE = 0.03  # the same for a passage that lingers beside an unstable one
-_ON = 1e-5  # difference of a lap's time from the period, relative, within which a passage is that near
-_PASSAGES = 3  # in a row that come nearer
 
 
 class KnownOrbits:
@@ -35,19 +31,19 @@ class KnownOrbits:
         if orbit is None:
             return None
         for known in self.orbits:
-            if orbit.same_as(known, 1e-4 if orbit.status.ok else 2e-2):
+            if orbit.same_as(known, SAME_ORBIT if orbit.status.ok else SAME_ROUGHLY):
                 return known
         self.orbits.append(orbit)
         return orbit
 
     def approached(self, laps: list[Lap]) -> Orbit | None:
         """Return the stable orbit that the last passages come nearer and nearer to, almost there; or None."""
-        if len(laps) <= _PASSAGES:
+        if len(laps) <= PASSAGES:
             return None
         for orbit in self.orbits:
             if orbit.stable:
-                apart = [self._distance(orbit, lap) for lap in laps[-_PASSAGES:]]
-                if apart[-1] < _THERE and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
+                apart = [self._distance(orbit, lap) for lap in laps[-PASSAGES:]]
+                if apart[-1] < THERE and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
                     return orbit
         return None
 
@@ -62,14 +58,14 @@ class KnownOrbits:
             if not passages or len(laps) <= passages:
                 continue
             lap = laps[-1].time - laps[-1 - passages].time
-            if abs(lap / orbit.period - 1) < _ON and self._distance(orbit, laps[-1]) < _THERE:
+            if abs(lap / orbit.period - 1) < ON and self._distance(orbit, laps[-1]) < THERE:
                 return orbit
         return None
 
     def beside(self, lap: Lap) -> Orbit | None:
         """Return the unstable orbit that a passage is beside; or None."""
         for orbit in self.orbits:
-            if orbit.stable is False and self._distance(orbit, lap) < _BESIDE:
+            if orbit.stable is False and self._distance(orbit, lap) < BESIDE:
                 return orbit
         return None
 
@@ -95,7 +91,7 @@ class KnownOrbits:
         found = self._passages.get(id(orbit))
         if found is None:
             states = np.asarray(orbit.states)
-            size = np.maximum(np.abs(states).max(axis=1), 1e-9 * self.swings.units)
+            size = np.maximum(np.abs(states).max(axis=1), ORBIT_SIZE * self.swings.units)
             y = np.asarray(orbit.outputs)[self.swings.row]
             ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
             share = y[ups] / (y[ups] - y[ups + 1])

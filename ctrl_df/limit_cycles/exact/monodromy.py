@@ -20,10 +20,18 @@ from ...simulate.kernel import driver
 from ...simulate.kernel.look import jump, look
 from ...simulate.program import layout
 from ...status import Status
-
-RTOL = 1e-11
-_REACH = 1e-6  # of a lap: the time over which rates of inputs are taken
-_TOLD = 1e-7  # of what the other states move a state by in a lap: a size below that is rounding
+from ..thresholds import (
+    EVENT_NUDGE,
+    FLOW_NUDGE,
+    LAP_EVENTS,
+    LAP_REACH,
+    LAP_RTOL,
+    LAP_STEPS,
+    NOTHING,
+    REACH_AT_FIRST,
+    SLOPE_NUDGE,
+    TOLD,
+)
 
 
 @dataclass(frozen=True)
@@ -51,19 +59,19 @@ class Period:
 class Tracer:
     """Follows orbits of one engine and differentiates them."""
 
-    def __init__(self, engine: Engine, drive: Drive | None = None, max_events: int = 5000):
+    def __init__(self, engine: Engine, drive: Drive | None = None, max_events: int = LAP_EVENTS):
         self.engine = engine
         self.drive = drive if drive is not None else constant_drive(np.zeros(engine.ninputs))
         self.max_events = max_events
         self.n = engine.nstates
         self._work, *_ = driver.workspace(engine.program)
         self._g = np.zeros(int(engine.program.ints[layout.H_NG]) + 1)
-        self._reach = 1e-9  # [s], set by every lap
+        self._reach = REACH_AT_FIRST  # [s], set by every lap
         self._none = np.zeros(0)
 
     def settle(self, state: State) -> State:
         """Return the state with its modes in line (no time passes)."""
-        return self.engine.run(state, state.time, self.drive, rtol=RTOL).state
+        return self.engine.run(state, state.time, self.drive, rtol=LAP_RTOL).state
 
     def rate(self, t, x, mode, margins=False) -> Any:
         """Rates of a state in a mode; with `margins` the event margins too."""
@@ -77,7 +85,7 @@ class Tracer:
     def lap(self, state: State, length: float, differentiate: bool = True, size=None) -> Period:
         """Follow the orbit for `length` seconds from `state`."""
         t_end = state.time + length
-        self._reach = _REACH * length
+        self._reach = LAP_REACH * length
         now = self.settle(state) if state.fresh else state.copy()
         phi = np.eye(self.n)
         segments, grazing = [], 1.0
@@ -88,7 +96,7 @@ class Tracer:
                 status = Status.WORK_LIMIT
                 break
             run = self.engine.run(
-                now, t_end, self.drive, rtol=RTOL, stop_at_event=True, log=2, max_steps=200_000
+                now, t_end, self.drive, rtol=LAP_RTOL, stop_at_event=True, log=2, max_steps=LAP_STEPS
             )
             if not run.status.ok:
                 status = run.status
@@ -128,10 +136,10 @@ class Tracer:
         slope = np.zeros((self.n, self.n))
         for j in np.flatnonzero(size):
             x = state.x.copy()
-            x[j] += 1e-4 * size[j]
-            slope[:, j] = np.abs(self.rate(state.time, x, state.mode) - here) / 1e-4
-        told = _TOLD * length * np.where(np.isfinite(slope), slope, 0.0).sum(axis=1)
-        size = np.maximum(size, np.maximum(told, _TOLD * length * np.abs(here)))
+            x[j] += SLOPE_NUDGE * size[j]
+            slope[:, j] = np.abs(self.rate(state.time, x, state.mode) - here) / SLOPE_NUDGE
+        told = TOLD * length * np.where(np.isfinite(slope), slope, 0.0).sum(axis=1)
+        size = np.maximum(size, np.maximum(told, TOLD * length * np.abs(here)))
         size[size == 0.0] = 1.0  # a state that is zero throughout may be measured by anything
         return size
 
@@ -142,9 +150,9 @@ class Tracer:
         return 0
 
     def _flow_derivative(self, state, span, size):
-        h = np.diag(1e-5 * size)
-        ends = flow(self.engine, state, np.vstack([state.x + h, state.x - h]), span, self.drive, RTOL)
-        return ((ends[: self.n] - ends[self.n :]) / (2e-5 * size)[:, None]).T
+        h = np.diag(FLOW_NUDGE * size)
+        ends = flow(self.engine, state, np.vstack([state.x + h, state.x - h]), span, self.drive, LAP_RTOL)
+        return ((ends[: self.n] - ends[self.n :]) / (2 * FLOW_NUDGE * size)[:, None]).T
 
     def _saltation(self, run, mode, size):
         t, before, after = run.state.time, run.before, run.state
@@ -153,7 +161,7 @@ class Tracer:
         margin = run.margin
         normal = np.zeros(self.n)
         for j in range(self.n):
-            h = 1e-6 * size[j]
+            h = EVENT_NUDGE * size[j]
             values = []
             for sign in (1.0, -1.0):
                 x = before.copy()
@@ -161,7 +169,7 @@ class Tracer:
                 values.append(self.rate(t, x, mode, margins=True)[1][margin])
             normal[j] = (values[0] - values[1]) / (2 * h)
         # rate of the margin along the flow, its own dependence on time included
-        h = 1e-6 / max(float(np.max(np.abs(f_minus) / size)), 1e-300)
+        h = EVENT_NUDGE / max(float(np.max(np.abs(f_minus) / size)), NOTHING)
         ahead = self.rate(t + h, before + h * f_minus, mode, margins=True)[1][margin]
         behind = self.rate(t - h, before - h * f_minus, mode, margins=True)[1][margin]
         speed = (ahead - behind) / (2 * h)
@@ -176,7 +184,7 @@ class Tracer:
         """Differentiate the jump at the event, by differences of the engine's own event map."""
         columns = []
         for j in range(self.n):
-            h = 1e-6 * size[j]
+            h = EVENT_NUDGE * size[j]
             ends = []
             for sign in (1.0, -1.0):
                 x = run.before.copy()

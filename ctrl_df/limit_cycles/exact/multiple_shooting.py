@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_ITERATIONS = 30
-_CLOSED = 1e-9  # mismatch at every joint, relative to the size of each state
-_LONGEST = 0.5  # largest change of a state in a step, relative to its size
+from ..thresholds import NOTHING, PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
 
 
 def shoot(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:
@@ -40,16 +38,16 @@ def shoot(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, flo
     m, n = states.shape
     z = np.append((states / size).ravel(), 0.0)  # the last one: logarithm of the period's change
     best = None
-    for _ in range(_ITERATIONS):
+    for _ in range(PIECES_ITERATIONS):
         pieces = _pieces(tracer, rebuilt, z, m, n, period, size)
         if pieces is None:
             return None
         residual, J = pieces
         worst = float(np.max(np.abs(residual)))
-        if worst < _CLOSED:
+        if worst < PIECES_CLOSED:
             return z[:n] * size, period * float(np.exp(z[-1]))
-        step = np.linalg.lstsq(J, -residual, rcond=1e-12)[0]
-        step *= min(1.0, _LONGEST / max(float(np.max(np.abs(step))), 1e-300))
+        step = np.linalg.lstsq(J, -residual, rcond=RANK)[0]
+        step *= min(1.0, PIECES_LONGEST / max(float(np.max(np.abs(step))), NOTHING))
         norm = float(np.linalg.norm(residual))
         for _halving in range(6):  # shorter while the pieces come apart
             trial = _pieces(tracer, rebuilt, z + step, m, n, period, size, differentiate=False)
@@ -57,7 +55,7 @@ def shoot(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, flo
                 break
             step *= 0.5
         else:
-            if best is not None and worst > 0.9 * best:
+            if best is not None and worst > STALLED * best:
                 return None
         best = worst if best is None else min(best, worst)
         z = z + step
@@ -87,5 +85,5 @@ def _pieces(tracer, rebuilt, z, m, n, period, size, differentiate=True):
             J[rows, -1] = tracer.rate(lap.end.time, lap.end.x, lap.end.mode) * span / size
             if i == 0:
                 rate = tracer.rate(start.time, start.x, start.mode) * period / size
-                J[-1, :n] = rate / max(np.linalg.norm(rate), 1e-300)
+                J[-1, :n] = rate / max(np.linalg.norm(rate), NOTHING)
     return residual, J

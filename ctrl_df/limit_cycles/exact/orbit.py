@@ -12,6 +12,7 @@ from ...drawing import draw
 from ...simulate.engine import Event
 from ...status import Status
 from ...table import Table
+from ..thresholds import SAME_ORBIT, SAME_SIZES
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +90,12 @@ class Orbit:
             return float("nan") if self.stable is None else 0.0
         return float(np.max(np.abs(self.floquet)))
 
-    def same_as(self, other: Orbit, tolerance: float = 1e-4) -> bool:
+    def same_as(self, other: Orbit, tolerance: float = SAME_ORBIT) -> bool:
         """Whether two orbits are one, up to a shift in time."""
         return (
             abs(self.omega / other.omega - 1) < tolerance
-            and abs(self.amplitude / other.amplitude - 1) < 10 * tolerance
-            and abs(self.output_amplitude / other.output_amplitude - 1) < 10 * tolerance
+            and abs(self.amplitude / other.amplitude - 1) < SAME_SIZES * tolerance
+            and abs(self.output_amplitude / other.output_amplitude - 1) < SAME_SIZES * tolerance
         )
 
     def plot(self, **keywords) -> ct.ControlPlot:

@@ -15,16 +15,22 @@ from __future__ import annotations
 import numpy as np
 
 from ...arclength import correction, tangent
-from .closing import CLOSED, Closing, NoClosure
+from ..thresholds import (
+    ACROSS,
+    CLOSED,
+    NOTHING,
+    SHRINK_BEND,
+    SHRINK_CLOSED,
+    SHRINK_FAR,
+    SHRINK_FIRST,
+    SHRINK_LONGER,
+    SHRINK_LONGEST,
+    SHRINK_SHORTEST,
+    SHRINK_STEPS,
+)
+from .closing import Closing, NoClosure
 from .orbit import Orbit
 from .symmetry import shift_directions
-
-_MOST_STEPS = 120
-_FIRST, _LONGEST, _LONGER = 0.1, 0.2, 1.5  # steps along the curve, in sizes of the orbit; their growth
-_BEND = 0.8  # cosine of the angle between the tangents at its ends from which a step is short enough
-_ACROSS = 1e-3  # step across a corner, over the first mismatch
-_SHORTEST = 1e-5  # step, relative to the first mismatch, at which the curve is taken to have a corner
-_FAR = 2.0  # change of a state, in sizes of the orbit, or of the logarithm of the period: given up beyond
 
 
 class Merged(NoClosure):
@@ -49,23 +55,23 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
     y[-1] = 1.0
     _, J = curve.equations(y)
     border = tangent(J, -np.eye(n + 2)[-1])
-    step, least = _FIRST * min(1.0, scale), 1.0
-    for _ in range(_MOST_STEPS):
+    step, least = SHRINK_FIRST * min(1.0, scale), 1.0
+    for _ in range(SHRINK_STEPS):
         ahead = y + step * border
         met = curve.onto(ahead, border)
         if met is not None and np.linalg.norm(met[0] - ahead) > step:
             met = None  # farther across the curve than along it: another one, as that of laps without length
         turned = None if met is None else tangent(met[1], border)
-        if met is not None and turned is not None and turned @ border >= _BEND:
+        if met is not None and turned is not None and turned @ border >= SHRINK_BEND:
             y, border = met[0], turned
         else:
             step *= 0.5
-            if step > _SHORTEST * scale:
+            if step > SHRINK_SHORTEST * scale:
                 continue
-            beyond = curve.round_corner(y, border, _ACROSS * scale)
+            beyond = curve.round_corner(y, border, ACROSS * scale)
             if beyond is None:
                 break
-            (y, border), step = beyond, _ACROSS * scale
+            (y, border), step = beyond, ACROSS * scale
         least = min(least, float(y[-1]))
         if y[-1] <= 0.0:
             return closing.close(curve.state(y), period * float(np.exp(y[n])))
@@ -75,15 +81,15 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
                 "the orbit and its neighbour have merged",
                 least * scale,
             )
-        if y[n] > _FAR:
+        if y[n] > SHRINK_FAR:
             raise Merged(
                 f"what is missing to a closed lap falls to {least:.1%} of {scale:.1g} only as the lap grows "
                 f"to {np.exp(y[n]):.0f} times its period: the orbit has merged with rest",
                 least * scale,
             )
-        if np.max(np.abs(y[: n + 1])) > _FAR:
+        if np.max(np.abs(y[: n + 1])) > SHRINK_FAR:
             break
-        step = min(_LONGER * step, _LONGEST)
+        step = min(SHRINK_LONGER * step, SHRINK_LONGEST)
     raise NoClosure("what is missing to a closed lap could not be followed to zero", least * scale)
 
 
@@ -95,7 +101,7 @@ class _Curve:
         start, self.size = closing.free_state(x0, period)
         self.n, self.origin = self.tracer.n, start.x.copy()
         phase = self.tracer.rate(start.time, start.x, start.mode) * period / self.size
-        self.phase = phase / max(np.linalg.norm(phase), 1e-300)
+        self.phase = phase / max(np.linalg.norm(phase), NOTHING)
         self.beside = np.eye(self.n)
         lap = self.tracer.lap(start, period, size=self.size)
         free = shift_directions(self.tracer, lap.segments, self.size)
@@ -133,7 +139,7 @@ class _Curve:
         try:
             for _ in range(8):
                 r, J = self.equations(y)
-                if np.max(np.abs(r)) < 1e-4 * self.scale:
+                if np.max(np.abs(r)) < SHRINK_CLOSED * self.scale:
                     return y, J
                 y = y + correction(J, border, r, border @ y - offset)
         except NoClosure:

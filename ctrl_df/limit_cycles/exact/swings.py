@@ -13,25 +13,38 @@ from ...simulate.engine import Engine, State
 from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
 from ...status import Status
+from ..thresholds import (
+    BEYOND,
+    COURSE_RTOL,
+    DEAD,
+    EVEN,
+    FAINT,
+    FEW,
+    GONE,
+    LASTING_DECAY,
+    LASTING_GROWTH,
+    LOOK,
+    LOOK_POINTS,
+    LOOK_RTOL,
+    LOOK_WORK,
+    NOTHING,
+    ON_TICK,
+    PATIENCE,
+    QUIET,
+    RECENT,
+    REPEATS,
+    REPEATS_EXACTLY,
+    REPEATS_LEAST,
+    SAMPLED_WORK,
+    STEADY,
+    STEPS,
+    STRIDE,
+    STRIDE_SAMPLES,
+    TENFOLD,
+    WITHIN,
+    WORK,
+)
 from .kicks import Kicks
-
-_WORK = 300_000  # integration steps of one simulation
-_FEW = 12  # swings within that work, below which it is no use
-_QUIET = 40  # strides without a passage after which a loop is called at rest, if nothing in it moves on
-_PATIENCE = 400  # the same while something does: an integral that winds up, a slow mode
-_DEAD = 1e-9  # of the largest state met, below which a loop without passages is at rest
-_SAMPLES = 1024  # in a stride, where passages are looked for among samples
-_FAINT = 1e-6  # of the highest peak met, below which swings count as rest
-_EVEN = 0.05  # spread of logarithmic growths within which a growth counts as steady
-_STEPS = 3  # such growths in a row, at least; two do where each is tenfold
-_WITHIN = 0.1  # of the input up to which a block is a straight line: there the loop is linear
-_RECENT = 64  # laps among which they are looked for
-_BEYOND = 10.0  # times the largest kick's first swing: growth at a steady ratio from there has no bound
-_GONE = 1e4  # times what the largest kick sets in motion: a loop beyond it has run away
-# Change of the swings from the third to the last quarter of a course below which they keep their size, and
-# the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
-# quadratic).
-_STEADY, _LASTING_GROWTH, _LASTING_DECAY = 1.25, 0.5, 0.9
 
 RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"
 
@@ -102,7 +115,7 @@ class Swings:
         ints = engine.program.ints
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
         self.kicks = Kicks(loop, engine)
-        self.stride = 20 * np.pi / self.kicks.pace  # ten swings at the loop's own pace
+        self.stride = STRIDE * np.pi / self.kicks.pace  # ten swings at the loop's own pace
         self._units: np.ndarray | None = None
         self._unit = 1.0
 
@@ -116,15 +129,16 @@ class Swings:
         if self._units is not None:
             return
         x0 = self.kicks.all()[-1][1]
-        times = np.linspace(0.0, 0.1 * self.stride, 129)
-        run = self.engine.run(self.start(x0), times[-1], times=times, rtol=1e-6, log=1, max_steps=50_000)
+        times = np.linspace(0.0, LOOK * self.stride, LOOK_POINTS)
+        limits: Any = dict(rtol=LOOK_RTOL, log=1, max_steps=LOOK_WORK)
+        run = self.engine.run(self.start(x0), times[-1], times=times, **limits)
 
         def largest(values):
             seen = np.abs(values[: max(run.recorded, 1)])
             return np.where(np.isfinite(seen), seen, 0.0).max(axis=0)
 
         states, swing = largest(run.states), float(largest(run.outputs)[self.row])
-        self._units = np.where(states > 0, states, max(float(states.max(initial=0.0)), 1e-300))
+        self._units = np.where(states > 0, states, max(float(states.max(initial=0.0)), NOTHING))
         self._unit = swing if swing > 0 else 1.0
 
     def size(self, x) -> float:
@@ -163,12 +177,12 @@ class Swings:
         laps: list[Lap] = []
         quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
-        bound = _GONE * max(1.0, largest)
+        bound = GONE * max(1.0, largest)
         stretches = self._by_samples(state, limit) if self.held else self._by_passage(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
-        while len(laps) < count and time < limit and quiet <= _PATIENCE and work <= _WORK:
+        while len(laps) < count and time < limit and quiet <= PATIENCE and work <= WORK:
             stretch = next(stretches)
-            if quiet > _QUIET and self.size(stretch.x - end) < _DEAD * largest:
+            if quiet > QUIET and self.size(stretch.x - end) < DEAD * largest:
                 break
             time, end, work = stretch.time, stretch.x, work + stretch.steps
             if stretch.status is Status.DIVERGED or not self.size(end) < bound:
@@ -180,15 +194,15 @@ class Swings:
             laps += found
             quiet = 0 if found else quiet + 1
             highest = max([highest, *(lap.peak for lap in found)])
-            if found and laps[-1].peak < _FAINT * highest:
+            if found and laps[-1].peak < FAINT * highest:
                 fate = RESTS
                 break
             size = self.size(end)
             largest = max(largest, size)
-            if quiet and size < _DEAD * largest:
+            if quiet and size < DEAD * largest:
                 fate = RESTS
                 break
-            if found and laps[-1].peak > _BEYOND and _explodes(laps):
+            if found and laps[-1].peak > BEYOND and _explodes(laps):
                 return Course(laps, DIVERGES, np.inf, end)
             if found and (_creeps(laps) or self._fades(laps)):
                 fate = RESTS
@@ -197,13 +211,13 @@ class Swings:
                 fate = decided(laps)
                 if fate:
                     break
-            if until_repeated and len(laps) > 12 and self.repeats(laps):
-                fate = CYCLES if laps[-1].peak > _FAINT * max(lap.peak for lap in laps) else RESTS
+            if until_repeated and len(laps) > FEW and self.repeats(laps):
+                fate = CYCLES if laps[-1].peak > FAINT * max(lap.peak for lap in laps) else RESTS
                 break
         growth = _growth(laps)
         if not fate:
-            fate = RESTS if quiet > _QUIET else UNDECIDED if stopped else _tendency(laps)
-        if (stopped or work > _WORK) and len(laps) < _FEW:
+            fate = RESTS if quiet > QUIET else UNDECIDED if stopped else _tendency(laps)
+        if (stopped or work > WORK) and len(laps) < FEW:
             laps = []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
         return Course(laps, fate, growth, end)
 
@@ -217,25 +231,25 @@ class Swings:
 
     def _fades(self, laps) -> bool:
         """Whether the swings shrink by a steady ratio where the block is a straight line: so they go on."""
-        recent = laps[-_RECENT:]
-        if not max(lap.peak for lap in recent[-_STEPS:]) * self._unit < _WITHIN * self.kicks.straight:
+        recent = laps[-RECENT:]
+        if not max(lap.peak for lap in recent[-STEPS:]) * self._unit < WITHIN * self.kicks.straight:
             return False
-        return _endless([1 / max(lap.peak, 1e-300) for lap in recent], 1 / _FAINT) > 0
+        return _endless([1 / max(lap.peak, NOTHING) for lap in recent], 1 / FAINT) > 0
 
     def repeats(self, laps) -> bool:
         """Whether the last two passages met the same state; closer if no Newton follows."""
         sizes = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
-        largest = max(float(np.max(sizes / self.units)), 1e-300)
+        largest = max(float(np.max(sizes / self.units)), NOTHING)
         bound = (
-            1e-9 * np.maximum(sizes, 1e-6 * largest * self.units)
+            REPEATS_EXACTLY * np.maximum(sizes, REPEATS_LEAST * largest * self.units)
             if self.tight
-            else 1e-7 * largest * self.units
+            else REPEATS * largest * self.units
         )
         return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
 
     def _by_passage(self, state, limit):
         # ahead in bounded strides: a loop at rest never crosses again
-        for s in strides(self.engine, state, self._signal, self.row, self.stride, limit, 1e-8):
+        for s in strides(self.engine, state, self._signal, self.row, self.stride, limit, COURSE_RTOL):
             found = [Lap(s.time, s.x, s.peak / self._unit)] if s.passed else []
             yield _Stretch(s.time, s.x, s.steps, s.status, found)
 
@@ -244,10 +258,12 @@ class Swings:
         dt = self.parts.dt
         while True:
             # from the sample before on, where the last stride ended: no passage is lost between two strides
-            first = np.ceil(state.time / dt - 0.5 - 1e-6)
-            times = np.maximum((first + 0.5 + np.arange(_SAMPLES)) * dt, state.time)
+            first = np.ceil(state.time / dt - 0.5 - ON_TICK)
+            times = np.maximum((first + 0.5 + np.arange(STRIDE_SAMPLES)) * dt, state.time)
             times = times[times <= max(limit, times[1])]
-            run = self.engine.run(state, times[-1], times=times, rtol=1e-8, log=1, max_steps=400_000)
+            run = self.engine.run(
+                state, times[-1], times=times, rtol=COURSE_RTOL, log=1, max_steps=SAMPLED_WORK
+            )
             y = run.outputs[:, self.row]
             ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
             passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
@@ -276,21 +292,21 @@ def _endless(values, factor: float) -> int:
     geometrically, by ``1 - e / (n - 1)`` each; what is then still to come sums to ``(n - 1) / e`` times the
     last one. A growth towards a limit less than `factor` away is told from one without.
     """
-    growths = np.diff(np.log(np.maximum(values, 1e-300)))[::-1]
+    growths = np.diff(np.log(np.maximum(values, NOTHING)))[::-1]
     high = np.maximum.accumulate(growths)
     low = np.minimum.accumulate(growths)
     count = np.arange(1, growths.size + 1)
     enough = (
-        (low > (1 - _EVEN) * high)
-        & ((count >= _STEPS) | ((count > 1) & (low > np.log(10.0))))
-        & ((count - 1) * low > _EVEN * np.log(factor))
+        (low > (1 - EVEN) * high)
+        & ((count >= STEPS) | ((count > 1) & (low > TENFOLD)))
+        & ((count - 1) * low > EVEN * np.log(factor))
     )
     return int(count[enough][0]) + 1 if enough.any() else 0
 
 
 def _explodes(laps) -> bool:
     """Whether the swings grow at a steady ratio and without bound."""
-    return _endless([lap.peak for lap in laps[-_RECENT:]], _GONE) > 0
+    return _endless([lap.peak for lap in laps[-RECENT:]], GONE) > 0
 
 
 def _creeps(laps) -> bool:
@@ -299,22 +315,22 @@ def _creeps(laps) -> bool:
     So a motion ends whose speed falls by a ratio each time it crosses a gap: its position never settles, its
     speed does.
     """
-    recent = laps[-_RECENT:]
+    recent = laps[-RECENT:]
     durations = np.diff([lap.time for lap in recent])
-    count = _endless(durations, 1 / _FAINT)
+    count = _endless(durations, 1 / FAINT)
     if not count:
         return False
     slowing = np.log(durations[-1] / durations[-count])
-    growth = np.log(max(recent[-1].peak, 1e-300) / max(recent[-count].peak, 1e-300))
-    return bool(growth < _EVEN * slowing)
+    growth = np.log(max(recent[-1].peak, NOTHING) / max(recent[-count].peak, NOTHING))
+    return bool(growth < EVEN * slowing)
 
 
 def _tendency(laps) -> str:
     """Fate of swings that grow or shrink without end: by a steady ratio, not towards some size."""
     now, earlier = _growth(laps), _growth(laps, 1)
-    if not now > 0 or not earlier > 0 or max(now, 1 / now) < _STEADY:
+    if not now > 0 or not earlier > 0 or max(now, 1 / now) < STEADY:
         return UNDECIDED
     lasting = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
     if now > 1.0:
-        return DIVERGES if lasting > _LASTING_GROWTH else UNDECIDED
-    return RESTS if lasting > _LASTING_DECAY else UNDECIDED
+        return DIVERGES if lasting > LASTING_GROWTH else UNDECIDED
+    return RESTS if lasting > LASTING_DECAY else UNDECIDED

@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_SAMPLES = 4  # of each mode an orbit visits
-_NUDGE = 1e-4  # of the difference quotients, relative to the size of a state
-_NULL = 1e-8  # singular values below, relative to the largest, make candidates
-_SAME = 1e-11  # relative change of rates and margins by a shift of half the size; rounding leaves 1e-15
+from ..thresholds import MODE_SAMPLES, NOTHING, NULL, SHIFT_NUDGE, SHIFT_SAME
 
 
 def shift_directions(tracer, segments, size) -> np.ndarray:
@@ -45,12 +42,12 @@ def shift_directions(tracer, segments, size) -> np.ndarray:
         columns = []
         for j in range(tracer.n):
             step = np.zeros(tracer.n)
-            step[j] = _NUDGE * size[j]
+            step[j] = SHIFT_NUDGE * size[j]
             columns.append(_change(_answer(tracer, p, p.x + step), _answer(tracer, p, p.x - step)) / scale)
-        slopes.append(np.array(columns).T / (2 * _NUDGE))
+        slopes.append(np.array(columns).T / (2 * SHIFT_NUDGE))
     _, values, rows = np.linalg.svd(np.vstack(slopes), full_matrices=True)
     values = np.append(values, np.zeros(tracer.n - len(values)))
-    candidates = rows[values <= _NULL * max(values[0], 1e-300)]
+    candidates = rows[values <= NULL * max(values[0], NOTHING)]
     kept = [d for d in candidates if _unnoticed(tracer, points, here, scale, 0.5 * d * size)]
     return np.array(kept).T if kept else np.zeros((tracer.n, 0))
 
@@ -69,7 +66,8 @@ def _points(segments):
     for s in segments:
         if s.length > 0:
             taken.setdefault(s.start.mode.tobytes(), []).append(s.start)
-    return [p for starts in taken.values() for p in starts[:: max(1, len(starts) // _SAMPLES)][:_SAMPLES]]
+    thinned = (starts[:: max(1, len(starts) // MODE_SAMPLES)] for starts in taken.values())
+    return [p for starts in thinned for p in starts[:MODE_SAMPLES]]
 
 
 def _answer(tracer, point, x) -> np.ndarray:
@@ -85,6 +83,6 @@ def _change(a, b) -> np.ndarray:
 def _unnoticed(tracer, points, here, scale, shift) -> bool:
     for p, answer in zip(points, here, strict=True):
         for moved in (p.x + shift, p.x - shift):
-            if np.max(np.abs(_change(_answer(tracer, p, moved), answer)) / scale) > _SAME:
+            if np.max(np.abs(_change(_answer(tracer, p, moved), answer)) / scale) > SHIFT_SAME:
                 return False
     return True

@@ -11,9 +11,7 @@ from ...blocks.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
 from ...df.forced_orbit.waveform import WaveformOrbit
 from ...df.methods import ElementIntegrals, Method
-
-SAMPLES = 2048
-STATIC_HARMONICS, DYNAMIC_HARMONICS = 63, 21
+from ..thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
 
 
 def responder(F, method: Method) -> tuple[Callable, int] | None:
@@ -41,12 +39,12 @@ def _sampled(cells):
     """
 
     def respond(U, omega):
-        full = np.zeros(SAMPLES // 2 + 1, dtype=complex)
-        full[: U.size] = U * SAMPLES / 2
+        full = np.zeros(WAVE_SAMPLES // 2 + 1, dtype=complex)
+        full[: U.size] = U * WAVE_SAMPLES / 2
         full[0] *= 2
         k = np.arange(U.size)
-        Y = np.fft.rfft(cells(np.fft.irfft(full, SAMPLES)))[: U.size] * 2 / SAMPLES
-        Y *= np.sinc(k / SAMPLES) * np.exp(-1j * np.pi * k / SAMPLES)
+        Y = np.fft.rfft(cells(np.fft.irfft(full, WAVE_SAMPLES)))[: U.size] * 2 / WAVE_SAMPLES
+        Y *= np.sinc(k / WAVE_SAMPLES) * np.exp(-1j * np.pi * k / WAVE_SAMPLES)
         Y[0] /= 2
         return Y
 
@@ -66,12 +64,9 @@ def jumps(method: Method, amplitude: float) -> bool:
         law = _pointwise(law)
     coarse, fine = (
         np.abs(np.diff(np.asarray(law(amplitude * np.cos(np.linspace(0, 2 * np.pi, n))), dtype=float))).max()
-        for n in (SAMPLES, 4 * SAMPLES)
+        for n in (WAVE_SAMPLES, 4 * WAVE_SAMPLES)
     )
     return bool(fine > 0.5 * coarse)  # a smooth law changes by a quarter of it between samples so much denser
-
-
-_INSIDE = (np.arange(64) + 0.5) / 64
 
 
 def _cell_means(law):
@@ -83,9 +78,9 @@ def _cell_means(law):
         ahead = np.roll(y, -1)
         mean = 0.5 * (y + ahead)
         rise = np.abs(ahead - y)
-        jumps = rise > 20 * np.median(rise) + 1e-9 * np.abs(y).max()
+        jumps = rise > WAVE_JUMP * np.median(rise) + WAVE_FLAT * np.abs(y).max()
         if jumps.any():
-            chord = u[jumps, None] + (after - u)[jumps, None] * _INSIDE
+            chord = u[jumps, None] + (after - u)[jumps, None] * (np.arange(CHORD_POINTS) + 0.5) / CHORD_POINTS
             mean[jumps] = np.asarray(law(chord.ravel()), dtype=float).reshape(chord.shape).mean(axis=1)
         return mean
 
@@ -113,7 +108,7 @@ def _exact_means(law, integral):
     def cells(u):
         after = np.roll(u, -1)
         rise = after - u
-        flat = np.abs(rise) < 1e-9 * np.abs(u).max()
+        flat = np.abs(rise) < WAVE_FLAT * np.abs(u).max()
         with np.errstate(all="ignore"):
             mean = (integral(after) - integral(u)) / rise
         return np.where(flat, law(0.5 * (u + after)), mean)

@@ -8,6 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from ...df.family import Family
+from ..thresholds import (
+    DYNAMIC_ERROR,
+    FLOOR,
+    FOLD,
+    GUESSED,
+    IRREGULAR,
+    MEMORYLESS_ERROR,
+    ROUNDED,
+    SAFETY,
+    VAGUE,
+)
 from .answer import jumps, responder
 from .bound import mees_bergen
 from .branches import BranchCrossing
@@ -15,17 +26,6 @@ from .crossings import Crossing, Scan, linear_zeros
 from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
 from .path import End, follow_path
 from .scan_grid import grid_slope, noisy
-
-# On the shift that the returned harmonics cause, by whether the block has dynamics: of an impact's harmonics,
-# which fall slowly, fewer are kept (worst of benchmarks/trust.py: 3.1 for a gap).
-SAFETY = {False: 1.5, True: 4.0}
-# Relative error of N from returned harmonics d where they cannot be carried, c1 d + c2 d^2. A jump or a
-# corner answers its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py:
-# 0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79).
-MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
-FLOOR = 1e-3  # least half width of a band
-FOLD = (1.5, 1.15)  # times the harmonics there are, at which a fold makes a prediction doubtful, unreliable
-VAGUE = 0.3  # |1 + N H| beyond which an average over irregular motion places no crossing, however it spreads
 
 
 class Assessor:
@@ -66,7 +66,8 @@ class Assessor:
             w = np.exp(place[1:])
             y, regime, spread = self.method.harmonics(np.exp(place[:1]), w, 1)
             residual = float(abs(1 + y[0, 0, 1] * self.linear(w)[0]))
-            if not noisy(regime, spread)[0, 0] or not residual <= min(max(0.05, 3 * spread[0, 0]), VAGUE):
+            told = residual <= min(max(IRREGULAR, 3 * spread[0, 0]), VAGUE)
+            if not noisy(regime, spread)[0, 0] or not told:
                 continue  # a jump between coexisting motions, not a crossing
             note = (
                 2,
@@ -171,7 +172,7 @@ class Assessor:
         h, outside = self.linear.clamped(k * w)
         size = np.abs(y[2:] * np.where(np.isfinite(h), h, 0))
         size = np.where(np.isfinite(size), size, 0)
-        guessed = outside & (size > 1e-6)
+        guessed = outside & (size > GUESSED)
         return float(size.sum()), f"{k[guessed][0] * w:.3g} rad/s" if guessed.any() else ""
 
     def _spread(self, crossing, distortion, sense, regime, named):
@@ -213,7 +214,7 @@ def near_folds(cycles):
                 continue
             before = np.log([one.amplitude / other.amplitude, one.omega / other.omega])
             after = np.log(np.divide(one.corrected, other.corrected))
-            ratio = np.abs(after).max() / max(np.abs(before).max(), 1e-12)
+            ratio = np.abs(after).max() / max(np.abs(before).max(), ROUNDED)
             margin = math.inf if ratio >= 1 else 1 / (1 - ratio**2)
             if margin > FOLD[0]:
                 continue

@@ -9,10 +9,7 @@ import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine
 from ...df.methods import ElementIntegrals
-
-_HARMONICS = np.arange(3, 62, 2)
-_WINDOWS = (0.1, 0.4, 1.2)  # half widths tried, in ln a and ln omega
-_POINTS = 161
+from ..thresholds import BESIDE_CORNER, BOUND_HARMONICS, BOUND_POINTS, NOTHING, ROUNDED, WINDOWS
 
 
 def mees_bergen(method, linear, crossing, others):
@@ -44,7 +41,7 @@ def mees_bergen(method, linear, crossing, others):
     slopes = slope_bounds(method)
     if slopes is None or linear.dt or linear.measured or not _strictly_proper(linear.H):
         return None, ""
-    for half in _WINDOWS:
+    for half in WINDOWS:
         box = _component(method, linear, crossing, slopes, half)
         if box == "open":
             continue
@@ -71,10 +68,10 @@ def slope_bounds(method) -> tuple[float, float] | None:
     corners = np.array(line.corners)
     left = np.array(line.intercept[:-1]) + np.array(line.slope[:-1]) * np.array(line.high[:-1])
     right = np.array(line.intercept[1:]) + np.array(line.slope[1:]) * np.array(line.low[1:])
-    probe = np.concatenate([corners, corners + 0.37 * (1 + np.abs(corners)), [0.0]])
-    size = np.abs(line.value(probe)).max() + 1e-300
-    continuous = np.allclose(left, right, atol=1e-12 * size)
-    odd = np.allclose(line.value(probe), -line.value(-probe), atol=1e-12 * size)
+    probe = np.concatenate([corners, corners + BESIDE_CORNER * (1 + np.abs(corners)), [0.0]])
+    size = np.abs(line.value(probe)).max() + NOTHING
+    continuous = np.allclose(left, right, atol=ROUNDED * size)
+    odd = np.allclose(line.value(probe), -line.value(-probe), atol=ROUNDED * size)
     return (min(line.slope), max(line.slope)) if continuous and odd else None
 
 
@@ -82,22 +79,22 @@ def _component(method, linear, crossing, slopes, half):
     """Box around the error set's part at the crossing; ``open`` if it reaches the window's edge."""
     from scipy.ndimage import label
 
-    p = np.log(crossing.amplitude) + np.linspace(-half, half, _POINTS)
-    q = np.log(crossing.omega) + np.linspace(-half, half, _POINTS)
+    p = np.log(crossing.amplitude) + np.linspace(-half, half, BOUND_POINTS)
+    q = np.log(crossing.omega) + np.linspace(-half, half, BOUND_POINTS)
     c, r = 0.5 * (slopes[0] + slopes[1]), 0.5 * (slopes[1] - slopes[0])
     w = np.exp(q)
     with np.errstate(all="ignore"):
-        rho = np.abs(c + 1 / linear(_HARMONICS[:, None] * w[None, :])).min(axis=0)
+        rho = np.abs(c + 1 / linear(BOUND_HARMONICS[:, None] * w[None, :])).min(axis=0)
         sigma = np.where(rho > r, r**2 / (rho - r), np.inf)
         N = method.harmonics(np.exp(p), None, 1)[0][:, 0, 1]
         inside = np.abs(N[:, None] + 1 / linear(w)[None, :]) <= sigma[None, :]
     parts: Any = label(inside, structure=np.ones((3, 3)))[0]  # pyright: ignore[reportIndexIssue]
-    mine = parts == parts[_POINTS // 2, _POINTS // 2]
-    if not inside[_POINTS // 2, _POINTS // 2]:
+    mine = parts == parts[BOUND_POINTS // 2, BOUND_POINTS // 2]
+    if not inside[BOUND_POINTS // 2, BOUND_POINTS // 2]:
         return None
     rows, columns = np.nonzero(mine.any(axis=1))[0], np.nonzero(mine.any(axis=0))[0]
     ends = rows[0], rows[-1], columns[0], columns[-1]
-    if min(ends) == 0 or max(ends) == _POINTS - 1:
+    if min(ends) == 0 or max(ends) == BOUND_POINTS - 1:
         return "open"
     a, w = np.exp(p), np.exp(q)  # one grid step of margin on each side
     return (float(a[rows[0] - 1]), float(a[rows[-1] + 1])), (

@@ -12,18 +12,18 @@ import numpy as np
 
 from ...df.branch import Branch
 from ...df.points import points
+from ..thresholds import (
+    BRANCH_AGREES,
+    BRANCH_FOLD,
+    BRANCH_NUDGE,
+    BRANCH_POINTS,
+    BRANCH_SAME,
+    BRANCH_SLACK,
+    FAR,
+    NEAR,
+)
 from .crossings import Crossing, find_crossings
 from .scan_grid import refined_omega
-
-# |1 + N H| on the grid up to which coexisting motions are looked for: their N differ by some 15 %. To it
-# comes what a grid step changes, as a^-1 omega^-2.
-NEAR, _FAR = 0.2, 0.5
-_SAME = 1e-4  # of ln a, ln omega: two crossings at one place
-_AGREES = 1e-6  # relative difference of N between branch and block: the block names this motion itself
-_STEP = 1e-5  # of s and ln omega, for the slope of ln a
-_FOLD = 1e-9
-_SLACK = 1e-9
-_POINTS = 100  # of omega, at least
 
 
 @dataclass(frozen=True)
@@ -81,14 +81,14 @@ def branch_crossings(method, linear, family, grid, values, known, refine=True) -
     """
     if not method.needs_omega or min(values.shape) < 2:
         return []
-    step = min(max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega))), _FAR)
+    step = min(max(np.diff(grid[0])) + 2 * max(np.diff(np.log(family.omega))), FAR)
     with np.errstate(invalid="ignore"):
         i, k = np.nonzero(np.abs(values) < NEAR + step)
     branches = method.branches(family.amplitudes, family.omega, np.exp(grid[0][i]), np.exp(grid[1][k]))
     if not branches:
         return []
     omega = refined_omega(linear, _filled(family.omega))
-    rough = _SAME if refine else step
+    rough = BRANCH_SAME if refine else step
     box = (family.amplitudes.min(), family.amplitudes.max())
     found: list[BranchCrossing] = []
     for branch in branches:
@@ -115,9 +115,9 @@ def _rivals(one, branches):
 
 def _filled(omega):
     """Give the range of a coarse grid more points: a closed form costs little."""
-    if omega.size >= _POINTS:
+    if omega.size >= BRANCH_POINTS:
         return omega
-    return np.unique(np.concatenate([omega, np.geomspace(omega[0], omega[-1], _POINTS)]))
+    return np.unique(np.concatenate([omega, np.geomspace(omega[0], omega[-1], BRANCH_POINTS)]))
 
 
 def _on_branch(branch, method, linear, omega, box):
@@ -141,14 +141,14 @@ def _solution(branch, method, linear, crossing, box):
     s, w = np.log([crossing.amplitude]), np.array([crossing.omega])  # it took s for a logarithm
     at = branch.motions(s, w, 1)
     a = at.amplitude
-    if not at.exists[0] or not box[0] * (1 - _SLACK) <= a[0] <= box[1] * (1 + _SLACK):
+    if not at.exists[0] or not box[0] * (1 - BRANCH_SLACK) <= a[0] <= box[1] * (1 + BRANCH_SLACK):
         return None
     slope = [
-        float(np.log(branch.motions(s + d, w * np.exp(e), 1).amplitude[0] / a[0])) / _STEP
-        for d, e in ((_STEP, 0.0), (0.0, _STEP))
+        float(np.log(branch.motions(s + d, w * np.exp(e), 1).amplitude[0] / a[0])) / BRANCH_NUDGE
+        for d, e in ((BRANCH_NUDGE, 0.0), (0.0, BRANCH_NUDGE))
     ]
     by_s, by_w = crossing.jacobian[:, 0], crossing.jacobian[:, 1]
-    by_a = by_s / (slope[0] if abs(slope[0]) > _FOLD else _FOLD)  # at a fold s moves a no more
+    by_a = by_s / (slope[0] if abs(slope[0]) > BRANCH_FOLD else BRANCH_FOLD)  # at a fold s moves a no more
     J = np.stack([by_a, by_w - slope[1] * by_a], axis=1)
     N = points(method, a, w)[0][0]
     mine = at.harmonics[0, 1]
@@ -157,10 +157,10 @@ def _solution(branch, method, linear, crossing, box):
         branch,
         float(s[0]),
         float(at.multiplier[0]),
-        bool(abs(N - mine) <= _AGREES * abs(mine)),
+        bool(abs(N - mine) <= BRANCH_AGREES * abs(mine)),
         float(abs(1 + N * linear.clamped(w)[0][0])),
     )
 
 
-def _at_one_place(one, other, near=_SAME):
+def _at_one_place(one, other, near=BRANCH_SAME):
     return abs(np.log(one.amplitude / other.amplitude)) < near and abs(np.log(one.omega / other.omega)) < near

@@ -14,15 +14,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-_MARGIN = 0.3  # of a cell's spread of values, by which a zero may hide beyond its corners
-_CUTS = 4
-_AT_ONCE = 1 << 18  # grid points looked at together: what bounds the memory of a large grid
-_MOST_STARTS = 600
-_MOST_PER_CELL = 4
-_STEP = 1e-5  # of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10
-_ACCEPT = 1e-8
-_SAME = 1e-5  # difference of ln a and ln omega below which two zeros are one
-_TOGETHER = 1e-3  # of a cell: starts so near to each other converge to one zero
+from ..thresholds import (
+    ACCEPT,
+    BISECTIONS,
+    CELLS_AT_ONCE,
+    CONVERGED,
+    CROSSING_NUDGE,
+    CROSSING_RANK,
+    CROSSING_STEPS,
+    CUTS,
+    HOPELESS,
+    MARGIN,
+    MOST_PER_CELL,
+    MOST_STARTS,
+    NOT_REAL,
+    NOTHING,
+    ON_EDGE,
+    SAME,
+    SETTLED,
+    TOGETHER,
+)
 
 
 @dataclass(frozen=True)
@@ -67,13 +78,13 @@ def find_crossings(D: Callable, log_a, log_w, values, refine=True) -> Scan:
     cells = int((values.shape[0] - 1) * (values.shape[1] - 1))
     if rows.size == 0:
         return Scan([], cells, missing, 0, False)
-    truncated = rows.size > _MOST_STARTS
+    truncated = rows.size > MOST_STARTS
     if truncated:
-        rows, columns = _nearest(values, rows, columns, _MOST_STARTS)
+        rows, columns = _nearest(values, rows, columns, MOST_STARTS)
     p, q, reach, size = _cut(D, log_a, log_w, rows, columns)
-    if p.size > _MOST_STARTS:
+    if p.size > MOST_STARTS:
         truncated = True
-        best = _least(size, _MOST_STARTS)
+        best = _least(size, MOST_STARTS)
         p, q, reach = p[best], q[best], reach[best]
     box = (log_a[0], log_a[-1], log_w[0], log_w[-1])
     found, unresolved = _polish(D, p, q, reach, box, refine)
@@ -99,12 +110,12 @@ def real_crossings(D: Callable, log_a, log_w, N, H: Callable) -> list[Crossing]:
     found = []
     for q in _bracketed(lambda q: H(np.exp(q)).imag, log_w, H(np.exp(log_w)).imag):
         gain = float(H(np.exp(np.array([q])))[0].real)
-        if not np.isfinite(gain) or abs(H(np.exp(np.array([q])))[0].imag) > 1e-6 * abs(gain):
+        if not np.isfinite(gain) or abs(H(np.exp(np.array([q])))[0].imag) > NOT_REAL * abs(gain):
             continue  # a pole: the phase jumps there
         here = np.full(1, q)
         for p in _bracketed(lambda p, q=q: D(p, np.full(p.size, q)).real, log_a, 1 + N * gain):
             value = abs(D(np.array([p]), here)[0])
-            if value <= _ACCEPT:
+            if value <= ACCEPT:
                 J = jacobian(D, np.array([p]), here)[0]
                 found.append(Crossing(float(np.exp(p)), float(np.exp(q)), float(value), J))
     return found
@@ -114,7 +125,7 @@ def _bracketed(f, grid, values):
     """Return the zeros of a function, bisecting all intervals of a grid across which its sign changes."""
     at = np.flatnonzero((values[:-1] < 0) != (values[1:] < 0))
     low, high, sign = grid[at].copy(), grid[at + 1].copy(), np.sign(values[at])
-    for _ in range(60 if at.size else 0):
+    for _ in range(BISECTIONS if at.size else 0):
         middle = 0.5 * (low + high)
         same = np.sign(f(middle)) == sign
         low, high = np.where(same, middle, low), np.where(same, high, middle)
@@ -126,14 +137,14 @@ def merged(scan: Scan, more: list[Crossing]) -> Scan:
     kept = list(scan.crossings)
     for c in more:
         places = [np.log([c.amplitude / k.amplitude, c.omega / k.omega]) for k in kept]
-        if not any((np.abs(place) < _SAME).all() for place in places):
+        if not any((np.abs(place) < SAME).all() for place in places):
             kept.append(c)
     return replace(scan, crossings=sorted(kept, key=lambda c: (c.amplitude, c.omega)), truncated=False)
 
 
 def jacobian(D: Callable, p, q) -> np.ndarray:
     """Return the derivatives of (Re D, Im D) by (ln a, ln omega) at points p, q; shape (n, 2, 2)."""
-    h = _STEP
+    h = CROSSING_NUDGE
     P = np.concatenate([p + h, p - h, p, p])
     Q = np.concatenate([q, q, q + h, q - h])
     up, down, right, left = np.split(D(P, Q), 4)
@@ -158,7 +169,7 @@ def _least(size, most):
 
 def _may_hold_zero(values):
     """Cells whose corners leave room for a zero; corners without an answer widen the room."""
-    rows = max(1, _AT_ONCE // values.shape[1])
+    rows = max(1, CELLS_AT_ONCE // values.shape[1])
     blocks = (values[i : i + rows + 1] for i in range(0, values.shape[0] - 1, rows))
     return np.concatenate([_block_may_hold_zero(block) for block in blocks])
 
@@ -172,14 +183,14 @@ def _block_may_hold_zero(values):
         low = np.where(known, part, np.inf).min(axis=0)
         high = np.where(known, part, -np.inf).max(axis=0)
         with np.errstate(invalid="ignore"):
-            room = np.where(partial, 1.0, _MARGIN) * (high - low) + np.where(partial, 0.5, 0.0)
+            room = np.where(partial, 1.0, MARGIN) * (high - low) + np.where(partial, 0.5, 0.0)
             hold &= (low - room <= 0) & (high + room >= 0)
     return hold
 
 
 def _cut(D, log_a, log_w, rows, columns):
     """Cut candidate cells; return the centres of small cells that may hold a zero, their reach and |D|."""
-    t = np.linspace(0, 1, _CUTS + 1)
+    t = np.linspace(0, 1, CUTS + 1)
     starts_p, starts_q, reach, sizes = [], [], [], []
     da, dw = log_a[rows + 1] - log_a[rows], log_w[columns + 1] - log_w[columns]
     P = np.broadcast_to((log_a[rows][:, None] + da[:, None] * t)[:, :, None], (rows.size, t.size, t.size))
@@ -189,11 +200,11 @@ def _cut(D, log_a, log_w, rows, columns):
         r, c = np.nonzero(_may_hold_zero(values[i]))
         middle = np.abs(values[i][r, c] + values[i][r + 1, c] + values[i][r, c + 1] + values[i][r + 1, c + 1])
         middle = np.where(np.isfinite(middle), middle, np.inf)
-        if r.size > _MOST_PER_CELL:  # neighbours of one zero; the nearest few suffice
-            best = np.argsort(middle)[:_MOST_PER_CELL]
+        if r.size > MOST_PER_CELL:  # neighbours of one zero; the nearest few suffice
+            best = np.argsort(middle)[:MOST_PER_CELL]
             r, c, middle = r[best], c[best], middle[best]
-        starts_p.append(log_a[rows[i]] + da[i] * (t[r] + 0.5 / _CUTS))
-        starts_q.append(log_w[columns[i]] + dw[i] * (t[c] + 0.5 / _CUTS))
+        starts_p.append(log_a[rows[i]] + da[i] * (t[r] + 0.5 / CUTS))
+        starts_q.append(log_w[columns[i]] + dw[i] * (t[c] + 0.5 / CUTS))
         reach.append(np.tile([da[i], dw[i]], (r.size, 1)))
         sizes.append(middle)
     if not starts_p:
@@ -210,8 +221,8 @@ def _polish(D, p, q, reach, box, refine):
     value = D(x[:, 0], x[:, 1])
     alive = np.isfinite(value)
     finished = np.zeros(p.size, dtype=bool)
-    for iteration in range(40 if refine else 1):
-        active = np.nonzero(alive & ~finished & (np.abs(value) > 1e-14))[0]
+    for iteration in range(CROSSING_STEPS if refine else 1):
+        active = np.nonzero(alive & ~finished & (np.abs(value) > CONVERGED))[0]
         if active.size == 0:
             break
         J = jacobian(D, x[active, 0], x[active, 1])
@@ -221,26 +232,26 @@ def _polish(D, p, q, reach, box, refine):
         active, step = active[~bad], step[~bad]
         if active.size == 0:
             break
-        longest = np.maximum(np.abs(step) / reach[active], 1e-300).max(axis=1)
+        longest = np.maximum(np.abs(step) / reach[active], NOTHING).max(axis=1)
         step = step * np.minimum(1.0, 1.0 / longest)[:, None]
         moved = _line_search(D, x, value, active, step)
-        settled = np.abs(step).max(axis=1) < 1e-13
+        settled = np.abs(step).max(axis=1) < SETTLED
         finished[active[settled | ~moved]] = True
         if iteration == 8:  # quadratic convergence shows by now; what has none sits at a jump
-            alive &= np.abs(value) < 1e-3
+            alive &= np.abs(value) < HOPELESS
         far = np.abs((x - start) / reach).max(axis=1) > 6  # strayed: another start owns what is there
         alive &= ~far
         if refine:
             alive &= ~_followers(x, np.where(alive, np.abs(value), np.inf), reach)
-    good = alive & (np.abs(value) <= (_ACCEPT if refine else np.inf))
-    slack = 1e-9
+    good = alive & (np.abs(value) <= (ACCEPT if refine else np.inf))
+    slack = ON_EDGE
     inside = (x[:, 0] >= box[0] - slack) & (x[:, 0] <= box[1] + slack)
     inside &= (x[:, 1] >= box[2] - slack) & (x[:, 1] <= box[3] + slack)
     keep = np.nonzero(good & inside)[0]
     found: list[Crossing] = []
     places: list[np.ndarray] = []
     for i in keep[np.argsort(np.abs(value[keep]))]:
-        near = _SAME if refine else 1.0 * reach[i]
+        near = SAME if refine else 1.0 * reach[i]
         if any((np.abs(x[i] - place) < near).all() for place in places):
             continue
         places.append(x[i])
@@ -258,7 +269,7 @@ def _followers(x, size, reach):
         if not np.isfinite(size[i]):
             break
         ahead = order[:n][~led[order[:n]]]
-        led[i] = bool((np.abs(x[ahead] - x[i]) < _TOGETHER * reach[i]).all(axis=1).any())
+        led[i] = bool((np.abs(x[ahead] - x[i]) < TOGETHER * reach[i]).all(axis=1).any())
     return led
 
 
@@ -285,8 +296,8 @@ def linear_zeros(log_a, log_w, values, chosen):
     """
     zeros, order = [], []
     rows, columns = np.nonzero(chosen)
-    for first in range(0, rows.size, _AT_ONCE):
-        i, k = rows[first : first + _AT_ONCE], columns[first : first + _AT_ONCE]
+    for first in range(0, rows.size, CELLS_AT_ONCE):
+        i, k = rows[first : first + CELLS_AT_ONCE], columns[first : first + CELLS_AT_ONCE]
         da, dw = log_a[i + 1] - log_a[i], log_w[k + 1] - log_w[k]
         by_a, by_w = values[i + 1, k], values[i, k + 1]  # from the near corner along a and along omega
         for half, (a, w, one, other, sign) in enumerate(
@@ -298,7 +309,7 @@ def linear_zeros(log_a, log_w, values, chosen):
                 det = Da.real * Dw.imag - Da.imag * Dw.real
                 s = (Dw.real * D0.imag - Dw.imag * D0.real) / det
                 t = (Da.imag * D0.real - Da.real * D0.imag) / det
-                inside = (s >= 0) & (t >= 0) & (s + t <= 1) & (np.abs(det) >= 1e-300)
+                inside = (s >= 0) & (t >= 0) & (s + t <= 1) & (np.abs(det) >= NOTHING)
             inside &= np.isfinite(D0) & np.isfinite(Da) & np.isfinite(Dw)
             here = np.nonzero(inside)[0]
             place = log_a[a] + sign * s * da, log_w[w] + sign * t * dw
@@ -315,7 +326,7 @@ def _solve(J, value):
     out = np.full(rhs.shape, np.nan)
     for i in range(len(rhs)):
         if np.isfinite(J[i]).all():
-            out[i] = np.linalg.lstsq(J[i], rhs[i], rcond=1e-9)[0]
+            out[i] = np.linalg.lstsq(J[i], rhs[i], rcond=CROSSING_RANK)[0]
     return out
 
 

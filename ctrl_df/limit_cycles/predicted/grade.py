@@ -8,15 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..thresholds import BAND, BAND_MOST, DISTORTION, LOEB, SENSITIVITY
 from .path import Path
 
 TRUSTED, DOUBTFUL, UNRELIABLE = "trusted", "doubtful", "unreliable"
 
 # Thresholds of the grades; benchmarks of tests/problems.py stand behind them.
-DISTORTION = (0.2, 0.6)  # fed-back harmonics, relative: doubtful, unreliable above
-SENSITIVITY = (6.0, 40.0)  # relative change of a for a relative error of N
-BAND = (0.15, 0.7)  # half width of the amplitude band, in ln a
-LOEB = 0.02  # sine of the angle between the curves below which Loeb's sign means nothing
 
 _IRREGULAR = ("aperiodic", "subharmonic", "diverged", "work limit", "stuck", "free", "resonance", "unstable")
 
@@ -156,7 +153,7 @@ def sensitivity(jacobian) -> Sensitivity:
 
 def band(value: float, spread: float) -> tuple[float, float]:
     """Interval around a positive value, `spread` on either side of its logarithm."""
-    spread = min(spread, 50.0)
+    spread = min(spread, BAND_MOST)
     return value * math.exp(-spread), value * math.exp(spread)
 
 
@@ -189,9 +186,8 @@ def graded(*, distortion, sensitivity, spread, stable, regime, notes=()) -> tupl
         f"%",
     )
     if not any(level for level, _ in reasons):
-        reasons += _over(
-            spread[0], BAND, f"the amplitude is known to a factor of {math.exp(min(spread[0], 50)):.2g} only"
-        )
+        factor = math.exp(min(spread[0], BAND_MOST))
+        reasons += _over(spread[0], BAND, f"the amplitude is known to a factor of {factor:.2g} only")
     else:
         worst = 2 if spread[0] > BAND[1] else 1 if spread[0] > BAND[0] else 0
         reasons.append((worst, ""))

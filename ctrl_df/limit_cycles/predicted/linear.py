@@ -9,8 +9,7 @@ import control as ct
 import numpy as np
 
 from ...checks import is_number, number, real_array, shown
-
-_SMOOTH_STEP = 0.5 * math.pi  # largest phase step between data points for which their phase is followed [rad]
+from ..thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_SPAN, ON_EDGE, ROUGH_POLE, ROUNDED, SMOOTH_STEP
 
 
 class LinearPart:
@@ -109,7 +108,7 @@ class LinearPart:
                 f"omega must be positive and finite [rad/s]; got {values.min():g} to {values.max():g}."
             )
         if values[0] == 0:  # python-control starts some of its contours at zero, where no cycle can be
-            values = values[1:] if not is_range else np.array([1e-3 * values[-1], values[-1]])
+            values = values[1:] if not is_range else np.array([OMEGA_LEAST * values[-1], values[-1]])
         if not values.size or values[-1] == 0:
             raise ValueError(
                 f"omega must be positive and finite [rad/s]; got {shown(omega)}. A range is [low, high]."
@@ -118,7 +117,7 @@ class LinearPart:
             values = np.geomspace(values[0], values[1], points)
         if self.measured:
             self._require_inside(values)
-        if values.size and values[-1] > self.top * (1 + 1e-9):
+        if values.size and values[-1] > self.top * (1 + ON_EDGE):
             raise ValueError(
                 f"omega must stay below the Nyquist frequency pi/dt = {self.top:g} rad/s; got {values[-1]:g} "
                 f"rad/s. A sampled loop knows no higher one: end the range there."
@@ -130,13 +129,13 @@ class LinearPart:
             return np.geomspace(self.bottom, self.top, max(points, 4 * self.H.omega.size))
         features = np.concatenate([self.H.poles(), self.H.zeros()])
         if self.dt:
-            features = features[np.abs(features) > 1e-12]
+            features = features[np.abs(features) > ROUNDED]
             features = np.log(features) / self.dt
         size = np.abs(features)
-        size = size[(size > 1e-8 * max(size.max(initial=0.0), 1e-8)) & np.isfinite(size)]
+        size = size[(size > ROUGH_POLE * max(size.max(initial=0.0), ROUGH_POLE)) & np.isfinite(size)]
         low, high = (size.min(), size.max()) if size.size else (1.0, 1.0)
-        top = self.top if self.dt else 100 * high
-        return np.geomspace(min(low / 100, top / 1e4), top, points)
+        top = self.top if self.dt else OMEGA_BEYOND * high
+        return np.geomspace(min(low / OMEGA_BEYOND, top / OMEGA_SPAN), top, points)
 
     def _prepare(self):
         omega = np.asarray(self.H.omega, dtype=float)
@@ -157,7 +156,7 @@ class LinearPart:
         self.bottom, top = float(omega[0]), float(omega[-1])
         self.top = min(self.top, top)
         x = np.log(omega)
-        smooth = (np.abs(value) > 0).all() and np.abs(np.angle(value[1:] / value[:-1])).max() < _SMOOTH_STEP
+        smooth = (np.abs(value) > 0).all() and np.abs(np.angle(value[1:] / value[:-1])).max() < SMOOTH_STEP
         if smooth:  # magnitude and phase of a physical response run smoothly over log frequency
             log = make(x, np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value)))
             self._spline = lambda q: np.exp(log(q))
@@ -169,7 +168,7 @@ class LinearPart:
         return np.asarray(self._spline(x), dtype=complex)
 
     def _require_inside(self, omega):
-        slack = 1e-9
+        slack = ON_EDGE
         if omega.size and (omega.min() < self.bottom * (1 - slack) or omega.max() > self.top * (1 + slack)):
             raise ValueError(
                 f"a measured H is known from {self.bottom:g} to {self.top:g} rad/s only; got omega from "

@@ -7,10 +7,9 @@ import warnings
 import control as ct
 import numpy as np
 
+from ..thresholds import INDENT, OMEGA_POINTS, OMEGA_POINTS_DRAWN
 from .linear import LinearPart
 from .scan_grid import refined_omega
-
-_INDENT = 1e-4  # radius of the contour's way round a pole, relative to the frequencies looked at
 
 
 def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
@@ -33,21 +32,22 @@ def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
     H = linear.H
     if linear.measured:
         own = np.asarray(H.omega)
-        w = own if omega is None else linear.grid(omega, 500)
+        w = own if omega is None else linear.grid(omega, OMEGA_POINTS_DRAWN)
         # python-control evaluates points along j omega only; a sampled H gets its circle afterwards
         H = ct.frd(linear(w[w > 0]), w[w > 0], name=H.name)
         omega, warn = None, False
     elif isinstance(omega, list | tuple) and len(omega) == 2:
-        omega = linear.grid(omega, 1000)
+        omega = linear.grid(omega, OMEGA_POINTS[True])
     elif omega is not None:
         omega = linear.grid(np.asarray(omega).reshape(-1))
-        omega = refined_omega(linear, omega, most=1000)  # the drawn curve passes through the crossings
+        # the drawn curve passes through the crossings
+        omega = refined_omega(linear, omega, most=OMEGA_POINTS[True])
     if omega is None and not linear.proper:  # its contour never closes: draw what is scanned
         omega, warn = linear.grid(), False
     if not linear.measured and "indent_radius" not in kwargs:
         # python-control's own is in rad/s: where a period takes days it swallows the contour
         seen = linear.grid() if omega is None else np.asarray(omega)
-        kwargs = {**kwargs, "indent_radius": _INDENT * float(np.sqrt(seen[seen > 0].min() * seen.max()))}
+        kwargs = {**kwargs, "indent_radius": INDENT * float(np.sqrt(seen[seen > 0].min() * seen.max()))}
     with warnings.catch_warnings():
         if not warn:
             warnings.simplefilter("ignore")

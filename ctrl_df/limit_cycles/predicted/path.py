@@ -23,19 +23,24 @@ import numpy as np
 
 from ...arclength import correction, tangent
 from ...simulate.engine import State
-
-_CLOSED = 1e-7  # defect, relative to the fundamental, of a point on the curve
-_NUDGE = 1e-5  # of the difference quotients; all unknowns are relative
-_LONGEST, _SHORTEST, _FIRST = 0.25, 1e-3, 0.1  # steps along the curve
-_MOST_STEPS = 80
-# A step is halved where the tangents at its ends differ by more than 37 degrees (cosine), or the corrector
-# moves by more than that share of it; else the next one is longer.
-_BEND, _ASTRAY, _LONGER = 0.8, 0.3, 1.6
-_SLOW = 0.5, 0.9  # defect over the one before from which Newton's matrix is taken anew, or the search is over
-_PROBE = 0.05 * np.exp(0.7j)  # third harmonic, relative, that asks for oddness: small, of no special phase
-_NAMED = 0.01  # |1 + N H| of a motion that is taken for the one of the prediction
-_REACH = np.log([30.0, 10.0])  # in amplitude and frequency, beyond which a curve is given up
-_ODD = 1e-7  # even harmonics and mean of the answer to an odd waveform, below which a block is odd
+from ..thresholds import (
+    ASTRAY,
+    NAMED,
+    ODD,
+    PATH_BEND,
+    PATH_CLOSED,
+    PATH_FIRST,
+    PATH_LATE,
+    PATH_LONGER,
+    PATH_LONGEST,
+    PATH_NEWTON,
+    PATH_NUDGE,
+    PATH_REACH,
+    PATH_SHORTEST,
+    PATH_STEPS,
+    PROBE,
+    SLOW,
+)
 
 
 class End(Enum):
@@ -135,11 +140,11 @@ class _Curve:
         nearest = getattr(self.respond, "nearest", None)
         if nearest is not None:  # of several, the one whose N balances H there
             H = self.linear.clamped(np.array([omega]))[0][0]
-            nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), _NAMED)
+            nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), NAMED)
         motion = self.motion
-        U[3] = _PROBE * amplitude
+        U[3] = PROBE * amplitude
         Y = self.respond(U, omega)
-        if Y is not None and np.abs(Y[0::2]).max() < _ODD * np.abs(Y).max():
+        if Y is not None and np.abs(Y[0::2]).max() < ODD * np.abs(Y).max():
             self.kept = np.arange(3, self.harmonics + 1, 2)
         self.motion = motion
 
@@ -194,7 +199,7 @@ class _Curve:
         for i in range(z.size):
             self.motion = motion
             moved = z.copy()
-            moved[i] += _NUDGE if i < z.size - 1 or z[i] < 0.5 else -_NUDGE
+            moved[i] += PATH_NUDGE if i < z.size - 1 or z[i] < 0.5 else -PATH_NUDGE
             there, _ = self.defect(moved)
             if there is None:
                 return None
@@ -228,9 +233,9 @@ class _Curve:
         z, Y, J = found
         border = tangent(J, border)
         motion = self.motion
-        step, share, folds, differenced = _FIRST, 0.0, 0, False
+        step, share, folds, differenced = PATH_FIRST, 0.0, 0, False
         reason = End.STOPPED
-        for _ in range(_MOST_STEPS):
+        for _ in range(PATH_STEPS):
             ahead = z + step * border
             target = None
             if ahead[-1] >= 1.0:
@@ -251,11 +256,11 @@ class _Curve:
             if (
                 found is None
                 or turned is None
-                or turned @ border < _BEND
-                or np.abs(found[0] - ahead).max() > _ASTRAY * step
+                or turned @ border < PATH_BEND
+                or np.abs(found[0] - ahead).max() > ASTRAY * step
             ):
                 step *= 0.5
-                if step < _SHORTEST:
+                if step < PATH_SHORTEST:
                     break
                 self.motion = motion  # what was tried may have led to another one
                 if differenced:  # Newton's matrix is that of this point already
@@ -272,8 +277,8 @@ class _Curve:
             z, Y, J = found
             border, motion, differenced = turned, self.motion, False
             share = max(share, float(z[-1]))
-            step = min(_LONGER * step, _LONGEST)
-            if (np.abs(z[:2] - self.first) > _REACH).any():
+            step = min(PATH_LONGER * step, PATH_LONGEST)
+            if (np.abs(z[:2] - self.first) > PATH_REACH).any():
                 reason = End.LEFT
                 break
         return self.path(reason, z, share, Y, folds)
@@ -286,13 +291,13 @@ class _Curve:
         if r is None:
             return None
         fresh, before = False, np.inf
-        for _ in range(12):
+        for _ in range(PATH_NEWTON):
             size = float(np.abs(r).max())
-            if size < _CLOSED:
+            if size < PATH_CLOSED:
                 return z, Y, J
-            if size > _SLOW[0] * before:
-                if fresh and size > _SLOW[1] * before:
-                    return (z, Y, J) if size < 100 * _CLOSED else None
+            if size > SLOW[0] * before:
+                if fresh and size > SLOW[1] * before:
+                    return (z, Y, J) if size < PATH_LATE * PATH_CLOSED else None
                 J = self.jacobian(z, r)
                 fresh = True
                 if J is None:

@@ -15,6 +15,7 @@ from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
 from ...drawing import draw
 from ...table import Table, frame, without_empty
+from ..thresholds import OMEGA_POINTS, ORDERS, ROUNDED
 from .assess import Assessor
 from .branches import branch_crossings
 from .crossings import Scan, find_crossings, merged, real_crossings
@@ -22,9 +23,6 @@ from .grade import LimitCycle
 from .linear import LinearPart
 from .nyquist import nyquist_of
 from .scan_grid import defect, scan_grid
-
-ORDERS = 9
-_OMEGA_POINTS = {True: 1000, False: 200}  # of a range: memoryless, dynamic
 
 
 class DescribingFunctionResponse(_PythonControlResponse):
@@ -199,7 +197,7 @@ def describing_function_response(
     limits = kwargs.get("omega_limits")
     frequencies = linear.grid(
         omega if omega is not None else (list(limits) if limits is not None else None),
-        _OMEGA_POINTS[not method.needs_omega],
+        OMEGA_POINTS[not method.needs_omega],
     )
     given: dict[str, Any] = dict(
         output=output, try_method=try_method, num_points=num_points, **(options or {})
@@ -220,7 +218,7 @@ def describing_function_response(
         scan = find_crossings(D, log_a, log_w, values, refine)
         if refine and method.static and log_a.size > 1:
             N: Any = method.harmonics(np.exp(log_a), None, 1)[0][:, 0, 1]
-            if (np.abs(N.imag) <= 1e-12 * np.abs(N)).all():
+            if (np.abs(N.imag) <= ROUNDED * np.abs(N)).all():
                 more = real_crossings(D, log_a, log_w, N.real, lambda w: linear.clamped(w)[0])
                 scan = merged(scan, more)
         branched = branch_crossings(method, linear, family, (log_a, log_w), values, scan.crossings, refine)
@@ -243,7 +241,7 @@ def _check_timebase(linear, F, method):
     if dt is None or not isinstance(F, ct.NonlinearIOSystem) or not method.needs_omega:
         return
     if bool(linear.dt) != bool(dt) or (
-        linear.dt and dt is not True and abs(float(dt) - linear.dt) > 1e-12 * linear.dt
+        linear.dt and dt is not True and abs(float(dt) - linear.dt) > ROUNDED * linear.dt
     ):
         mine = f"dt={linear.H.dt}"
         raise ValueError(

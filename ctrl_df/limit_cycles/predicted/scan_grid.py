@@ -9,12 +9,18 @@ import numpy as np
 from ...df.family import Family
 from ...df.methods import ElementIntegrals, Method
 from ...df.points import points
+from ..thresholds import (
+    BEYOND_CORNER,
+    JUMPY,
+    LEVELS,
+    SCAN_AT_ONCE,
+    SCAN_CHANGE,
+    SCAN_HALVINGS,
+    SCAN_MOST,
+    SCAN_QUICK,
+    SCAN_STEP,
+)
 from .linear import LinearPart
-
-_LEVELS = 200  # of a quantizer, whose corners enter the grid: beyond N differs from 1 by less than 1e-3
-_BEYOND = 4.0 ** np.arange(-10.0, -3.0)  # relative, from a corner on
-_AT_ONCE = 1 << 16  # points of a closed form between two chances to interrupt it
-_NOISE = 1e-6  # spread of an average from which N jumps from point to point
 
 
 def defect(method: Method, linear: LinearPart, bar=None):
@@ -44,7 +50,7 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
         a = _refined(coarse, method.amplitudes)
         if isinstance(method, ElementIntegrals):
             a = with_corners(a, method.subject.primitive)
-        if method.needs_omega and a.size * w.size > 60_000:
+        if method.needs_omega and a.size * w.size > SCAN_QUICK:
             a = coarse
         N = _fundamental(method, a, w, family)
     else:
@@ -61,7 +67,7 @@ def _fundamental(method, a, w, family):
         return method.harmonics(a, None, 1)[0][..., 1]
     if a is family.amplitudes and w is family.omega:
         return family.N
-    rows = max(1, _AT_ONCE // w.size)
+    rows = max(1, SCAN_AT_ONCE // w.size)
     parts = (a[i : i + rows] for i in range(0, a.size, rows))
     return np.concatenate([method.harmonics(part, w, 1)[0][..., 1] for part in parts])
 
@@ -85,22 +91,22 @@ def with_corners(a, primitive):
     corners = np.abs(np.asarray(getattr(primitive, "corners", ()), dtype=float))
     step = getattr(primitive, "step", 0.0)
     if step > 0:
-        most = min(int(a[-1] / step + 0.5), _LEVELS)
+        most = min(int(a[-1] / step + 0.5), LEVELS)
         corners = np.concatenate([corners, (np.arange(most) + 0.5) * step])
     corners = corners[(corners >= a[0]) & (corners < a[-1])]
-    beyond = corners[:, None] * (1.0 + _BEYOND)
+    beyond = corners[:, None] * (1.0 + BEYOND_CORNER)
     return np.unique(np.concatenate([a, corners, beyond[beyond < a[-1]]]))
 
 
-def refined_omega(linear, w, change=0.15, most=3000):
+def refined_omega(linear, w, change=SCAN_CHANGE, most=SCAN_MOST):
     """Halve steps of ln omega until H changes by at most `change` (relative) from point to point."""
-    for _ in range(12):
+    for _ in range(SCAN_HALVINGS):
         if w.size < 2 or w.size >= most:
             break
         h = linear(w)
         with np.errstate(all="ignore"):
             step = np.abs(np.diff(h)) / np.minimum(np.abs(h[1:]), np.abs(h[:-1]))
-        coarse = (step > change) & (np.diff(np.log(w)) > 1e-5)
+        coarse = (step > change) & (np.diff(np.log(w)) > SCAN_STEP)
         if not coarse.any():
             break
         w = np.unique(np.concatenate([w, np.sqrt(w[:-1] * w[1:])[coarse]]))
@@ -132,4 +138,4 @@ def grid_slope(log_a, log_w, values, place):
 
 def noisy(regime, spread):
     """Where N is an average over irregular motion rather than a function of (a, omega)."""
-    return (np.asarray(regime) == "aperiodic") & ~(np.asarray(spread) < _NOISE)
+    return (np.asarray(regime) == "aperiodic") & ~(np.asarray(spread) < JUMPY)

@@ -18,8 +18,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from numba.core.untyped_passes import InlineClosureLikes
 
-SPEED = 2  # of LLVM's levels; 1 makes the steps of Runge-Kutta methods half as fast, 3 nothing faster
-INLINED = 100  # size up to which functions are copied into others; larger ones are no faster for it
+from ..thresholds import INLINED, SPEED
 
 
 class LeanLibrary(JITCodeLibrary):

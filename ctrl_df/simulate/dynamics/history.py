@@ -23,6 +23,7 @@ from ..program.layout import Y_RECORD as RECORD
 from ..program.layout import Y_RECORDS as RECORDS
 from ..program.layout import Y_RING as RING
 from ..program.layout import Y_VALUES as VALUES
+from ..thresholds import AHEAD, RESOLUTION
 
 LAST_GENERATION = 6
 OLDEST, NEXT, NOW = range(3)
@@ -88,7 +89,7 @@ def advance(prog, t, h, limit, w):
             continue
         base, delay = prog.ints[prog.nodes[n, AUX]], prog.par[prog.nodes[n, PAR]]
         serial, following = int(w[base + NOW]), int(w[base + NEXT])
-        near = 4e-16 * (abs(t) + delay)
+        near = 2.0 * RESOLUTION * (abs(t) + delay)
         while serial + 1 < following:
             at = _record(base, serial + 1)
             if w[at + START] + delay > t + near:
@@ -104,7 +105,7 @@ def advance(prog, t, h, limit, w):
         while serial < following:
             at = _record(base, serial)
             arrival = w[at + START] + delay
-            if arrival > t + 1.5 * h or arrival >= limit_here:
+            if arrival > t + AHEAD * h or arrival >= limit_here:
                 break
             if w[at + GENERATION] > 0.0:
                 limit_here = arrival

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
@@ -45,11 +43,10 @@ from ..program.layout import (
     TOUCH,
     X,
 )
+from ..thresholds import GRAIN, ROUNDED, SETTLING
 from .contact import impact, resolve, stop
 from .flow import external, node_input, product, refresh, signals
 from .mechanics import closed
-
-ROUNDING = 4.0 * np.finfo(float).eps
 
 
 @part
@@ -57,7 +54,7 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
     """Bring all modes in line with the state; returns False if they keep changing (a sliding mode)."""
     w, f, trial = work
     nodes, par = prog.nodes, prog.par
-    for _pass in range(50):
+    for _pass in range(SETTLING):
         changed = False
         external(prog, drive, t, segment, w)
         signals(prog, t, x, mode, w)
@@ -185,7 +182,7 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
             + abs(par[row_b + 3])
             + abs(par[row_b + 2] * value)
         )
-        return E_SWITCH if abs(jump) > 1e-12 * sizes else E_CORNER
+        return E_SWITCH if abs(jump) > ROUNDED * sizes else E_CORNER
     if kind == QUANTIZER:
         mode[mo] += 1 if slot == 1 else -1
         return E_SWITCH
@@ -193,7 +190,7 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         if mode[mo] != 0:
             # free from here on: rounding must not find the output at that side of the gap still
             refresh(prog, drive, segment, t, x, mode, w)
-            x[xo] += mode[mo] * ROUNDING * (abs(node_input(prog, node, 0, w)) + abs(x[xo]))
+            x[xo] += mode[mo] * GRAIN * (abs(node_input(prog, node, 0, w)) + abs(x[xo]))
             mode[mo] = 0
             return E_DISENGAGE
         mode[mo] = 1 if slot == 1 else -1

@@ -46,18 +46,13 @@ from ..program.layout import (
     G,
     X,
 )
+from ..thresholds import AFFINE_SHARE, FORCING_SHARE, SLOTS, TERMS, UNIT
 from .roots import first_root
 
-TERMS = 20
-SLOTS = 16
-HARMONICS = 32
 LENGTHS = 2  # of steps whose propagators are kept
 RANKS = (
     4  # kinds of propagators for each length where laws are curved, see `ctrl_df.simulate.kernel.exponential`
 )
-UNIT = 2.0**200  # probes of linear maps: what is constant beside them vanishes without rounding them
-SHARE = 0.01
-"""Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
 
 
 class Memory(NamedTuple):
@@ -300,7 +295,7 @@ def forced(prog, drive, segment, t, length, rtol, store):
                 re, im = -im * turn / k, re * turn / k
                 term *= turn / k
                 store.forcing[k, i] += re
-                if term > 1e-3 * rtol:
+                if term > FORCING_SHARE * rtol:
                     least = max(least, k + 1)
     return min(least, TERMS)
 
@@ -339,9 +334,9 @@ def series(store, slot, length, least, k0, size, rtol, atol, poly):
                 now = max(now, abs(value) / (atol + rtol * store.measures[i]))
         if not now < math.inf:
             return k, -1.0
-        if k >= 3 and now < SHARE and before < SHARE and k >= least:
+        if k >= 3 and now < AFFINE_SHARE and before < AFFINE_SHARE and k >= least:
             return k, 1.0
-    share = min((SHARE / now) ** (1.0 / TERMS), (SHARE / before) ** (1.0 / (TERMS - 1)))
+    share = min((AFFINE_SHARE / now) ** (1.0 / TERMS), (AFFINE_SHARE / before) ** (1.0 / (TERMS - 1)))
     return TERMS, min(share, 1.0)
 
 

@@ -25,7 +25,39 @@ from ..program.layout import (
     G,
     Program,
 )
-from .affine import HARMONICS, crossing, forced, recall, series, shrink
+from ..thresholds import (
+    AFTER_EVENT,
+    BUMP_KEPT,
+    DENSE,
+    FADING,
+    FIRST_BLIND,
+    FIRST_CHANGE,
+    FIRST_LEAST,
+    GAUSS_REACH,
+    GAUSS_REACH_AFFINE,
+    GRAINS,
+    GROWS_5,
+    GROWS_8,
+    HARMONICS,
+    LOST,
+    MARGIN_GROWTH,
+    PACE_WAIT,
+    PATIENCE,
+    PROGRESS,
+    REACH,
+    RESTART,
+    ROUNDED,
+    SAME,
+    SERIES_REACH,
+    SHORTEST,
+    STEP_GROWTH,
+    STEP_KEPT,
+    STEP_SAFETY,
+    STEP_SHRINK,
+    UNSETTLED,
+    ZENO,
+)
+from .affine import crossing, forced, recall, series, shrink
 from .glide import forget_run
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
@@ -35,14 +67,6 @@ from .stepper import grains, inside, prepare, prepare8, roughness, step
 DONE, EVENT, SECTION, FULL, STEPS, NAN, CHATTER, TINY, HISTORY = range(9)
 """Why a run returned: end of time, stopped at an event, at the section, event log full, step bound, NaN,
 sliding, step below the resolution of time, more steps within a delay than its history holds."""
-
-PATIENCE = 40  # steps before a lower order that failed is tried again
-DENSE = 1e-3  # error of a step, times its tolerance, below which a lower order is tried
-SAME = 1e-15  # relative difference of two instants that only rounding parts
-WAIT = 3  # steps at most until constant propagators are tried again
-GRAINS = 200  # steps after which rounding is asked anew
-REACH = 1e-4  # of a step: the time over which rates of inputs are taken
-SHORTEST = 1e-12  # of the span of a run: no step or stretch between events shorter than that is progress
 
 
 @part(inline=True)
@@ -123,10 +147,10 @@ def advance(
     )
     if affine and nh > 1 and drive.omega > 0.0:
         # the series of the forcing has to converge as well
-        hmax = min(hmax, 2.5 / ((nh - 1) * drive.omega))
+        hmax = min(hmax, SERIES_REACH / ((nh - 1) * drive.omega))
     if spectrum.shape[1] > 0 and omega > 0.0:
-        # ten nodes integrate a wave over so many radians of it
-        hmax = min(hmax, (6.0 if affine else 10.0) / (spectrum.shape[1] * omega))
+        # so many radians of a wave are integrated at once
+        hmax = min(hmax, (GAUSS_REACH_AFFINE if affine else GAUSS_REACH) / (spectrum.shape[1] * omega))
     steps = events_here = 0
     # a run that goes on after a full event log goes on counting events without progress
     zero_events = int(memo[0]) if memo[2] == 1.0 else 0
@@ -208,7 +232,7 @@ def advance(
                     known, jumped = False, led[4] == 1.0 or held
                     continue
                 if curved:
-                    skip = wait = min(2 * wait + 1, WAIT)
+                    skip = wait = min(2 * wait + 1, PACE_WAIT)
         if jumped or not known:
             renewed(prog, mode, scale, -1)  # a jump may have made a speed of a margin that was a force
             rates(prog, drive, segment, t, x, mode, work, k[0], g0, locate)
@@ -255,7 +279,7 @@ def advance(
                 for j in range(n):
                     x1[j] = x[j] + length * k[0, j]
                 length *= bump_share(prog, x, x1)
-            truncated = t + length >= limit - 1e-12 * max(abs(limit), length)
+            truncated = t + length >= limit - ROUNDED * max(abs(limit), length)
             if truncated:
                 length = room
             prepared = False
@@ -273,7 +297,7 @@ def advance(
                 inside(terms, 1.0, x, poly, x1)
                 prepared = True
                 # a step costs the same however long: only an event cuts the next one short
-                h_next = max(h, 5.0 * length)
+                h_next = max(h, STEP_GROWTH * length)
             else:
                 for i in range(ng):
                     lowest[i] = g0[i]
@@ -315,26 +339,26 @@ def advance(
                 if truncated and rank == level and patience == 0 and error < DENSE * length / h:
                     level = 5 if level == 8 else 3
                 if not error < math.inf:
-                    h = 0.2 * length
-                    if not h >= 0.1 * max(1e-12 * abs(t), shortest):
+                    h = STEP_SHRINK * length
+                    if not h >= LOST * max(ROUNDED * abs(t), shortest):
                         reason = NAN
                     continue
                 if error > 1.0:
-                    h = length * max(0.2, 0.9 * error ** (-1.0 / order))
+                    h = length * max(STEP_SHRINK, STEP_SAFETY * error ** (-1.0 / order))
                     if t + h == t:
                         reason = TINY
                     continue
                 if bumpy:
                     share = bump_share(prog, x, x1)
-                    if share < 0.7:
-                        h = 0.9 * share * length
+                    if share < BUMP_KEPT:
+                        h = STEP_SAFETY * share * length
                         continue
                 h_next = h
                 if rank == order:
-                    grow = 5.0
-                    if error > (1e-6 if order == 8 else 1e-4):
-                        grow = min(5.0, 0.9 * error ** (-1.0 / order))
-                    h_next = length * max(grow, 0.3)
+                    grow = STEP_GROWTH
+                    if error > (GROWS_8 if order == 8 else GROWS_5):
+                        grow = min(STEP_GROWTH, STEP_SAFETY * error ** (-1.0 / order))
+                    h_next = length * max(grow, STEP_KEPT)
                     if truncated:
                         h_next = max(h_next, h)
             # --- events
@@ -367,7 +391,7 @@ def advance(
                     prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
                     rough = roughness(size, grain, length, rtol, atol, poly)
                     if rough > 1.0:
-                        h = length * max(0.3, 0.9 * rough ** (-0.125))
+                        h = length * max(STEP_KEPT, STEP_SAFETY * rough ** (-0.125))
                         continue
                 else:
                     terms = prepare(rank, length, k, poly)
@@ -403,7 +427,7 @@ def advance(
             copy(x1, x)
             for j in range(n):
                 # a size that forgets slowly: tolerances do not tighten as a state swings through zero
-                size[j] = max(abs(x[j]), 0.98 * size[j])
+                size[j] = max(abs(x[j]), FADING * size[j])
             h = h_next
             if at < 0:
                 known = False
@@ -422,7 +446,7 @@ def advance(
         reach = REACH * h
         if theta < 1.0 and theta * length > 0.0:
             # a step that ran far beyond its event says little of what follows
-            h = max(min(h, 3.0 * theta * length), 1e-14 * abs(t))
+            h = max(min(h, AFTER_EVENT * theta * length), RESTART * abs(t))
         # --- an event at (t, x)
         known = False
         if at == ng - 1:
@@ -443,14 +467,14 @@ def advance(
         generation = 1.0
         settled = settle(prog, drive, segment, t, x, mode, work, dx)
         if not settled:
-            zero_events += 100
+            zero_events += UNSETTLED
         if settled and _signature(mode) == modes and _same(x, before):
             # nothing came of it: rounding alone crossed this margin, which thereby counts as larger
-            scale[NOW, at] *= 100.0
+            scale[NOW, at] *= MARGIN_GROWTH
         else:
             renewed(prog, mode, scale, node)
         zero_events += 1
-        if t - last_event_t > max(1e-9 * abs(t), shortest):
+        if t - last_event_t > max(PROGRESS * abs(t), shortest):
             zero_events = 0
             last_event_t = t
         clock[4] += 1
@@ -460,7 +484,7 @@ def advance(
             log_n[events_here] = node
             log_k[events_here] = kind
         events_here += 1
-        if zero_events > 2000:
+        if zero_events > ZENO:
             reason = CHATTER
         elif stop_at_event:
             reason = EVENT
@@ -502,6 +526,6 @@ def _first_step(x, dx, room, hmax):
     h = math.inf
     for j in range(x.shape[0]):
         if x[j] != 0.0 and dx[j] != 0.0:
-            h = min(h, 0.01 * abs(x[j] / dx[j]))
+            h = min(h, FIRST_CHANGE * abs(x[j] / dx[j]))
     span = min(room, hmax)
-    return min(max(h, 1e-9 * span), span) if h < math.inf else 1e-6 * span
+    return min(max(h, FIRST_LEAST * span), span) if h < math.inf else FIRST_BLIND * span

@@ -28,18 +28,12 @@ from ..compiler.compiled import part
 from ..compiler.views import lean
 from ..dynamics.mechanics import curved_forces
 from ..program.layout import CURVED, F_ASKED, F_SIZE, H_BUMP
+from ..thresholds import BUMP_KEPT, CURVED_HALVINGS, CURVED_NUDGE, CURVED_SHARE, EPS, EXPONENTIAL_TERMS
 from .affine import LENGTHS, RANKS, Memory
 from .locate import bump_share
 
 PARTS = np.array([2, 3, 5, 8])  # of a step, for each rank
 MOST = 8
-MILD = 0.003  # the same, once K is not zero
-STIFF = 0.05  # contraction h |dR/dx| of a sweep beyond which K is renewed
-NUDGE = 1e-6  # of difference quotients of the curved laws, relative to the size of a state
-PATIENCE = 20  # steps of the higher rank before the lower one is tried again
-EPS = np.finfo(float).eps
-ORDER = 16  # terms of the series of an exponential
-HALVINGS = 40
 USE = 1  # an entry of `Bend.state`
 # u (u - 1) .. (u - i + 1) / i! = sum_k NEWTON[i, k] u^k / k!
 NEWTON = np.zeros((MOST + 1, MOST + 1))
@@ -210,7 +204,7 @@ def contraction(prog, node, store, bend, slot, t, h, x, mode, size):
     for j in range(n):
         trial[j] = x[j]
     for j in range(n):
-        trial[j] = x[j] + NUDGE * size[j]
+        trial[j] = x[j] + CURVED_NUDGE * size[j]
         nudge = trial[j] - x[j]
         if nudge != 0.0:
             ask(prog, node, t, trial, mode, store.acting, bend.push, bend.dx, beside, nq)
@@ -249,7 +243,7 @@ def renew(store, bend, slot):
 @part
 def narrow(prog, x, x1):
     """Whether a step is too long to meet a narrow feature of friction over speed."""
-    return prog.ints[H_BUMP] == 1 and bump_share(prog, x, x1) < 0.7
+    return prog.ints[H_BUMP] == 1 and bump_share(prog, x, x1) < BUMP_KEPT
 
 
 @part
@@ -271,9 +265,9 @@ def make_bent(store, bend, place, slot, rank, h, n, nr):
                 value += store.q[slot, i, k] * bend.slope[slot, k, j]
             jacobian[i, j] = value
     halvings = _least_halvings(jacobian, sigma)
-    while halvings > HALVINGS or not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, bend.dx):
+    while halvings > CURVED_HALVINGS or not _series(bend.matrix, jacobian, sigma / 2.0**halvings, m, bend.dx):
         halvings += 1
-        if halvings > HALVINGS:
+        if halvings > CURVED_HALVINGS:
             return False
     tau = sigma / 2.0**halvings
     for _ in range(halvings):
@@ -334,7 +328,7 @@ def _newton_gain(matrix, newton, q, row, degree, k, sigma):
 
 @part
 def _least_halvings(jacobian, tau):
-    """Return how often tau is to be halved at least for a series of `ORDER` terms to converge.
+    """Return how often tau is to be halved at least for a series of `EXPONENTIAL_TERMS` terms to converge.
 
     The trace of J^2 tells about the largest rate, whatever the units of the states.
     """
@@ -343,7 +337,7 @@ def _least_halvings(jacobian, tau):
         for j in range(jacobian.shape[0]):
             square += jacobian[i, j] * jacobian[j, i]
     turn, halvings = math.sqrt(abs(square)) * tau, 0
-    while turn > 2.0 and halvings <= HALVINGS:
+    while turn > 2.0 and halvings <= CURVED_HALVINGS:
         turn *= 0.5
         halvings += 1
     return halvings
@@ -361,7 +355,7 @@ def _series(matrix, jacobian, tau, m, column):
         for j in range(n):
             top[i, j] = power[i, j] = factor if i == j else 0.0
     small = False
-    for term in range(1, ORDER + 1):
+    for term in range(1, EXPONENTIAL_TERMS + 1):
         small = True
         factor = tau / (term + m + 1)
         for j in range(n):
@@ -374,7 +368,7 @@ def _series(matrix, jacobian, tau, m, column):
                 total *= factor
                 power[i, j] = total
                 top[i, j] += total
-                small = small and abs(total) <= 0.1 * EPS * abs(top[i, j])
+                small = small and abs(total) <= CURVED_SHARE * EPS * abs(top[i, j])
         if small:
             break
     if not small:

@@ -27,11 +27,22 @@ from ..dynamics.matrices import multiply, row_times
 from ..dynamics.mechanics import mechanism
 from ..dynamics.modes import settle
 from ..program import layout as L
+from ..thresholds import (
+    ALIKE,
+    EPS,
+    EXPONENTIAL_HALVINGS,
+    EXPONENTIAL_SHARE,
+    EXPONENTIAL_TERMS,
+    FADING,
+    MILD,
+    MORE_NODES,
+    NEAR,
+    PACED_SHARE,
+    RANK_PATIENCE,
+    STIFF,
+)
 from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
 from .exponential import (
-    MILD,
-    PATIENCE,
-    STIFF,
     begin_use,
     bent_step,
     contraction,
@@ -42,16 +53,7 @@ from .exponential import (
 )
 from .outputs import next_sample, record, tick
 
-EPS = np.finfo(float).eps
-ORDER = 16  # terms of an exponential's series
-HALVINGS = 12  # of the step, at most, before its series is summed
-NEAR = 1e-3  # times the tolerance: how far a step may be from a known length, relative to it
-ALIKE = 1e-6  # relative difference of two steps below which they count as the same length
-
-SHARE = 0.1  # of the tolerance of a step that one between samples may have
-
 USABLE, USELESS = 1, 2  # entries of `Memory.ready`
-GIVEN_UP = 0.25  # share of the error that is left by more nodes, above which still more are of no use
 RANK, LEFT = 2, 3  # entries of `Bend.state`
 
 
@@ -166,13 +168,13 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         here[at], ahead[at] = t, t1
         # --- over the step
         if bend is not None:
-            share = min(tracks.length[which] / long, SHARE) if long > 0.0 else SHARE
+            share = min(tracks.length[which] / long, PACED_SHARE) if long > 0.0 else PACED_SHARE
             state = bend.state[slot]
             if state[RANK] > 0.0:
                 state[LEFT] -= 1.0
                 if state[LEFT] <= 0.0:
                     state[RANK] -= 1.0
-                    state[LEFT] = PATIENCE
+                    state[LEFT] = RANK_PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
             if store.ready[place] != USABLE or not share >= bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
@@ -209,7 +211,7 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
         before = place
         for j in range(n):
             x[j] = here[j] = ahead[j]
-            size[j] = max(abs(ahead[j]), 0.98 * size[j])
+            size[j] = max(abs(ahead[j]), FADING * size[j])
         done += 1
         t = t1
         ticked = next_tick <= t1 + near
@@ -308,7 +310,7 @@ def _march(
             break
         for j in range(n):
             x[j] = here[j] = ahead[j]
-            size[j] = max(abs(ahead[j]), 0.98 * size[j])
+            size[j] = max(abs(ahead[j]), FADING * size[j])
         if due:
             for i in range(ny):
                 yout[index, i] = row_times(first, column, values, n + fed.shape[0] + i, ahead)
@@ -390,9 +392,9 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
             lag = contraction(prog, node, store, bend, slot, t, h, x, mode, size)
         if not fresh and lag > STIFF and renew(store, bend, slot):
             fresh = True
-        elif rank + 1 < RANKS and error < GIVEN_UP * before and not (fresh and lag > STIFF):
+        elif rank + 1 < RANKS and error < MORE_NODES * before and not (fresh and lag > STIFF):
             rank += 1
-            state[LEFT] = PATIENCE
+            state[LEFT] = RANK_PATIENCE
             before = error if error > 0.0 else math.inf
         elif not fresh and state[0] != 0.0 and lag > MILD and renew(store, bend, slot):
             fresh, rank, before = True, first, math.inf
@@ -554,9 +556,9 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
         for j in range(nz):
             absolute[i, j] = abs(m[i, j])
     halvings = 0
-    while halvings <= HALVINGS and not _exponential(absolute, h, halvings, whole, power, scratch):
+    while halvings <= EXPONENTIAL_HALVINGS and not _exponential(absolute, h, halvings, whole, power, scratch):
         halvings += 1
-    usable = halvings <= HALVINGS
+    usable = halvings <= EXPONENTIAL_HALVINGS
     # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
     for row in range(margins):
         for j in range(nz):
@@ -597,21 +599,21 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
 
 @part
 def _exponential(m, h, halvings, out, power, scratch):
-    """Sum exp(m h / 2^halvings), squared as often; False where ORDER terms are too few for an element."""
+    """Sum exp(m h / 2^halvings), squared as often; False where so many terms are too few for an element."""
     nz = m.shape[0]
     step = h / 2.0**halvings
     for i in range(nz):
         for j in range(nz):
             out[i, j] = power[i, j] = 1.0 if i == j else 0.0
     small = False
-    for k in range(1, ORDER + 1):
+    for k in range(1, EXPONENTIAL_TERMS + 1):
         small = True
         multiply(m, power, scratch)
         for i in range(nz):
             for j in range(nz):
                 power[i, j] = scratch[i, j] * step / k
                 out[i, j] += power[i, j]
-                small = small and abs(power[i, j]) <= 1e-3 * EPS * abs(out[i, j])
+                small = small and abs(power[i, j]) <= EXPONENTIAL_SHARE * EPS * abs(out[i, j])
         if small:
             break
     for _ in range(halvings):

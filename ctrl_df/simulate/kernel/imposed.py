@@ -20,12 +20,18 @@ from ..compiler.compiled import njit, part
 from ..compiler.views import lean
 from ..program.imposed import ASKING, CONTACT, FORCE, FRICTION
 from ..program.pointers import call_asking, call_force, call_friction, call_presliding
-
-NUDGE = 1e-7  # relative step of differences by a state: a third of the digits
-ALONG = 1e-6  # the same by time, over the piece
-LEAST = 1e-10  # shortest step, over the piece
-BALANCED = 60  # secant steps for friction that grows with the force carried: two where laws are linear
-EVEN = 1e-13  # of the force: where that balance is found
+from ..thresholds import (
+    BALANCED,
+    BLIND,
+    EVEN,
+    IMPOSED_ALONG,
+    IMPOSED_LEAST,
+    IMPOSED_NUDGE,
+    IMPOSED_SHRINK,
+    NONE,
+    STEP_GROWTH,
+    STEP_SAFETY,
+)
 
 Laws = namedtuple("Laws", "table par mass span asked presliding")
 """What answers: laws as `program.imposed` lays them out, parameters, mass, walls, of one row."""
@@ -142,14 +148,14 @@ def _linearize(laws, motion, node, s, z, largest, work):
     """Write the rates, their derivatives by the states and along the motion, at the share s of a piece."""
     h, n = motion[node, 0] - motion[node - 1, 0], z.shape[0]
     _rates(laws, motion, node, s, z, work.f0)
-    ahead = ALONG if s < 0.5 else -ALONG
+    ahead = IMPOSED_ALONG if s < 0.5 else -IMPOSED_ALONG
     _rates(laws, motion, node, s + ahead, z, work.ft)
     for i in range(n):
         work.ft[i] = (work.ft[i] - work.f0[i]) / (ahead * h)
     for j in range(n):
         for i in range(n):
             work.moved[i] = z[i]
-        reach = NUDGE * max(abs(z[j]), largest[j], abs(h * work.f0[j]), 1e-30)
+        reach = IMPOSED_NUDGE * max(abs(z[j]), largest[j], abs(h * work.f0[j]), BLIND)
         work.moved[j] = z[j] + reach
         _rates(laws, motion, node, s, work.moved, work.f)
         for i in range(n):
@@ -199,17 +205,19 @@ def _across(laws, motion, node, z, largest, rtol, pace, work):
             _try(laws, motion, node, s, step, z, work)
             error = 0.0
             for i in range(n):
-                size = max(largest[i], abs(work.moved[i]), abs(step * h * work.f0[i]), 1e-290)
+                size = max(largest[i], abs(work.moved[i]), abs(step * h * work.f0[i]), NONE)
                 off = abs(work.k[3, i]) / (rtol * size)
                 error = off if not off <= error else error
             # the estimate is of order 2
-            factor = min(max(0.9 * error ** (-1.0 / 3.0), 0.1), 5.0) if error > 0.0 else 5.0
+            factor = STEP_GROWTH
+            if error > 0.0:
+                factor = min(max(STEP_SAFETY * error ** (-1.0 / 3.0), IMPOSED_SHRINK), STEP_GROWTH)
             if not factor > 0.0:  # NaN: shorter
-                factor = 0.1
+                factor = IMPOSED_SHRINK
             if error <= 1.0:
                 break
             pace = factor * step * h
-            if step < LEAST:
+            if step < IMPOSED_LEAST:
                 return 0.0
         for i in range(n):
             z[i] = work.moved[i]

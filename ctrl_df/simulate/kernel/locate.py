@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..compiler.compiled import part
 from ..dynamics.flow import input_rates, rates
 from ..dynamics.mechanics import closed, dry_level_at
@@ -42,9 +40,20 @@ from ..program.layout import (
     G,
     X,
 )
+from ..thresholds import (
+    BUMP_REACH,
+    GRAIN,
+    LOOKS,
+    LOOKS_POWER,
+    REACH,
+    RESOLUTION,
+    ROOT,
+    ROOT_STEPS,
+    ROUNDED,
+    TOUCH_HALVINGS,
+)
 from .stepper import inside
 
-GRAIN = 4.0 * np.finfo(float).eps
 NOW, FIRST, SECOND, QUANTITY = range(4)  # rows of the scales of margins, see `renewed`
 
 
@@ -85,7 +94,7 @@ def tolerances(prog, x, mode, scale, gtol):
     last digits make of it is no crossing. `scale` as in `renewed`.
     """
     for i in range(gtol.shape[0]):
-        gtol[i] = 1e-12 * scale[NOW, i] + GRAIN * scale[int(scale[QUANTITY, i]), i]
+        gtol[i] = ROUNDED * scale[NOW, i] + GRAIN * scale[int(scale[QUANTITY, i]), i]
     for n in range(prog.nodes.shape[0]):
         kind, first, go, po = prog.nodes[n, KIND], prog.nodes[n, X], prog.nodes[n, G], prog.nodes[n, PAR]
         if kind == MECHANISM:
@@ -145,7 +154,7 @@ def renewed(prog, mode, scale, node):
 def bump_share(prog, x, x1):
     """Share of the way from x to x1 that a step may take near a narrow feature of friction over speed.
 
-    A Stribeck bump lies within about six of its speeds vs (exp(-36) is below rounding). There a step may
+    A Stribeck bump lies within `BUMP_REACH` of its speeds vs. There a step may
     change the speed by vs, or by half: no stage of it can then miss the bump, and the error estimate sees it.
     """
     share = 1.0
@@ -156,7 +165,7 @@ def bump_share(prog, x, x1):
             narrow = prog.par[prog.nodes[n, PAR] + P_BUMP0 + b]
             at = prog.nodes[n, X] + 2 * b + 1
             v0, v1 = x[at], x1[at]
-            passes = v0 * v1 < 0.0 or min(abs(v0), abs(v1)) < 6.0 * narrow
+            passes = v0 * v1 < 0.0 or min(abs(v0), abs(v1)) < BUMP_REACH * narrow
             if narrow < math.inf and passes and v1 != v0:
                 share = min(share, max(0.5 * abs(v0), narrow) / abs(v1 - v0))
     return share
@@ -207,13 +216,13 @@ def locate_event(
     The inner stages of a step are crude; what they suspect is confirmed on the interpolant. `g` holds the
     margins at the end of the step, before and after.
     """
-    reach = 1e-4 * length
+    reach = REACH * length
     left, right = 0.0, -1.0
     value_right, at = worst(g, gtol, scale, blocked)
     value_left = 1.0
     end_value, end_at = value_right, at
     # a margin may go below zero and come back before it goes again: look from the left
-    pieces = 4 if 0 < terms <= 4 else 12
+    pieces = LOOKS_POWER if 0 < terms <= 4 else LOOKS
     before = math.inf  # value one piece before the left end
     for p in range(1, pieces + 1):
         theta = p / pieces
@@ -273,7 +282,7 @@ def locate_event(
         return 0.0, at
     if left == 0.0:
         # a flight or slip that began at this very point: its margin rises from zero before it falls
-        for _halving in range(50):
+        for _halving in range(TOUCH_HALVINGS):
             theta = 0.5 * right
             inside(terms, theta, x, poly, xi)
             margins(
@@ -297,9 +306,9 @@ def locate_event(
                 break
             right, value_right, at = theta, value, index
     weight_left, weight_right, side = value_left, value_right, 0
-    for iteration in range(100):
+    for iteration in range(ROOT_STEPS):
         width = right - left
-        if width * length <= 2e-16 * max(abs(t), length) or width < 1e-15 or value_right > -1e-15:
+        if width * length <= RESOLUTION * max(abs(t), length) or width < ROOT or value_right > -ROOT:
             break
         # Illinois: a secant that cannot hang on one side, with a bisection now and then
         theta = left + width * weight_left / (weight_left - weight_right)

@@ -18,17 +18,13 @@ from ..compiler.compiled import njit, part
 from ..compiler.native import call_native
 from ..compiler.views import cut, lean
 from ..program.layout import H_NG, Drive, Program
+from ..thresholds import EVENTS, LOGS, MOST_OUTPUTS, STEPS_AT_ONCE, steps_at_once
 from . import driver
 from .pace import keep_pace
 from .space import space_at, workspace
 
 NOT_BEGUN, UNFINISHED = -1, -2
 """Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
-
-EVENTS = 256  # of one run, logged before its log is emptied
-_LOGS = 16  # runs' logs that are kept until Python takes them
-_FEW_STEPS = 10_000  # of a small system between two looks whether to stop
-_MOST_OUTPUTS = 100_000  # recorded between two looks whether to stop
 
 
 class Drives(NamedTuple):
@@ -107,14 +103,14 @@ def make_desk(engine, states: np.ndarray, keep: bool, logged: bool, stop: np.nda
     n, ng = engine.nstates, int(program.ints[H_NG]) + 1
     space = workspace(program, delays=True)
     keep_pace(program, space)
-    room = _LOGS * EVENTS if logged else 1
+    room = LOGS * EVENTS if logged else 1
     log_t, log_n, log_k, log_row = (np.zeros(room, kind) for kind in (float, np.int64, np.int64, np.int64))
     scale, before = np.zeros((4, ng)), np.zeros(n)
     spectrum = np.zeros((engine.noutputs, 0), complex)
     return Desk(
         driver.address(), program.nodes, program.ints, space.at, space.words, scale, before, spectrum, states,
         int(keep),
-        log_t, log_n, log_k, log_row, np.array([0, -1]), max(int(_FEW_STEPS / (1 + (n / 6) ** 2)), 10), stop,
+        log_t, log_n, log_k, log_row, np.array([0, -1]), steps_at_once(STEPS_AT_ONCE, n), stop,
     )  # fmt: skip
 
 
@@ -170,8 +166,8 @@ def _one(desk, rows, drives, par, how, row):
                 rows.reason[row] = UNFINISHED
             return False
         until = rows.end[row]
-        if times.shape[0] - int(clock[1]) > _MOST_OUTPUTS:
-            until = min(until, times[int(clock[1]) + _MOST_OUTPUTS])
+        if times.shape[0] - int(clock[1]) > MOST_OUTPUTS:
+            until = min(until, times[int(clock[1]) + MOST_OUTPUTS])
         budget = min(rows.max_steps[row] - int(clock[3]), desk.chunk)
         reason = call_native(
             desk.run,

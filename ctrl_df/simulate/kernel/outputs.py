@@ -13,9 +13,10 @@ from ..dynamics import history
 from ..dynamics.flow import combine, external, node_input, refresh, signals
 from ..dynamics.modes import advance_state, answers_at_once, hold, settle
 from ..program.layout import DELAY, FEED, H_DELAYS, H_NS, H_NY, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
+from ..thresholds import GAUSS, TICK
 from .stepper import inside
 
-NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(10))
+NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(GAUSS))
 NODES = NODES + 0.5
 
 
@@ -26,7 +27,7 @@ def next_sample(prog, t):
     for n in range(prog.nodes.shape[0]):
         if prog.nodes[n, KIND] == SAMPLED:
             dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
-            nearest = min(nearest, (math.floor(t / dt + 1e-6) + 1.0) * dt)
+            nearest = min(nearest, (math.floor(t / dt + TICK) + 1.0) * dt)
     return nearest
 
 
@@ -71,7 +72,7 @@ def tick(prog, drive, segment, t, x, mode, work, dx):
 def _ticks(prog, n, t):
     """Whether a tick of this sampled node falls on `t`."""
     dt = prog.par[prog.nodes[n, PAR] + _sampled_size(prog, n)]
-    return abs(t / dt - round(t / dt)) < 1e-6
+    return abs(t / dt - round(t / dt)) < TICK
 
 
 @part

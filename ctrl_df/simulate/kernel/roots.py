@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 
 from ..compiler.compiled import part
+from ..thresholds import BOTTOM_HALVINGS, ROOT, ROOT_STEPS, SERIES_LOOKS, TOUCH_HALVINGS
 
 
 @part
@@ -22,7 +23,7 @@ def value_slope(curve, terms, theta):
 @part
 def first_root(curve, terms, upto, scale):
     """First passage of a power series below zero within [0, upto]; 2.0 where there is none."""
-    pieces = 8
+    pieces = SERIES_LOOKS
     left, value, slope = 0.0, curve[0], curve[1]
     if value < 0.0:
         return 0.0
@@ -38,14 +39,14 @@ def first_root(curve, terms, upto, scale):
             if p == 1:
                 # a flight or slip that begins here: the margin rises from zero, or from its last digits,
                 # before it falls
-                for _halving in range(50):
+                for _halving in range(TOUCH_HALVINGS):
                     middle = 0.5 * right
                     value_middle, _slope = value_slope(curve, terms, middle)
                     if value_middle >= 0.0:
                         left, value = middle, value_middle
                         break
                     right, value_right = middle, value_middle
-                if left == 0.0 and slope <= 0.0 and value <= 1e-15 * scale:
+                if left == 0.0 and slope <= 0.0 and value <= ROOT * scale:
                     return 0.0
             return _refine(curve, terms, left, value, right, value_right, scale)
         left, value, slope = right, value_right, slope_right
@@ -56,7 +57,7 @@ def first_root(curve, terms, upto, scale):
 def _bottom(curve, terms, left, right):
     """Lowest point of a series between a falling and a rising end, by bisection of its slope."""
     best, lowest = left, math.inf
-    for _i in range(40):
+    for _i in range(BOTTOM_HALVINGS):
         middle = 0.5 * (left + right)
         value, slope = value_slope(curve, terms, middle)
         if value < lowest:
@@ -74,16 +75,16 @@ def _bottom(curve, terms, left, right):
 def _refine(curve, terms, left, value, right, value_right, scale):
     """Right end of the root between a value >= 0 on the left and one < 0 on the right: Newton kept inside."""
     theta = left + (right - left) * value / (value - value_right)
-    for iteration in range(100):
+    for iteration in range(ROOT_STEPS):
         now, slope = value_slope(curve, terms, theta)
         if now < 0.0:
             right, value_right = theta, now
         else:
             left = theta
-        if right - left < 1e-15 or value_right > -1e-15 * scale:
+        if right - left < ROOT or value_right > -ROOT * scale:
             break
         # a little to the right of the root, so that it is met from beyond
-        step = theta - (now + 0.5e-15 * scale) / slope if slope < 0.0 else left
+        step = theta - (now + 0.5 * ROOT * scale) / slope if slope < 0.0 else left
         if not left < step < right or iteration % 8 == 7:
             step = 0.5 * (left + right)
         theta = step

@@ -22,9 +22,11 @@ from ..program.layout import (
     Y_SIZE,
     G,
 )
+from ..thresholds import TERMS
 from .affine import Memory, memory
 from .exponential import Bend, bend_memory
 from .glide import Glide, glide_memory
+from .stepper import STAGES
 
 _NONE = np.zeros(0, np.int64)
 LAYOUT = Layout()
@@ -82,8 +84,8 @@ def workspace(prog, delays: bool = False):
     x1, xi, dx, size, grain = (np.zeros(n) for _ in range(5))
     store = memory(prog)
     space = Space(
-        work, np.zeros((16, n)), np.zeros((20, n)), x1, xi, dx, size, grain, g, g0, gtol, lowest, norm, owner,
-        np.zeros(3), store, glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])),
+        work, np.zeros((STAGES, n)), np.zeros((TERMS, n)), x1, xi, dx, size, grain, g, g0, gtol, lowest, norm,
+        owner, np.zeros(3), store, glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])),
         bend_memory(store), np.zeros(1, np.int64), np.zeros(5), _NONE, 0,
     )  # fmt: skip
     words = LAYOUT.pack(space)

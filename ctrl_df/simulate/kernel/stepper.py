@@ -19,6 +19,7 @@ from ..compiler.views import lean
 from ..dynamics.flow import node_input, rates
 from ..dynamics.mechanics import dry_level
 from ..program.layout import A_BODIES, AUX, KIND, LTI, MECHANISM, NIN, NX, P_M0, PAR, X
+from ..thresholds import GRAIN_NUDGE, LAST_BASIS, LOW_ORDER, RATE_GRAIN, ROUGH
 
 A8, C8 = np.vstack([DOP853.A[:12, :12], DOP853.B]), np.append(DOP853.C[:12], 1.0)
 E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
@@ -30,10 +31,7 @@ E5_5, P5 = RK45.E.copy(), RK45.P.copy()
 A3, C3 = np.zeros((4, 3)), np.append(RK23.C, 1.0)
 A3[:3, :3], A3[3] = RK23.A, RK23.B
 E3_3, P3 = RK23.E.copy(), RK23.P.copy()
-# share of the interpolant's last term that stands for its error
-ROUGH = 0.1
-GRAIN = 32.0 * np.finfo(float).eps  # the weights of error estimates add up to some ten
-NUDGE = 1e-4  # of the difference quotients of `grains`, relative to the size of a state
+MAIN, STAGES = len(C8), len(C8X)  # of order 8: of a step, with those of its interpolant
 
 
 @part
@@ -87,24 +85,24 @@ def grains(prog, drive, segment, t, h, x, mode, work, k0, size, trial, dx, g, gr
                 held = dry_level(prog, node, b, 0.0, 1.0, 0.0, work[1]) + dry_level(
                     prog, node, b, 0.0, -1.0, 0.0, work[1]
                 )
-                grain[first + 2 * b + 1] = GRAIN * (force + held) / prog.par[po + P_M0 + b]
+                grain[first + 2 * b + 1] = RATE_GRAIN * (force + held) / prog.par[po + P_M0 + b]
         elif kind == LTI:
             nx, ni = prog.nodes[node, NX], prog.nodes[node, NIN]
             for k in range(ni):
-                value = GRAIN * abs(node_input(prog, node, k, w))
+                value = RATE_GRAIN * abs(node_input(prog, node, k, w))
                 for i in range(nx):
                     grain[first + i] += value * abs(prog.par[po + nx * nx + i * ni + k])
     for j in range(n):
-        reach = size[j] + h * grain[j] / GRAIN
+        reach = size[j] + h * grain[j] / RATE_GRAIN
         if reach == 0.0:
             continue
-        trial[j] = x[j] + NUDGE * reach
+        trial[j] = x[j] + GRAIN_NUDGE * reach
         rates(prog, drive, segment, t, trial, mode, work, dx, g, False)
         trial[j] = x[j]
         for i in range(n):
-            term = abs(dx[i] - k0[i]) / NUDGE
+            term = abs(dx[i] - k0[i]) / GRAIN_NUDGE
             if term < math.inf:
-                grain[i] += GRAIN * term
+                grain[i] += RATE_GRAIN * term
 
 
 @part
@@ -119,14 +117,14 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
     error = 0.0
     if order == 8:
         stages(
-            prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A8), lean(C8), 1, 13, want_g,
+            prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A8), lean(C8), 1, MAIN, want_g,
             want_g,
         )  # fmt: skip
         e3 = e5 = 0.0
         for j in range(n):
-            scale = atol + h * grain[j] + rtol * measure(j, 13, h, k, x1, size)
+            scale = atol + h * grain[j] + rtol * measure(j, MAIN, h, k, x1, size)
             v3 = v5 = 0.0
-            for m in range(13):
+            for m in range(MAIN):
                 v3 += E3[m] * k[m, j]
                 v5 += E5[m] * k[m, j]
             if scale == 0.0:
@@ -137,7 +135,7 @@ def step(order, prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, siz
             e5 += (v5 / scale) ** 2
         if e3 == 0.0 and e5 == 0.0:
             return 0.0
-        return abs(h) * e5 / np.sqrt((e5 + 0.01 * e3) * n)
+        return abs(h) * e5 / np.sqrt((e5 + LOW_ORDER * e3) * n)
     if order == 5:
         stages(
             prog, drive, segment, t, h, x, mode, work, k, g, lowest, x1, lean(A5), lean(C5), 1, 7, False,
@@ -181,8 +179,8 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
         poly[7],
         lean(A8X),
         lean(C8X),
-        13,
-        16,
+        MAIN,
+        STAGES,
         False,
         False,
     )
@@ -193,7 +191,7 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
         poly[2, j] = 2.0 * delta - h * (k[12, j] + k[0, j])
         for i in range(4):
             value = 0.0
-            for m in range(16):
+            for m in range(STAGES):
                 value += D8[i, m] * k[m, j]
             poly[3 + i, j] = h * value
 
@@ -206,10 +204,9 @@ def roughness(size, grain, h, rtol, atol, poly):
     """
     worst = 0.0
     for j in range(size.shape[0]):
-        # 0.0084 is the largest value of the last basis function, theta^4 (1 - theta)^3
         scale = atol + h * grain[j] + rtol * max(size[j], abs(poly[0, j]))
         if scale > 0.0:
-            worst = max(worst, 0.0084 * abs(poly[6, j]) / scale)
+            worst = max(worst, LAST_BASIS * abs(poly[6, j]) / scale)
     return ROUGH * worst
 
 

@@ -7,16 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...column import spread
+from ..thresholds import WIDEST_AFFINE, WIDEST_CURVED
 from . import layout as L
 from .layout import Program
 
 if TYPE_CHECKING:
     from .flatten import Flat
-
-WIDEST_AFFINE = 24
-"""States up to which a product with a full matrix is cheaper than the rates themselves."""
-WIDEST_CURVED = 10
-"""The same where curved laws stand beside: a step then takes several such products."""
 
 
 def pack(flat: Flat, nx: int) -> tuple[Program, np.ndarray, np.ndarray, list[str]]:

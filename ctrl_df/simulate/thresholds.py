@@ -1,0 +1,307 @@
+"""Every tuned number of the engine, with what it follows from, or what chose it.
+
+eps is 2.2e-16. A number that names no derivation bounds work or memory and
+changes no result, or is the choice of the textbook named: Hairer, Norsett & Wanner, Solving Ordinary
+Differential Equations I (HNW). What a method is made of (its tableau, the terms of a formula) stands beside
+it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# --- rounding ---------------------------------------------------------------------------------------
+
+EPS = np.finfo(float).eps
+"""Spacing of floats at one."""
+
+GRAIN = 4.0 * EPS
+"""Error of a difference of two numbers that are rounded themselves, over their size: a few half eps."""
+
+RATE_GRAIN = 32.0 * EPS
+"""Error that rounding of a rate leaves in the error estimate of a step, over the rate's largest term: the
+weights of the estimates add up to some ten."""
+
+SAME = 1e-15
+"""Relative difference of two instants that only rounding parts: five eps."""
+
+RESOLUTION = 2e-16
+"""Relative resolution of time, an eps: an event is located no finer."""
+
+ROOT = 1e-15
+"""Share of a step, and of the size of a margin, to which a root is found: five eps."""
+
+ROUNDED = 1e-12
+"""Relative error of a sum of many rounded terms: five thousand eps. A margin, a jump, the rest of a stretch
+that is smaller is zero."""
+
+SHORTEST = 1e-12
+"""Share of the span of a run: no step or stretch between events shorter than that is progress."""
+
+ALGEBRAIC = 1e-12
+"""Determinant of a loop of gains, equal to one without any, below which inputs are wired to themselves."""
+
+TICK = 1e-6
+"""Share of a period within which an instant is a tick: rounding of a billion periods stays below."""
+
+# --- steps ------------------------------------------------------------------------------------------
+
+RTOL = 1e-9
+"""Default relative tolerance of a step: differences of runs by a millionth still have three digits."""
+
+RTOL_RANGE = (1e-14, 0.1)
+"""Tolerances that may be asked for: rounding leaves fifty eps."""
+
+MAX_STEPS = 20_000_000
+"""Steps of a run at most: minutes of work."""
+
+FAR = 1e50
+"""State beyond which a system has run away: NaN is then no mistake of a law."""
+
+STEP_SAFETY, STEP_SHRINK, STEP_GROWTH = 0.9, 0.2, 5.0
+"""Share of the step that an error would just allow; least, largest change from step to step (HNW, II.4)."""
+
+GROWS_8, GROWS_5 = 1e-6, 1e-4
+"""Error below which a step of order 8 or 5 grows as far as it may, (`STEP_SAFETY` / `STEP_GROWTH`)^order:
+no root need be taken."""
+
+STEP_KEPT = 0.3
+"""Least change after a step that was right, at its end at least."""
+
+LOST = 0.1
+"""Share of the shortest step below which rates that are not finite are taken for NaN."""
+
+FIRST_CHANGE = 0.01
+"""Change of some state, over itself, in a first step: the guess of HNW, II.4, for any order."""
+
+FIRST_LEAST, FIRST_BLIND = 1e-9, 1e-6
+"""Share of the span ahead that a first step takes at least, and where all states are zero: fourteen
+steps, each five times the last, lead from it to any length."""
+
+FADING = 0.98
+"""What is left of a state's size after a step: over fifty steps, more than a swing takes, tolerances do not
+tighten while a state passes zero."""
+
+DENSE = 1e-3
+"""Error of a step, times its tolerance, below which a lower order is tried."""
+
+PATIENCE = 40
+"""Steps before a lower order that failed is tried again: a failure costs one, a fortieth."""
+
+GRAINS = 200
+"""Steps after which rounding is asked anew: as many rates as states a time, half a percent of the work."""
+
+GRAIN_NUDGE = 1e-4
+"""Of the difference quotients that ask for rounding, over the size of a state: only magnitudes count."""
+
+REACH = 1e-4
+"""Share of a step over which rates of inputs are differenced: they do not bend in it, and rounding leaves
+them eight digits."""
+
+ROUGH = 0.1
+"""Share of the interpolant's last term that stands for its error."""
+
+LAST_BASIS = 0.0084
+"""Largest value of that term's basis function, theta^4 (1 - theta)^3, at theta = 4/7."""
+
+LOW_ORDER = 0.01
+"""Weight of the error of order 3 beside that of order 5 in Dormand and Prince's 8(5,3) pair (HNW, II.5)."""
+
+SERIES_REACH = 2.5
+"""Angle [rad] of the forcing's highest harmonic in a step of `TERMS` terms, the last 2.5^20/20! = 4e-11."""
+
+GAUSS = 10
+"""Nodes of the Gauss quadrature with which outputs are integrated over a step."""
+
+GAUSS_REACH, GAUSS_REACH_AFFINE = 10.0, 6.0
+"""Angle [rad] of the highest harmonic between these: L^21 (10!)^4 / (21 (20!)^3) is 6e-10, and 1e-14 where
+the states themselves are exact."""
+
+# --- events -----------------------------------------------------------------------------------------
+
+HEIGHT = 1e-10
+"""Relative flight below which a bounce has ended, unless the tolerance is larger."""
+
+SETTLING = 50
+"""Rounds of settling modes: each one changes a mode, and few loops have as many; more is sliding."""
+
+ZENO = 2000
+"""Events without progress after which a run slides: chatter ends after `HEIGHT` = eps^n within 1,200 bounces
+at a restitution of 0.98."""
+
+UNSETTLED = 100
+"""Events that modes which do not settle count for: twenty such in a row are sliding."""
+
+PROGRESS = 1e-9
+"""Relative time between events that is progress."""
+
+MARGIN_GROWTH = 100.0
+"""By how much a margin that rounding crossed counts as larger: six such widen its tolerance to all of it."""
+
+AFTER_EVENT, RESTART = 3.0, 1e-14
+"""Step after an event over the way to it, and over the time: a step cut short says little of what follows."""
+
+BUMP_REACH = 6.0
+"""Speeds of a narrow feature of friction beyond which it is gone: exp(-36) is below rounding."""
+
+BUMP_KEPT = 0.7
+"""Share of a step that such a feature may take away before it is made anew: what is asked is a change of
+speed by half, what is caught one by 0.7."""
+
+LOOKS_POWER, LOOKS = 4, 12
+"""Pieces of a step in which crossings are looked for: of a series of up to four terms, whose margins turn
+thrice at most, and of one of order 7."""
+
+SERIES_LOOKS = 8
+"""The same of the series of affine modes, which are looked at with their slopes."""
+
+TOUCH_HALVINGS = 50
+"""Halvings toward the begin of a step, where a margin rises from zero before it falls: to 2^-50, four eps."""
+
+BOTTOM_HALVINGS = 40
+"""Halvings toward the bottom of a margin, which is flat there: to 2^-40."""
+
+ROOT_STEPS = 100
+"""Steps to a root at most: every fifth or eighth halves, and fifty halvings are all there is."""
+
+PROBED = (0.0, 1.0, 10.0)
+"""Sizes of random inputs by which a system's output is asked whether it reads them."""
+
+# --- affine modes and series ------------------------------------------------------------------------
+
+TERMS = 20
+"""Terms of the series of an affine flow: at 1e-9 a step may turn by 2.3 rad, where the last one is 1e-11."""
+
+SLOTS = 16
+"""Modes whose matrices are kept."""
+
+HARMONICS = 32
+"""Harmonics of a periodic input that affine steps take."""
+
+UNIT = 2.0**200
+"""Size of the inputs and states that probe linear maps: what is constant beside them vanishes, and nothing is
+rounded."""
+
+AFFINE_SHARE = 0.01
+"""Share of the tolerance that the neglected terms may have: beside the events they cost nothing."""
+
+FORCING_SHARE = 1e-3
+"""The same of the terms of the forcing, of which there are many."""
+
+WIDEST_AFFINE, WIDEST_CURVED = 24, 10
+"""States up to which a product with a full matrix is cheaper than the rates themselves; and where curved laws
+stand beside, whose steps take several such products."""
+
+EXPONENTIAL_TERMS = 16
+"""Terms of an exponential's series: after a turn of half a radian the last is 0.5^16/16! = 7e-19; a step that
+turns further is halved."""
+
+EXPONENTIAL_HALVINGS, CURVED_HALVINGS = 12, 40
+"""Halvings of a step at most before its exponential is summed: a mode that needs more is left to other steps;
+and where stiff laws decay within the step."""
+
+EXPONENTIAL_SHARE, CURVED_SHARE = 1e-3, 0.1
+"""Share of an eps at which its series ends: twelve squarings make four eps of it; and where steps
+double one by one."""
+
+AHEAD = 1.5
+"""Steps ahead of which kinks on their way out of a delay are looked for."""
+
+# --- steps at a pace --------------------------------------------------------------------------------
+
+NEAR = 1e-3
+"""Times the tolerance: how far a step may be from a known length, relative to it."""
+
+ALIKE = 1e-6
+"""Relative difference of two steps below which they count as the same length."""
+
+PACED_SHARE = 0.1
+"""Share of a step's tolerance that one between samples may have: many of them stand for one."""
+
+STIFF, MILD = 0.05, 0.003
+"""Contraction h |dR/dx| of a sweep beyond which K is renewed where steps fail, once K is not zero even where
+they are right: what is left of a change after a node is that share of it."""
+
+MORE_NODES = 0.25
+"""Share of the error that is left by more nodes, above which still more are of no use: a third of the terms
+of a series that converges leaves less."""
+
+RANK_PATIENCE = 20
+"""Steps of the higher rank before the lower one is tried again."""
+
+CURVED_NUDGE = 1e-6
+"""Of difference quotients of the curved laws, over the size of a state: K need not be exact."""
+
+PACE_WAIT = 3
+"""Steps at most until constant propagators are tried again."""
+
+# --- forces under an imposed motion -----------------------------------------------------------------
+
+IMPOSED_RTOL = 1e-7
+"""Relative tolerance of hidden states: forces are then right to about six digits."""
+
+IMPOSED_NUDGE, IMPOSED_ALONG = 1e-7, 1e-6
+"""Differences by a state, over its size, a bit more than the root of eps; by time, over the piece."""
+
+IMPOSED_LEAST = 1e-10
+"""Shortest step, over the piece."""
+
+IMPOSED_SHRINK = 0.1
+"""Least change of a step: a bristle's rate may grow tenfold from one to the next."""
+
+BALANCED, EVEN = 60, 1e-13
+"""Secant steps for friction that grows with the force carried (two where laws are linear), and share of the
+force to which that balance is found."""
+
+BLIND, NONE = 1e-30, 1e-290
+"""Size of a state that has never been any: for differences, and as what errors are divided by."""
+
+TURN_INSIDE = 1e-9
+"""Share of a piece within which a reversal is one of its ends."""
+
+PLACE_GRAIN = 1e-14
+"""Motion, over the largest place, that rounding alone makes: fifty eps."""
+
+# --- machine code -----------------------------------------------------------------------------------
+
+SPEED, INLINED = 2, 100
+"""LLVM's level (1 makes the steps of Runge-Kutta methods half as fast, 3 nothing faster), and the size up to
+which functions are copied into others (larger ones are no faster for it)."""
+
+# --- work and memory --------------------------------------------------------------------------------
+
+CHUNK_TIME, CHUNK_LEAST, CHUNK_CHANGE = 0.2, 1e-6, (0.05, 4.0)
+"""Time [s] that compiled code may run before Python looks whether Ctrl-C was pressed; shortest time that a
+clock tells; least and largest change of the number of steps in it."""
+
+STEPS_AT_ONCE, STEPS_AT_ONCE_MANY = 10_000, 100_000
+"""Steps of a small system until the pace is known, and where many runs or strides are made in one call."""
+
+SMALL, FEWEST_STEPS = 6, 10
+"""States of a small system: twice as many take four times as long; steps at once at least."""
+
+MOST_OUTPUTS = 100_000
+"""Outputs recorded in one go."""
+
+EVENTS, LOGS = 256, 16
+"""Events of one run of many that are logged before its log is emptied; logs kept until Python takes them."""
+
+LOG = 4096
+"""Events of a single run between two returns to Python."""
+
+TOGETHER_RUNS, TOGETHER_STRIDES, SPLITS = 256, 64, 64
+"""Runs, strides in one call; kinds of systems in a batch, beyond which they are packed one by one."""
+
+STRIDE_STEPS, STRIDE_PEEKS = 400_000, 129
+"""Steps of a stride at most; points in it, thirty a passage, from which the peak of an output is read."""
+
+LARGEST = 2 << 30
+"""Memory [bytes] of the outputs and states of a batch."""
+
+SHOWN = 10
+"""Events that a notebook shows."""
+
+
+def steps_at_once(small: int, states: int) -> int:
+    """Return how many steps take as long as `small` steps of a small system."""
+    return max(int(small / (1 + (states / SMALL) ** 2)), FEWEST_STEPS)
