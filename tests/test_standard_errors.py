@@ -35,10 +35,9 @@ def test_two_errors_of_a_regression_hold_the_truth(noise, least):
     rng = np.random.default_rng(1)
     t = np.arange(N) / N
     lines = (2, 3, 5, 8, 13, 21, 40)
+    phases = rng.uniform(0, 6, (2, 7))
     waves = [
-        sum(
-            np.sin(2 * np.pi * k * t + p) / k**slope for k, p in zip(lines, rng.uniform(0, 6, 7), strict=True)
-        )
+        sum(np.sin(2 * np.pi * k * t + p) / k**slope for k, p in zip(lines, phases[slope], strict=True))
         for slope in (0, 1)
     ]
     q, _ = np.linalg.qr(np.column_stack([np.ones(N), t, *waves]))

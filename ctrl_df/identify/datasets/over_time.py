@@ -6,7 +6,8 @@ from types import MappingProxyType
 
 from ..arguments import check_window
 from ..estimation.fit import segment_lengths
-from ..estimation.multiple_shooting import Problem
+from ..estimation.multiple_shooting import Stage
+from ..estimation.problem import Problem
 from ..estimation.refit_records import blurred, doubts, refit_records
 from ..estimation.states import find_states
 from ..planning.inputs import input_that_separates
@@ -16,7 +17,7 @@ from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
-from ..thresholds import RESTARTS_KEPT, RTOL
+from ..thresholds import RESTARTS_KEPT
 from .dataset import Dataset, Estimate
 
 
@@ -41,7 +42,7 @@ class TimeDataset(Dataset):
         lengths = segment_lengths(model, self.records, mode, window)
         problem = Problem(model, self.records, (), 10_000, followed=RESTARTS_KEPT)
         cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
-        return self._comparison(model, cut, find_states(problem, cut, 1, RTOL))
+        return self._comparison(model, cut, find_states(Stage(problem, cut, 1)))
 
     def _comparison(self, model, segments, starts, fitted: int = 0) -> Comparison:
         """Return the comparison of a model whose initial states in each segment are known already."""

@@ -8,12 +8,12 @@ import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from ..thresholds import MANY_SEGMENTS
-from .multiple_shooting import Problem
+from .multiple_shooting import Solution, Stage
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
 
 
-def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
+def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity):
     """Return the covariance of the scaled parameters and the directions the data do not determine.
 
     The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
@@ -32,9 +32,10 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     ----------
     Ljung (1999), sec. 9.4; Newey & West (1987); Satterthwaite (1946).
     """
-    residual = problem.last
+    assert found.slopes is not None
+    problem, residual = stage.problem, found.residual
     ones = [np.ones(len(r)) for r in residual]
-    h, _, _ = problem.normal(jp, js, residual, ones, problem.nuisance)
+    h, _, _ = stage.normal(*found.slopes, residual, ones, found.states)
     size = np.sqrt(np.maximum(np.diag(h), 1e-300))
     size[size <= 1e-9 * max(float(size.max()), 1e-300)] = 1.0
     eigen, vectors = np.linalg.eigh(h / np.outer(size, size))
@@ -48,7 +49,7 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     inverse = root @ root.T
     middle, variances = np.zeros_like(h), [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):
-        e, columns, segments = problem.weighed(k, e), sensitivity.parameters[k], problem.segments[k]
+        e, columns, segments = stage.weighed(k, e), sensitivity.parameters[k], stage.segments[k]
         if problem.error_filter is None and len(segments) >= MANY_SEGMENTS:
             scores = np.array([columns[w].T @ e[w] for w in segments.places])
             middle += _long_run(scores)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,11 @@ from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
 from ..thresholds import RESTARTS_KEPT, RTOL
 from .covariance import covariance_of
-from .multiple_shooting import Problem
+from .multiple_shooting import Solution, Stage
 from .noise_model import NoiseModel
+from .problem import Problem
 from .sensitivity import OutputSensitivity
-from .variables import default_free
+from .variables import default_free, step_of_sensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,14 +208,18 @@ def fit_records(
         coarse = start is None
     if coarse and names and not first.closed:
         for short in _short_segments(first, records, lengths):
-            problem.stage(_cut(records, short), thin)
-            theta = problem.solve(theta, iterations=6, tolerance=0.02, robust=False)
-    problem.stage(_cut(records, lengths), thin if polish else max(thin, 1), starts)
-    theta = problem.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
+            stage = Stage(problem, _cut(records, short), thin)
+            theta = stage.solve(theta, iterations=6, tolerance=0.02, robust=False).theta
+    stage = Stage(problem, _cut(records, lengths), thin if polish else max(thin, 1), starts)
+    found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and thin > 1:
-        problem.stage(problem.segments, 1, problem.nuisance)
-        theta = problem.solve(theta, iterations=polish, tolerance=tolerance, robust=robust)
-    return _candidate(problem, theta, central)
+        stage = Stage(problem, stage.segments, 1, found.states.values)
+        found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
+    if names:
+        # about the solution
+        base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
+        found = replace(found, slopes=stage.jacobian(found.theta, found.states, base, central))
+    return _outcome(stage, found, errors=True)
 
 
 def fit_segments(
@@ -281,14 +286,11 @@ def fit_segments(
         model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about,
         followed,
     )  # fmt: skip
-    problem.stage(list(segments), thin, starts, rtol)
-    theta = problem.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
-    problem.round(theta)
-    if not errors or problem.slopes is None or not names:
-        return _outcome(problem, theta, np.zeros((0, 0)), [])
-    covariance, null = covariance_of(problem, problem.sensitivity(), *problem.slopes)
-    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
-    return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
+    stage = Stage(problem, list(segments), thin, starts, rtol)
+    found = stage.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
+    if step_of_sensor(problem.block) is not None:
+        found = replace(found, residual=stage.rounded(found.theta, found.states.values))
+    return _outcome(stage, found, errors)
 
 
 def _cut(records, lengths) -> list[Segments]:
@@ -321,36 +323,34 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
 # --- the answer -----------------------------------------------------------------------------------
 
 
-def _candidate(problem: Problem, theta, central) -> FitResult:
-    """Return the outcome with covariance, from derivatives about the solution."""
-    if not problem.names:
-        return _outcome(problem, theta, np.zeros((0, 0)), [])
-    base = [m - e for m, e in zip(problem.measured, problem.last, strict=True)]
-    problem.slopes = problem.jacobian(theta, problem.nuisance, base, central)
-    covariance, null = covariance_of(problem, problem.sensitivity(), *problem.slopes)
-    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
-    return _outcome(problem, theta, covariance * np.outer(slopes, slopes), null)
-
-
-def _outcome(problem: Problem, theta, covariance, null) -> FitResult:
+def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
+    """Return the outcome of a fit; `errors`: with covariance, from the derivatives of its last step."""
+    problem, theta, residual = stage.problem, found.theta, found.residual
     values = problem.values(theta) or {}
-    residual = problem.last
-    total, count = problem.power(residual)
-    spread, _ = problem.power([w.centred(y) for w, y in zip(problem.segments, problem.measured, strict=True)])
+    covariance, null, linear = np.zeros((0, 0)), [], None
+    if problem.names and found.slopes is not None:
+        parts = (*found.slopes, stage.segments, stage.precision(found.states), problem.error_filter)
+        linear = partial(OutputSensitivity, *parts)
+        if errors:
+            covariance, null = covariance_of(stage, found, linear())
+            slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
+            covariance = covariance * np.outer(slopes, slopes)
+    total, count = stage.power(residual)
+    spread, _ = stage.power([w.centred(y) for w, y in zip(stage.segments, stage.measured, strict=True)])
     return FitResult(
-        model=problem.simulators[0].with_values(values),
+        model=problem.first.with_values(values),
         names=problem.names,
         values=np.array([values[k] for k in problem.names]),
         covariance=covariance,
         residual=residual,
-        simulated=[m - e for m, e in zip(problem.measured, residual, strict=True)],
+        simulated=[m - e for m, e in zip(stage.measured, residual, strict=True)],
         count=count,
         unit=problem.unit,
         error_filter=problem.error_filter,
         rmse=math.sqrt(total / count),
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
-        converged=problem.converged,
+        converged=found.converged,
         at_bound=tuple(
             bool(
                 v.clip(q + 1e-6) == q
@@ -361,7 +361,7 @@ def _outcome(problem: Problem, theta, covariance, null) -> FitResult:
         ),
         null=null,
         scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
-        starts=problem.nuisance,
-        segments=problem.segments,
-        linear=problem.sensitivity if problem.slopes is not None and problem.names else None,
+        starts=found.states.values,
+        segments=stage.segments,
+        linear=linear,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,10 +11,13 @@ import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
+from ..data.measurement import Measurement
+from ..prediction.segments import facts
 from ..prediction.simulators import simulator_of
+from ..thresholds import HOLDOUT_PARTS, PROCESS_NOISE, SEGMENT_LEAST
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
-from .segmented import short_segment
+from .segmented import prepare
 from .variables import step_of_sensor
 
 
@@ -44,7 +48,7 @@ def refit_records(
     found = min(fits, key=lambda f: f.rmse)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
-        brief = short_segment(found.model, records)
+        brief = _short_segment(found.model, records)
         if brief is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
             settings["window"] = brief
@@ -60,6 +64,25 @@ def refit_records(
     # a model that errs over brief segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
+
+
+def _short_segment(model, records: Sequence[Measurement]) -> float | None:
+    """Return the length [s] of `SegmentedData.short_segments` where disturbance forces prevail; or None.
+
+    Not for models of which something is hidden, nor for records too short to tell.
+    """
+    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST or any(facts(r).imposed for r in records):
+        return None
+    data = prepare(model, records, records)
+    near, disturbed = (
+        data.segmentations[0].fit(model, (), iterations=4, tolerance=2e-2),
+        data.with_process_noise,
+    )
+    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
+        return None
+    segments = disturbed.short_segments.train.segments
+    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]
+    return float(np.median(np.concatenate(spans)))
 
 
 def _many_minima(model, records) -> bool:

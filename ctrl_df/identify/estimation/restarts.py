@@ -1,6 +1,6 @@
 """Where segments begin: tries of initial states that a descent from the estimate does not reach.
 
-`problem` is a `multiple_shooting.Problem`; what is found goes into its `nuisance`.
+`stage` is a `multiple_shooting.Stage`, `found` the `Solution` that it has come to.
 """
 
 from __future__ import annotations
@@ -11,21 +11,29 @@ import numpy as np
 
 from ..prediction.sensed import sensed
 from ..thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, UNFOLLOWED
+from .outputs import States
 
 
-def restart_segments(problem, theta) -> bool:
+def restarted_segments(stage, found):
     """Try other starts where single segments err far more than the rest; whether any was better.
 
     Stick and slip make the error of a segment a nonsmooth function of the speed it begins with, and so does a
     gap of where in it and how fast the other body is: a start that is estimated badly may lie in another
     minimum. What the segment before ends with is tried first.
+
+    Returns
+    -------
+    States, bool
+        These may be farther off in the segments tried.
     """
-    found, values = False, problem.values(theta)
-    for k, simulator in enumerate(problem.simulators):
+    problem, better_found, values = stage.problem, False, stage.problem.values(found.theta)
+    all_starts = [a.copy() for a in found.states.values]
+    all_reach = [p.copy() for p in found.states.reach]
+    for k, simulator in enumerate(stage.simulators):
         if "v" not in simulator.nuisances or simulator.continued:
             continue
-        column, segments, starts = simulator.nuisances.index("v"), problem.segments[k], problem.nuisance[k]
-        rms = np.sqrt(segments.means(problem.last[k] ** 2))
+        column, segments, starts = simulator.nuisances.index("v"), stage.segments[k], all_starts[k]
+        rms = np.sqrt(segments.means(found.residual[k] ** 2))
         bad = (rms > OUTLYING_SEGMENT * np.quantile(rms, GOOD)) & (rms > OUTLYING_NOISE * problem.noise)
         if not bad.any():
             continue
@@ -33,8 +41,8 @@ def restart_segments(problem, theta) -> bool:
         held = sensed(problem.records[k])
         measured = held.within(some.samples)
         least = (BETTER**2 if problem.followed else UNFOLLOWED) * rms[bad] ** 2
-        problem.priors[k][bad, column] = problem.widest[k][bad, column]
-        reach, chosen = problem.priors[k][bad, column], starts[bad].copy()
+        all_reach[k][bad, column] = stage.widest[k][bad, column]
+        reach, chosen = all_reach[k][bad, column], starts[bad].copy()
         before = simulator.carried_on(segments, values, starts)[bad]
         before = np.where(np.isfinite(before), before, starts[bad])
         tries: list[tuple[Any, Any]] = [
@@ -44,7 +52,7 @@ def restart_segments(problem, theta) -> bool:
         tries += [(column, f * reach) for f in RESTART_SPEEDS]
         if "slack" in simulator.nuisances:
             at = simulator.nuisances.index("slack")
-            tries += [(slice(at, at + 2), pair) for pair in _slacks(problem, k)]
+            tries += [(slice(at, at + 2), pair) for pair in _slacks(stage, k)]
         trials = [starts[bad].copy() for _ in tries]
         for trial, (which, value) in zip(trials, tries, strict=True):
             trial[:, which] = value
@@ -54,51 +62,53 @@ def restart_segments(problem, theta) -> bool:
             shift, gain = _shift(held, some, e, simulator.position_dependent)
             powers.append(some.means(e**2) - gain)
             trial[:, 0] += shift
-        for begun, ended in _ends(problem, theta, k, some, trials, np.array(powers)):
+        for begun, ended in _ends(stage, found.theta, k, some, trials, np.array(powers)):
             better = ended < least
             chosen[better], least = begun[better], np.minimum(least, ended)
-            found = found or bool(better.any())
+            better_found = better_found or bool(better.any())
         starts[bad] = chosen
         problem.count(len(tries) * len(some) / len(segments))
-    return found
+    return States(all_starts, all_reach), better_found
 
 
-def _ends(problem, theta, k, some, trials, powers):
+def _ends(stage, theta, k, some, trials, powers):
     """Yield where segments `some` of a record may begin, the best tries first, and their mean squared errors.
 
     `powers`: (tries, nw), those of the tries as they are. Followed to their end where the problem says so.
     """
+    problem = stage.problem
     order = np.argsort(powers, axis=0, kind="stable")
     begun = [np.array([trials[i][w] for w, i in enumerate(row)]) for row in order[: max(problem.followed, 1)]]
     if not problem.followed:
         yield begun[0], powers.min(axis=0)
         return
-    alone = problem.alone(theta, slice(k, k + 1))
+    alone = stage.alone(theta, None, slice(k, k + 1))
     for start in begun:
-        alone.stage([some], problem.thin, [start], problem.rtol)
-        alone.solve(np.zeros(0), 5, 1e-2, False, restarts=False)
-        yield alone.nuisance[0], some.means(alone.last[0] ** 2)
-    problem.count(alone.nfev)
+        ended = alone.over([some], [start]).solve(np.zeros(0), 5, 1e-2, False, restarts=False)
+        yield ended.states.values[0], some.means(ended.residual[0] ** 2)
+    problem.count(alone.problem.nfev)
 
 
-def scan_gap_state(problem, theta):
+def scanned_gap_states(stage, theta, states):
     """Find where in its gap each segment begins, and how fast it crosses it (the cost has several minima)."""
-    for k, simulator in enumerate(problem.simulators):
+    found, problem = list(states.values), stage.problem
+    for k, simulator in enumerate(stage.simulators):
         if "slack" not in simulator.nuisances:
             continue
         at = simulator.nuisances.index("slack")
-        segments, chosen = problem.segments[k], problem.nuisance[k].copy()
-        least, values, tries = np.full(len(segments), np.inf), problem.values(theta), _slacks(problem, k)
-        trials = [problem.nuisance[k].copy() for _ in tries]
+        segments, chosen = stage.segments[k], found[k].copy()
+        least, values, tries = np.full(len(segments), np.inf), problem.values(theta), _slacks(stage, k)
+        trials = [found[k].copy() for _ in tries]
         for trial, slack in zip(trials, tries, strict=True):
             trial[:, at : at + 2] = slack
         for trial, y in zip(trials, simulator.run_all([(segments, values, t) for t in trials]), strict=True):
-            e = problem.measured[k] - y
+            e = stage.measured[k] - y
             errors = segments.means(e**2) - _shift(sensed(problem.records[k]), segments, e)[1]
             better = errors < least
             chosen[better], least = trial[better], np.minimum(least, errors)
-        problem.nuisance[k] = chosen
-        problem.count(len(tries) / len(problem.simulators))
+        found[k] = chosen
+        problem.count(len(tries) / len(stage.simulators))
+    return states.at(found)
 
 
 def _shift(held, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
@@ -114,8 +124,8 @@ def _shift(held, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
     return shift, shift**2 * (count / (segments.outputs * segments.counts))
 
 
-def _slacks(problem, k) -> list[tuple[float, float]]:
+def _slacks(stage, k) -> list[tuple[float, float]]:
     """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a segment with."""
-    speed = problem.known[k].speed
+    speed = stage.problem.known[k].speed
     rates = [f * speed for f in (0.0, -0.2, 0.2, -0.7, 0.7)]
     return [(p, r) for p in (0.02, 0.25, 0.5, 0.75, 0.98) for r in rates]

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...units import size
 from ..data import derivatives
 from ..data.measurement import Measurement
 from ..prediction.decimated import thinnable
 from ..prediction.initial_states import CONTINUED, FREE, MEASURED
-from ..prediction.segments import Segments, cut, facts, load_of, split
+from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
@@ -26,69 +25,21 @@ from ..thresholds import (
     LEVELS,
     NOISE_FREE,
     PARAMETER_RANGE,
-    PROCESS_NOISE,
     RESTARTS_KEPT,
     RTOL,
     RTOL_COARSE,
     RTOL_NONSMOOTH,
     RTOL_OVER_NOISE,
     SCREEN_SAMPLES,
-    SEGMENT_LEAST,
     SHORTEST,
 )
 from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
 from .noise_model import NoiseModel, acceleration_filter
-from .variables import RecordScales, typical_mass
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Typical sizes of force [N], position [m], speed [m/s] and mass [kg] in the records."""
-
-    force: float
-    position: float
-    speed: float
-    mass: float
-
-    def of(self, unit: str) -> float:
-        """Return the typical size of a parameter of that unit (of a machine on a line)."""
-        time = self.position / self.speed
-        return size(unit, {"N": self.force, "m": self.position, "s": time, "kg": self.mass})
-
-
-@dataclass(frozen=True)
-class SegmentedRecords:
-    """Records and the segments of each that count."""
-
-    records: tuple[Measurement, ...]
-    segments: tuple[Segments, ...]
-
-    def shorter(self, factor: int) -> SegmentedRecords:
-        """Return up to `factor` times as many segments over the same samples, none too short."""
-        pairs = zip(self.records, self.segments, strict=True)
-        return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
-
-    def every(self, step: int) -> SegmentedRecords:
-        """Return every `step`-th segment."""
-        return SegmentedRecords(
-            self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.segments)
-        )
-
-    def thinned(self, step: int) -> SegmentedRecords:
-        """Return the same segments, of which every `step`-th sample counts."""
-        return replace(self, segments=tuple(w.every(step) for w in self.segments))
-
-    @property
-    def outputs(self) -> list[np.ndarray]:
-        """Measured outputs within the segments, as fits see them."""
-        return [sensed(r).within(w.samples) for r, w in zip(self.records, self.segments, strict=True)]
-
-    def only(self, quantity: str) -> SegmentedRecords:
-        """Return the same with one output alone, by quantity."""
-        return SegmentedRecords(
-            tuple(r.only(quantity) for r in self.records), tuple(replace(w, outputs=1) for w in self.segments)
-        )
+from .scales import Scales, scales_of
+from .segmented_records import SegmentedRecords
+from .starts import same_begins
+from .variables import RecordScales
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,7 +335,7 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
-    scales = _scales(block, records)
+    scales = scales_of(block, records)
     seen = RecordScales(
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
@@ -405,52 +356,3 @@ def _count(record) -> int:
     """Return the number of segments: two to-and-fro motions and a half each, 60 samples at least."""
     known, n = facts(record), len(record)
     return int(min(max(round(record.duration / max(2.5 * known.swing, 60 * record.duration / n)), 4), 40))
-
-
-def _scales(block, records) -> Scales:
-    known = [facts(r) for r in records]
-    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), 1e-300)
-    position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), 1e-300)
-    speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), 1e-300)
-    return Scales(force, position, speed, typical_mass(block, force, position, speed))
-
-
-def short_segment(model, records: Sequence[Measurement]) -> float | None:
-    """Return the length [s] of `SegmentedData.short_segments` where disturbance forces prevail; or None.
-
-    Not for models of which something is hidden, nor for records too short to tell.
-    """
-    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST or any(facts(r).imposed for r in records):
-        return None
-    data = prepare(model, records, records)
-    near, disturbed = (
-        data.segmentations[0].fit(model, (), iterations=4, tolerance=2e-2),
-        data.with_process_noise,
-    )
-    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
-        return None
-    segments = disturbed.short_segments.train.segments
-    spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]
-    return float(np.median(np.concatenate(spans)))
-
-
-def same_begins(found: FitResult, segments) -> list[np.ndarray]:
-    """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
-    starts = []
-    for old, new, states in zip(found.segments, segments, found.starts, strict=True):
-        at = np.searchsorted(old.begins, new.begins)
-        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
-        rows = np.zeros((len(new), states.shape[1]))
-        rows[same] = states[at[same]]
-        starts.append(rows)
-    return starts
-
-
-def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
-    """Return one model's initial states as those of another: what the first lacks begins as usual."""
-    given = dict(zip(before.nuisances, starts.T, strict=True))
-    columns = []
-    for name in simulator.nuisances:
-        usual = np.where(segments.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(segments))
-        columns.append(given.get(name, usual))
-    return np.array(columns).T.reshape(len(segments), len(columns))

@@ -1,10 +1,12 @@
-"""Initial states alone, of a `multiple_shooting.Problem` without parameters.
+"""Initial states alone, of a `multiple_shooting.Stage` without parameters.
 
 Segments that share nothing are problems of their own: each has its own Levenberg-Marquardt damping, and takes
 or refuses a step by its own error, so that one that begins badly holds up no other.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,60 +16,72 @@ from .elimination import states_for
 from .noise_model import power
 
 
-def find_states(problem, segments, thin, rtol, starts=None) -> list[np.ndarray]:
-    """Return the initial states of segments: found at once, or over their beginnings first.
+def find_states(stage) -> list[np.ndarray]:
+    """Return the initial states of a stage: found at once, or over the beginnings of its segments first.
 
     The longer a segment, the more minima its error has over the state it begins in; a short beginning
     hardly has any. Each way can end in a wrong one: the better counts.
-
-    Parameters
-    ----------
-    problem : multiple_shooting.Problem
-    segments : list of Segments
-    thin, rtol, starts
-        As for `Problem.stage`; `starts` is where the first way begins.
     """
-    found = []
-    for shares in ((), BEGINNINGS):
-        states = None if shares else starts
-        for share in shares:
-            pairs = list(zip(problem.records, segments, strict=True))
-            parts = [split(r, w, share, SEGMENT_LEAST) for r, w in pairs]
-            first = [p.only(np.isin(p.begins, w.begins)) for p, w in zip(parts, segments, strict=True)]
-            problem.stage(first, thin, states, rtol)
-            problem.solve(np.zeros(0), iterations=5, tolerance=1e-2, robust=False)
-            states = problem.nuisance
-        problem.stage(segments, thin, states, rtol)
-        problem.solve(np.zeros(0), iterations=8, tolerance=1e-4, robust=False)
-        found.append((power(problem.last), len(found), problem.nuisance))
-    return min(found, key=lambda f: f[:2])[2]
+    none = np.zeros(0)
+    found = [stage.solve(none, iterations=8, tolerance=1e-4, robust=False)]
+    starts = None
+    for first in _beginnings(stage):
+        begun = stage.over(first, starts).solve(none, iterations=5, tolerance=1e-2, robust=False)
+        starts = begun.states.values
+    if starts is not None:
+        again = stage.over(stage.segments, starts)
+        found.append(again.solve(none, iterations=8, tolerance=1e-4, robust=False))
+    return min(found, key=lambda f: power(f.residual)).states.values
 
 
-def descend(problem, iterations: int, tolerance: float) -> None:
-    """Take steps of every segment by itself, until none gains more than `tolerance` of its cost."""
-    left = [_Record(problem, k) for k in range(len(problem.segments))]
+def _beginnings(stage):
+    """Yield the beginnings of the segments, shortest first, each once."""
+    known = [stage.segments]
+    for share in BEGINNINGS:
+        first = []
+        for record, segments in zip(stage.problem.records, stage.segments, strict=True):
+            parts = split(record, segments, share, SEGMENT_LEAST)
+            first.append(parts.only(np.isin(parts.begins, segments.begins)))
+        ends = [w.ends for w in first]
+        if not any(all(map(np.array_equal, ends, [w.ends for w in k])) for k in known):
+            known.append(first)
+            yield first
+
+
+def descend(stage, begun, iterations: int, tolerance: float):
+    """Take steps of every segment by itself, until none gains more than `tolerance` of its cost.
+
+    `begun`, and what is returned: `multiple_shooting.Solution`.
+    """
+    problem = stage.problem
+    records = [_Record(stage, begun, k) for k in range(len(stage.segments))]
+    residual = [r.residual for r in records]
     for i in range(iterations):
-        if problem.nfev >= problem.budget or not any(r.open.any() for r in left):
+        if problem.nfev >= problem.budget or not any(r.open.any() for r in records):
             break
-        before = power(problem.last)
-        for r in left:
+        before = power(residual)
+        for r in records:
             r.step(tolerance)
-        if problem.too_far(power(problem.last) / max(before, 1e-300), iterations - i - 1 + problem.outlook):
+        pace = power(residual) / max(before, 1e-300)
+        if stage.too_far(residual, pace, iterations - i - 1 + problem.outlook):
             break
-    problem.converged = not any(r.open.any() for r in left)
+    states = begun.states.at([r.starts for r in records])
+    converged = not any(r.open.any() for r in records)
+    return replace(begun, states=states, residual=residual, converged=converged)
 
 
 class _Record:
     """The segments of one record on their way; those that have not come to their end are `open`."""
 
-    def __init__(self, problem, k):
-        self.problem, self.k = problem, k
-        self.simulator, self.segments = problem.simulators[k], problem.segments[k]
-        self.precision, self.means = problem.noise**2 / problem.priors[k] ** 2, problem.means()[k]
-        residual = problem.last[k]
-        self.cost = self._cost(self.segments, residual, problem.nuisance[k], slice(None))
+    def __init__(self, stage, begun, k):
+        self.stage, self.k = stage, k
+        self.simulator, self.segments = stage.simulators[k], stage.segments[k]
+        self.starts, self.residual = begun.states.values[k].copy(), begun.residual[k].copy()
+        self.reach, self.means = begun.states.reach[k], stage.means()[k]
+        self.precision = stage.precision(begun.states)[k]
+        self.cost = self._cost(self.segments, self.residual, self.starts, slice(None))
         self.damping = np.full(len(self.segments), 1e-3)
-        self.open = np.full(len(self.segments), problem.nuisance[k].shape[1] > 0)
+        self.open = np.full(len(self.segments), self.starts.shape[1] > 0)
 
     def _cost(self, segments, residual, starts, rows):
         known = (starts - self.means[rows]) ** 2 * self.precision[rows]
@@ -80,25 +94,28 @@ class _Record:
 
     def step(self, tolerance):
         """Take a step in every open segment, damped until its cost falls."""
-        problem, k = self.problem, self.k
+        stage, k = self.stage, self.k
         rows = np.flatnonzero(self.open)
         if not rows.size:
             return
-        products = problem.state_products(k, *self._signal(rows))
+        which, seen = self._signal(rows)
+        products = stage.state_products(
+            k, which, seen, self.starts[rows], self.reach[rows], self.residual[seen]
+        )
         for _ in range(DAMPED):
             which, seen = self._signal(rows)
-            some, starts = self.segments.only(which), problem.nuisance[k]
-            off = starts[rows] - self.means[rows]
+            some, starts = self.segments.only(which), self.starts[rows]
+            off = starts - self.means[rows]
             moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
-            trial = problem.within_reach(k, starts[rows] + moves, rows)
-            residual = problem.measured[k][seen] - self.simulator.run(some, None, trial)
-            problem.nfev += len(rows) / len(self.segments) / len(problem.segments)
+            trial = stage.within_reach(k, starts + moves, self.reach[rows])
+            residual = stage.measured[k][seen] - self.simulator.run(some, None, trial)
+            stage.problem.nfev += len(rows) / len(self.segments) / len(stage.segments)
             cost = self._cost(some, residual, trial, rows)
             better = cost < self.cost[rows]
             gained = rows[better]
             self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
-            self.cost[gained], starts[gained] = cost[better], trial[better]
-            problem.last[k][self._signal(gained)[1]] = residual[some.spread(better)]
+            self.cost[gained], self.starts[gained] = cost[better], trial[better]
+            self.residual[self._signal(gained)[1]] = residual[some.spread(better)]
             self.damping[gained] = np.maximum(self.damping[gained] / 10, 1e-7)
             rows, products = rows[~better], products[~better]
             self.damping[rows] *= 10

@@ -13,7 +13,7 @@ from ...drawing import draw
 from ..data.imposed import imposes_motion
 from ..data.measurement import Measurement
 from ..estimation.fit import FitResult, fit_segments
-from ..estimation.segmented import same_begins
+from ..estimation.starts import same_begins
 from ..prediction.initial_states import CONTINUED, FREE
 from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed

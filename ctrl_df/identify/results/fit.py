@@ -20,7 +20,8 @@ class FittedParameter:
     name, unit : str
         As in ``block.parameters``.
     value, standard_error : float
-        SI; the error allows for the colour of the residual.
+        SI; the error allows for the colour of the noise, as the residual tells it: two of them hold the truth
+        for 95 % of records.
     start : float
         Value before.
     at_bound : bool

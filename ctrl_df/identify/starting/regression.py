@@ -14,7 +14,7 @@ import numpy as np
 
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
-from ..estimation.segmented import Scales
+from ..estimation.scales import Scales
 from ..prediction.segments import facts, load_of
 from ..thresholds import STRONG
 from .extend import extended

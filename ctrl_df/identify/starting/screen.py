@@ -14,7 +14,9 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.fit import FitResult
-from ..estimation.segmented import Scales, SegmentedData, carried
+from ..estimation.scales import Scales
+from ..estimation.segmented import SegmentedData
+from ..estimation.starts import carried
 from .extend import extended
 from .proposals import proposals
 from .regression import ForceFit, Start, force_fit, motion_of, regressed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..estimation.segmented import Scales
+from ..estimation.scales import Scales
 from ..thresholds import WORK_LOW, WORK_MEDIUM
 from .fit import (
     FittedTable,

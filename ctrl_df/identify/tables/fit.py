@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from ...blocks.core import level
 from ..data.frequency_measurement import FrequencyMeasurement
-from ..estimation.segmented import Scales
+from ..estimation.scales import Scales
 from ..estimation.variables import Variable
 from ..prediction.simulator import feasible
 from ..thresholds import GROSS, RIGID, WORK_HIGH

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...simulate.imposed import imposed_forces, path_of
 from ...simulate.imposed_response import imposable
-from ..estimation.segmented import Scales
+from ..estimation.scales import Scales
 from ..prediction.simulator import feasible
 from ..thresholds import BALANCE_PERIODS, BALANCE_ROUNDS, BALANCE_SAMPLES
 from .fit import Points

@@ -1,0 +1,271 @@
+"""What a model puts out over segments of records, how that changes with what moves, and how far it is off."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...simulate.crew import check
+from ..prediction.segments import Segments
+from ..prediction.sensed import sensed
+from ..prediction.simulator import Simulator
+from ..prediction.simulators import simulator_of
+from ..thresholds import RTOL
+from .elimination import products_of, states_for
+from .noise_model import power
+from .problem import Problem
+
+Signals = list[np.ndarray]
+
+
+@dataclass(frozen=True)
+class States:
+    """Initial states of the segments, (nw, ns) a record: corrections, and how far off each may be."""
+
+    values: Signals
+    reach: Signals
+
+    def at(self, values) -> States:
+        """Return others within the same reach."""
+        return replace(self, values=values)
+
+    @property
+    def widened(self) -> States:
+        """The same, what was found farther off being within reach."""
+        pairs = zip(self.reach, self.values, strict=True)
+        return replace(self, reach=[np.maximum(p, np.abs(a)) for p, a in pairs])
+
+
+class SegmentOutputs:
+    """A model over segments of records.
+
+    Parameters
+    ----------
+    problem : Problem
+    segments : list of Segments
+    thin : int
+        Samples a step of the input.
+    starts : list of (nw, ns) arrays or None
+        Initial states to begin with; None: what the data say.
+    rtol : float
+        Relative tolerance of the simulations.
+    """
+
+    def __init__(self, problem: Problem, segments: list[Segments], thin, starts=None, rtol=RTOL):
+        self.problem, self.segments, self.thin, self.rtol = problem, list(segments), thin, rtol
+        self.simulators: list[Simulator] = [
+            simulator_of(problem.model, r, thin=thin, begins=problem.begins, rtol=rtol)
+            for r in problem.records
+        ]
+        self.measured = [sensed(r).within(w.samples) for r, w in zip(problem.records, segments, strict=True)]
+        reach = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
+        if starts is not None:
+            # those of a fit of more states: the first of them are the same
+            starts = [a[:, : p.shape[1]] for a, p in zip(starts, reach, strict=True)]
+        self.fresh = starts is None or any(a.shape != p.shape for a, p in zip(starts, reach, strict=True))
+        begun = [np.zeros_like(p) for p in reach] if self.fresh else [np.array(a) for a in starts or ()]
+        self.begun = States(begun, reach).widened
+        self.widest = [3 * p for p in self.begun.reach]  # where a start was far off
+
+    # --- how far it is off ----------------------------------------------------------------------------
+
+    def simulate(self, theta, starts) -> Signals:
+        """Return the outputs within the segments."""
+        check()
+        self.problem.nfev += 1
+        values = self.problem.values(theta)
+        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.segments, starts, strict=True)]
+
+    def residual(self, theta, starts) -> Signals:
+        """Return measured minus simulated."""
+        return [m - y for m, y in zip(self.measured, self.simulate(theta, starts), strict=True)]
+
+    def rounded(self, theta, starts) -> Signals:
+        """Return the residual of what an encoder of the model rounds (fits leave it out: it has no slope)."""
+        values = self.problem.values(theta)
+        runs = zip(self.simulators, self.segments, starts, self.measured, strict=True)
+        return [m - s.run(w, values, a, rounded=True) for s, w, a, m in runs]
+
+    def cost(self, residual, states: States, weights) -> float:
+        """Return half the weighted sum of squares, initial states weighed by what is known of them."""
+        if self.problem.error_filter is not None:
+            return 0.5 * power([self.weighed(k, r) for k, r in enumerate(residual)])
+        total = sum(float(np.sum(w * r * r)) for r, w in zip(residual, weights, strict=True))
+        known = sum(
+            float(np.sum((a - m) ** 2 / p**2))
+            for a, m, p in zip(states.values, self.means(), states.reach, strict=True)
+        )
+        # What is known beforehand counts as much as one sample off by the noise.
+        return 0.5 * (total + self.problem.noise**2 * known)
+
+    def weighed(self, k, x) -> np.ndarray:
+        """Return what the cost sees of signals (n,) or (n, m) of one record."""
+        error_filter = self.problem.error_filter
+        return x if error_filter is None else error_filter.filtered(x, self.segments[k].slices)
+
+    def power(self, signals: Signals) -> tuple[float, int]:
+        """Return the sum of squares of what the cost sees of signals, and of how many values."""
+        seen = [self.weighed(k, x) for k, x in enumerate(signals)]
+        return power(seen) / self.problem.unit**2, sum(map(len, seen))
+
+    def means(self) -> Signals:
+        """Return the expected corrections of the initial states: none, but half the slack of a gap."""
+        means = [np.zeros_like(a) for a in self.begun.values]
+        for mean, simulator in zip(means, self.simulators, strict=True):
+            if "slack" in simulator.nuisances:
+                mean[:, simulator.nuisances.index("slack")] = 0.5
+        return means
+
+    def precision(self, states: States) -> Signals:
+        """Return what is known of the initial states beforehand, in units of one sample."""
+        return [self.problem.noise**2 / p**2 for p in states.reach]
+
+    def within_reach(self, k, values, reach) -> np.ndarray:
+        """Return initial states (nr, ns) of segments, none farther off than it can be.
+
+        The data say where a segment begins: its start must not hide the faults of the model.
+        """
+        names = self.simulators[k].nuisances
+        means = np.array([0.5 if name == "slack" else 0.0 for name in names])
+        values = np.clip(values, means - 3 * reach, means + 3 * reach)
+        if "slack" in names:
+            j = names.index("slack")
+            values[:, j] = np.clip(values[:, j], 0.0, 1.0)
+        return values
+
+    # --- how it changes -------------------------------------------------------------------------------
+
+    def jacobian(self, theta, states: States, base, central=False) -> tuple[Signals, Signals]:
+        """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""
+        problem = self.problem
+        pairs = [self._ends(i, theta, central) for i in range(len(problem.variables))]
+        thetas = [end for pair in pairs for end in pair if end is not None]
+        moved: list[Signals] = [[] for _ in thetas]
+        by_start = []
+        for k, simulator in enumerate(self.simulators):
+            begun = states.values[k]
+            asked = [(self.segments[k], problem.values(q), begun) for q in thetas]
+            starts, widths = self._moved_starts(k, begun, self.segments[k], states.reach[k])
+            values = problem.values(theta)
+            asked += [(self.segments[k], values, start) for start in starts if start is not None]
+            signals = simulator.run_all(asked)
+            for found, y in zip(moved, signals, strict=False):
+                found.append(y)
+            by_start.append(_by_start(starts, widths, signals[len(thetas) :], base[k], self._by_place(k)))
+            problem.nfev += len(starts) / len(self.simulators)
+        problem.nfev += len(thetas)
+        columns: list[Signals] = [[] for _ in self.segments]
+        ready = iter(moved)
+        for i, pair in enumerate(pairs):
+            above, below = (base if end is None else next(ready) for end in pair)
+            width = float(pair[0][i] - (theta if pair[1] is None else pair[1])[i])
+            for k, column in enumerate(self._column(i, above, below, width)):
+                columns[k].append(column)
+        by_parameter = [
+            np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)
+        ]
+        return by_parameter, by_start
+
+    def _ends(self, i, theta, central):
+        """Return the parameters between which variable `i` is differenced; None for those there are."""
+        h, variable = self.problem.steps[i], self.problem.variables[i]
+        up = theta.copy()
+        up[i] = variable.clip(theta[i] + h)
+        if up[i] == theta[i]:
+            h = -h
+            up[i] = theta[i] + h
+        if not central:
+            return up, None
+        down = theta.copy()
+        down[i] = variable.clip(theta[i] - h)
+        return up, (None if down[i] == theta[i] else down)
+
+    def _column(self, i, moved, other, width) -> Signals:
+        """Return the derivatives by variable `i`, and choose its next step."""
+        variable, h = self.problem.variables[i], self.problem.steps[i]
+        change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
+        # Next time the output shall move by a third of the noise.
+        wanted = abs(h) * 0.3 * self.problem.noise / change if change > 0 else 10 * abs(h)
+        self.problem.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
+        return [(a - b) / width for a, b in zip(moved, other, strict=True)]
+
+    def state_products(self, k, which, seen, starts, reach, residual) -> np.ndarray:
+        """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
+
+        `which`, `seen`: of the segments (nw,) and the samples (n,) of a signal, booleans; `starts`, `reach`:
+        of these segments, `residual`: at these samples.
+        """
+        segments, simulator = self.segments[k], self.simulators[k]
+        some = segments.only(which)
+        moved, widths = self._moved_starts(k, starts, some, reach)
+        signals = simulator.run_all([(some, None, start) for start in moved if start is not None])
+        self.problem.nfev += len(moved) * len(some) / len(segments) / len(self.segments)
+        base = self.measured[k][seen] - residual
+        js = _by_start(moved, widths, signals, base, self._by_place(k)[seen])
+        return products_of(js, residual, None, some)
+
+    def _moved_starts(self, k, starts, segments, reach):
+        """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
+        simulator, known = self.simulators[k], self.problem.known[k]
+        moved, widths = [], []
+        for j, name in enumerate(simulator.nuisances):
+            if name == "x" and not simulator.position_dependent:
+                moved.append(None)
+                widths.append(None)
+                continue
+            size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
+                reach[:, j], {"x": 0.003 * known.position, "v": 0.003 * known.speed}.get(name, np.inf)
+            )
+            trial = starts.copy()
+            sign = np.where(trial[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
+            trial[:, j] += sign * size
+            moved.append(trial)
+            widths.append(segments.spread(sign * size))
+        return moved, widths
+
+    def _by_place(self, k) -> np.ndarray:
+        """Return the derivatives by the place where no law knows it."""
+        return sensed(self.problem.records[k]).of_place(len(self.segments[k].samples))
+
+    def normal(self, jp, js, residual, weights, states: States, damping=0.0):
+        """Eliminate the initial states; return (H, g, back) with ``back(step)`` those of a step."""
+        p = len(self.problem.names)
+        h, g, pieces = np.zeros((p, p)), np.zeros(p), []
+        means, precision = self.means(), self.precision(states)
+        for k, segments in enumerate(self.segments):
+            if self.problem.error_filter is not None:
+                a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
+                h += a.T @ a
+                g += a.T @ r
+                continue
+            others = np.column_stack((jp[k], residual[k]))
+            products, ns = products_of(js[k], others, weights[k], segments), js[k].shape[1]
+            h += products[:, ns:-1, ns:-1].sum(axis=0)
+            g += products[:, ns:-1, -1].sum(axis=0)
+            if ns:
+                solved = states_for(products, precision[k], damping, states.values[k] - means[k])
+                coupled = products[:, :ns, ns:-1]
+                h -= np.einsum("wsi,wsj->ij", coupled, solved[:, :, :p])
+                g -= np.einsum("wsi,ws->i", coupled, solved[:, :, p])
+                pieces.append((k, solved))
+
+        def back(step) -> States:
+            moved = [a.copy() for a in states.values]
+            for k, solved in pieces:
+                there = states.values[k] + solved[:, :, p] - solved[:, :, :p] @ step
+                moved[k] = self.within_reach(k, there, states.reach[k])
+            return states.at(moved)
+
+        return h, g, back
+
+
+def _by_start(starts, widths, signals, base, by_place) -> np.ndarray:
+    """Return derivatives (n, ns) of one record's output by its initial states, all segments at once."""
+    moved = iter(signals)
+    rows = [
+        by_place if start is None else (next(moved) - base) / width
+        for start, width in zip(starts, widths, strict=True)
+    ]
+    return np.array(rows).T.reshape(len(base), len(rows))

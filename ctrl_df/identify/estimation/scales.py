@@ -1,0 +1,36 @@
+"""Typical sizes of what records hold, and of parameters by their unit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...units import size
+from ..prediction.segments import facts, load_of
+from .variables import typical_mass
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Typical sizes of force [N], position [m], speed [m/s] and mass [kg] in the records."""
+
+    force: float
+    position: float
+    speed: float
+    mass: float
+
+    def of(self, unit: str) -> float:
+        """Return the typical size of a parameter of that unit (of a machine on a line)."""
+        time = self.position / self.speed
+        return size(unit, {"N": self.force, "m": self.position, "s": time, "kg": self.mass})
+
+
+def scales_of(block, records) -> Scales:
+    """Return the typical sizes in records of a machine."""
+    known = [facts(r) for r in records]
+    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), 1e-300)
+    position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), 1e-300)
+    speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), 1e-300)
+    return Scales(force, position, speed, typical_mass(block, force, position, speed))

@@ -1,0 +1,46 @@
+"""Records and the segments of each that count: shorter, fewer, thinner, of one output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..data.measurement import Measurement
+from ..prediction.segments import Segments, split
+from ..prediction.sensed import sensed
+from ..thresholds import SEGMENT_LEAST
+
+
+@dataclass(frozen=True)
+class SegmentedRecords:
+    """Records and the segments of each that count."""
+
+    records: tuple[Measurement, ...]
+    segments: tuple[Segments, ...]
+
+    def shorter(self, factor: int) -> SegmentedRecords:
+        """Return up to `factor` times as many segments over the same samples, none too short."""
+        pairs = zip(self.records, self.segments, strict=True)
+        return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
+
+    def every(self, step: int) -> SegmentedRecords:
+        """Return every `step`-th segment."""
+        return SegmentedRecords(
+            self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.segments)
+        )
+
+    def thinned(self, step: int) -> SegmentedRecords:
+        """Return the same segments, of which every `step`-th sample counts."""
+        return replace(self, segments=tuple(w.every(step) for w in self.segments))
+
+    @property
+    def outputs(self) -> list[np.ndarray]:
+        """Measured outputs within the segments, as fits see them."""
+        return [sensed(r).within(w.samples) for r, w in zip(self.records, self.segments, strict=True)]
+
+    def only(self, quantity: str) -> SegmentedRecords:
+        """Return the same with one output alone, by quantity."""
+        return SegmentedRecords(
+            tuple(r.only(quantity) for r in self.records), tuple(replace(w, outputs=1) for w in self.segments)
+        )

@@ -1,0 +1,31 @@
+"""Initial states of one fit as those of another: over other segments, or of another model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..prediction.segments import Segments
+from ..prediction.simulator import Simulator
+from .fit import FitResult
+
+
+def same_begins(found: FitResult, segments) -> list[np.ndarray]:
+    """Return initial states from a fit over other segments: theirs where both begin at one sample, else 0."""
+    starts = []
+    for old, new, states in zip(found.segments, segments, found.starts, strict=True):
+        at = np.searchsorted(old.begins, new.begins)
+        same = (at < len(old)) & (old.begins[np.minimum(at, len(old) - 1)] == new.begins)
+        rows = np.zeros((len(new), states.shape[1]))
+        rows[same] = states[at[same]]
+        starts.append(rows)
+    return starts
+
+
+def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
+    """Return one model's initial states as those of another: what the first lacks begins as usual."""
+    given = dict(zip(before.nuisances, starts.T, strict=True))
+    columns = []
+    for name in simulator.nuisances:
+        usual = np.where(segments.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(segments))
+        columns.append(given.get(name, usual))
+    return np.array(columns).T.reshape(len(segments), len(columns))
