@@ -357,5 +357,8 @@ FORCE_KNOWN = 0.8
 CURVE_BINS, CURVE_LEAST = 25, 4
 """Steps of a curve over a quantity, at most and at least."""
 
+UNLIKE = 0.1
+"""Autocorrelation of a force below which it is another one: what is left adds less than its own scatter."""
+
 CURVE_ALONE = 4
 """Instants that know of different forces, for each step of a curve: its error is half their spread."""

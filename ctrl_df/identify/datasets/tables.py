@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ..planning.sines import stepped_sines
 from ..tables.compare import comparison_of_tables, inner_block
-from ..tables.fit import fit_table, points_of, table_scales
+from ..tables.fit import fit_table
+from ..tables.points import points_of, table_scales
 from ..tables.search import TableSearch
 from ..tables.uncertainty import uncertainty
 from .dataset import Dataset, Estimate

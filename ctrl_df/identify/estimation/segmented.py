@@ -298,7 +298,7 @@ class SegmentedData:
 
     def rtol_of(self, block) -> float:
         """Return the tolerance of a model's simulations: events that come and go want the finest."""
-        return RTOL if any(e.nonsmooth for e in block.effects) else self.rtol
+        return RTOL if block.nonsmooth else self.rtol
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
         """Return least and largest values: the model's own, and what the records show of its effects."""
@@ -342,7 +342,7 @@ class SegmentedData:
         starts = same_begins(near, view.segments)
         near = rough.fit(model, (), view=getattr(rough, name), starts=starts, iterations=3)
         found = self.fit(model, (), view=view, starts=near.starts, iterations=1)
-        if not any(e.nonsmooth for e in model.effects):
+        if not model.nonsmooth:
             return found
         # single segments may have begun in a wrong minimum: each goes on by itself
         return self.fit(model, (), view=view, starts=found.starts, iterations=1, followed=RESTARTS_KEPT)

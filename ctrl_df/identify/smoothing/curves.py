@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST
+from ..residuals.residual_tests import autocorrelation
+from ..thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST, UNLIKE
 
 
 @dataclass(frozen=True)
@@ -80,10 +81,6 @@ def curve_over(values, force, std, own, known) -> Curve:
 
 def _together(d) -> float:
     """Return over how many samples a force is much the same: they count as one."""
-    spread, total = float(d @ d), 1.0
-    for lag in range(1, len(d) // 4 if spread > 0 else 1):
-        correlation = float(d[:-lag] @ d[lag:]) / spread
-        if correlation < 0.1:
-            break
-        total += 2.0 * correlation
-    return total
+    alike = autocorrelation(d, max(len(d) // 4 - 1, 0))
+    until = np.argmax(alike < UNLIKE) if np.any(alike < UNLIKE) else len(alike)
+    return 1.0 + 2.0 * float(np.sum(alike[1:until]))

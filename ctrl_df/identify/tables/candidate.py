@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from ..estimation.segmented import Scales
 from ..thresholds import WORK_LOW, WORK_MEDIUM
-from .fit import (
-    FittedTable,
-    fit_table,
-    log_density,
-    outlying,
-    relative_error,
-    simulate_table,
-)
+from .errors import log_density, outlying
+from .fit import FittedTable, fit_table
+from .simulated import relative_error, simulate_table
 from .starts import best_starts
 
 

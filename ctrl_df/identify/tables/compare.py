@@ -12,7 +12,9 @@ from ...drawing import draw
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..residuals.comparison_base import ComparisonBase
 from ..residuals.regions import Region, Regions
-from .fit import Points, counted, points_of, relative_error, rms, simulate_table
+from .errors import rms
+from .points import Points, counted, points_of
+from .simulated import relative_error, simulate_table
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...simulate.imposed import imposed_forces, path_of
+from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
 from ..estimation.segmented import Scales
 from ..prediction.simulator import feasible
 from ..thresholds import BALANCE_PERIODS, BALANCE_ROUNDS, BALANCE_SAMPLES
-from .fit import Points
+from .points import Points
 
 
 def can_be_imposed(block) -> bool:
@@ -45,20 +45,17 @@ class ForceBalance:
         self.amplitude = moved.A
         angle = 2 * np.pi * np.arange(BALANCE_SAMPLES * BALANCE_PERIODS + 1) / BALANCE_SAMPLES
         self.paths = [
-            path_of(angle / w, x * np.cos(angle), -x * w * np.sin(angle))
-            for x, w in zip(moved.A * np.abs(moved.N), moved.omega, strict=True)
+            sine_path(x, w, angle) for x, w in zip(moved.A * np.abs(moved.N), moved.omega, strict=True)
         ]
-        last = slice(-BALANCE_SAMPLES - 1, -1)
-        self._last, self._wave = last, 2 / BALANCE_SAMPLES * np.exp(-1j * angle[last])
+        self._last = slice(-BALANCE_SAMPLES - 1, -1)
+        self._angle = angle[self._last]
 
     def forces(self, blocks: Sequence) -> np.ndarray:
         """Return first harmonics of the forces over A, (blocks, points)."""
         cores = [b.core for b in blocks]
         z0 = np.zeros((len(blocks), cores[0].nstates - 2))
-        found = [
-            imposed_forces(cores, path, z0, rtol=1e-4)[0][:, self._last] @ self._wave for path in self.paths
-        ]
-        return np.stack(found, axis=1) / self.amplitude
+        forces = [imposed_forces(cores, path, z0, rtol=1e-4)[0][:, self._last] for path in self.paths]
+        return harmonics(np.stack(forces, axis=1), self._angle, 1)[..., 1] / self.amplitude
 
     def error(self, blocks: Sequence) -> np.ndarray:
         """Return the root mean square of what misses in each block's balance, over A."""

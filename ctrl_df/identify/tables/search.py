@@ -28,20 +28,10 @@ from ..thresholds import (
 )
 from .candidate import fit_either, try_effect
 from .compare import comparison_of_tables, plane_regions, scatter
-from .fit import (
-    FittedTable,
-    Points,
-    counted,
-    fit_table,
-    log_density,
-    outlying,
-    points_of,
-    relative_error,
-    rms,
-    simulate_table,
-    slopes_of,
-    table_scales,
-)
+from .errors import log_density, outlying, rms
+from .fit import FittedTable, fit_table, slopes_of
+from .points import Points, counted, points_of, table_scales
+from .simulated import relative_error, simulate_table
 from .starts import balanced
 from .uncertainty import uncertainty
 
@@ -202,8 +192,7 @@ class TableSearch(Search):
 
         No model gets below the stated noise, or below how exact orbits are.
         """
-        stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
-        return log_density(self.points.weight * tried.error, max(0.5 * stated, 1e-6) ** 2)
+        return log_density(self.points.weight * tried.error, max(0.5 * self.points.stated, 1e-6) ** 2)
 
     def alike(self, a, b):
         """Whether two candidates' tables differ by less than the scatter lets one see."""
@@ -259,7 +248,7 @@ class TableSearch(Search):
                     # second differences see scatter six times as strong as a smooth print
                     differences.append(e[line[2:]] - 2 * e[line[1:-1]] + e[line[:-2]])
         total = rms(e)
-        stated = p.noise if math.isfinite(p.noise) else 0.0
+        stated = p.stated
         if not differences:
             return (stated, math.sqrt(max(total**2 - stated**2, 0.0))) if stated else (total, 0.0)
         rough = float(np.median(np.abs(np.concatenate(differences)))) / math.sqrt(6 * math.log(2))

@@ -18,10 +18,12 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
+from ..estimation.segmented import Scales
 from ..starting.extend import extended
 from ..thresholds import BALANCED_STARTS, HOPELESS_START, TABLE_SIZES, WORK_MEDIUM
-from .fit import Points, Scales, relative_error, simulate_table
 from .force_balance import ForceBalance, can_be_imposed
+from .points import Points
+from .simulated import relative_error, simulate_table
 
 
 @dataclass(frozen=True)
