@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from ..thresholds import MANY_SEGMENTS
 from .multiple_shooting import Problem
-from .noise_model import noise_model
+from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
 
 
@@ -16,9 +17,10 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
     """Return the covariance of the scaled parameters and the directions the data do not determine.
 
     The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
-    H^-1, Omega the covariance of a stationary residual whose spectrum an autoregressive model gives; lost
-    degrees of freedom are given back. Errors that go on from one of many segments into the next (forces that
-    vary, whose trace in position every fitted start cuts off) are seen from the scores of the segments.
+    H^-1, Omega the covariance of stationary noise (`noise_spectrum`). Two of its standard errors hold the
+    truth for 95 % of records, also where the noise is known from few frequencies (Student's distribution).
+    Errors that go on from one of many segments into the next (forces that vary, whose trace in position every
+    fitted start cuts off) are seen from the scores of the segments.
 
     Returns
     -------
@@ -28,7 +30,7 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
 
     References
     ----------
-    Ljung (1999), sec. 9.4; Newey & West (1987).
+    Ljung (1999), sec. 9.4; Newey & West (1987); Satterthwaite (1946).
     """
     residual = problem.last
     ones = [np.ones(len(r)) for r in residual]
@@ -42,32 +44,32 @@ def covariance_of(problem: Problem, sensitivity: OutputSensitivity, jp, js):
         for e, v in zip(eigen, vectors.T, strict=True)
         if e < 1e-7 * top
     ]
-    inverse = (vectors / np.maximum(eigen, 1e-12 * top)) @ vectors.T / np.outer(size, size)
-    middle = np.zeros_like(h)
+    root = vectors / np.sqrt(np.maximum(eigen, 1e-12 * top)) / size[:, None]
+    inverse = root @ root.T
+    middle, variances = np.zeros_like(h), [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):
-        e, columns = problem.weighed(k, e), sensitivity.parameters[k]
-        if problem.error_filter is None and len(problem.segments[k]) >= MANY_SEGMENTS:
-            scores = np.array([columns[w].T @ e[w] for w in problem.segments[k].places])
+        e, columns, segments = problem.weighed(k, e), sensitivity.parameters[k], problem.segments[k]
+        if problem.error_filter is None and len(segments) >= MANY_SEGMENTS:
+            scores = np.array([columns[w].T @ e[w] for w in segments.places])
             middle += _long_run(scores)
             continue
-        n = len(e)
-        lost = len(problem.names) / len(residual) + js[k].shape[1] * len(problem.segments[k])
-        floor = problem.noise**2 if problem.error_filter is None else float(np.mean(e * e))
-        blocks = problem.segments[k].blocks if problem.error_filter is None else [slice(0, n)]
-        for block in blocks:
-            middle += n / max(n - lost, 0.1 * n) * _coloured(columns[block], e[block], floor)
-    return inverse @ middle @ inverse, null
+        floor = 1e-6 * (problem.noise**2 if problem.error_filter is None else float(np.mean(e * e)))
+        absorbed = np.column_stack((columns @ root, sensitivity.absorbed_by_starts(k)))
+        for block in segments.blocks if problem.error_filter is None else [slice(0, len(e))]:
+            noise = noise_spectrum(e[block], absorbed[block], floor)
+            middle += noise.product(columns[block])
+            variances.append(noise.variances(columns[block] @ inverse))
+    wide = _widening(*np.sum(variances, axis=0))
+    return inverse @ middle @ inverse * np.outer(wide, wide), null
 
 
-def _coloured(columns, e, floor) -> np.ndarray:
-    """Return J' Omega J, (p, p), for the colour of a stationary residual."""
-    length = 1 << (len(e) - 1).bit_length()
-    transform = np.fft.rfft(columns, length, axis=0)
-    omega = np.linspace(0, math.pi, transform.shape[0])
-    density = noise_model(e).spectrum(omega) + 1e-6 * floor
-    double = np.full(len(omega), 2.0)
-    double[0] = double[-1] = 1.0
-    return np.real((transform.conj() * (density * double / length)[:, None]).T @ transform)
+def _widening(variances, errors) -> np.ndarray:
+    """Return how much wider than of a normal distribution two standard errors are, (p,).
+
+    `errors`: variances of what the variances are estimated to be.
+    """
+    freedom = 2 * variances**2 / np.maximum(errors, 1e-300)
+    return np.where(errors > 0, stdtrit(np.clip(freedom, 1.0, 1e6), ndtr(2.0)) / 2, 1.0)
 
 
 def _long_run(scores) -> np.ndarray:

@@ -21,6 +21,7 @@ from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator, feasible
 from ..prediction.simulators import simulator_of
 from ..thresholds import GOOD, RTOL
+from .elimination import products_of, states_for
 from .noise_model import power
 from .restarts import restart_segments, scan_gap_state
 from .sensitivity import OutputSensitivity
@@ -386,7 +387,7 @@ class Problem:
         self.nfev += len(starts) * len(some) / len(segments) / len(self.segments)
         base = (self.measured[k] - self.last[k])[seen]
         js = _by_start(starts, widths, signals, base, self._by_place(k)[seen])
-        return _by_segment(js, np.empty((len(base), 0)), self.last[k][seen], np.ones(len(base)), some)
+        return products_of(js, self.last[k][seen], None, some)
 
     def _moved_starts(self, k, nuisance, segments, priors):
         """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
@@ -436,22 +437,17 @@ class Problem:
                 h += a.T @ a
                 g += a.T @ r
                 continue
-            products = _by_segment(js[k], jp[k], residual[k], weights[k], segments)
-            ns = js[k].shape[1]
+            others = np.column_stack((jp[k], residual[k]))
+            products, ns = products_of(js[k], others, weights[k], segments), js[k].shape[1]
             h += products[:, ns:-1, ns:-1].sum(axis=0)
             g += products[:, ns:-1, -1].sum(axis=0)
             if ns:
                 precision = prior / self.priors[k] ** 2
-                ss, right = products[:, :ns, :ns], products[:, :ns, ns:].copy()
-                i = np.arange(ns)
-                ss[:, i, i] += precision
-                ss[:, i, i] *= 1 + damping
-                right[:, :, -1] -= precision * (nuisance[k] - means[k])
-                # of one size, whatever the units: pivots are then chosen alike
-                size = np.sqrt(ss[:, i, i])[:, :, None]
-                solved = np.linalg.solve(ss / (size * size.transpose(0, 2, 1)), right / size) / size
-                h -= np.einsum("wsi,wsj->ij", right[:, :, :p], solved[:, :, :p])
-                g -= np.einsum("wsi,ws->i", right[:, :, :p], solved[:, :, p])
+                off = nuisance[k] - means[k]
+                solved = states_for(products, precision, damping, off)
+                coupled = products[:, :ns, ns:-1]
+                h -= np.einsum("wsi,wsj->ij", coupled, solved[:, :, :p])
+                g -= np.einsum("wsi,ws->i", coupled, solved[:, :, p])
                 pieces.append((k, solved))
 
         def back(step):
@@ -508,14 +504,3 @@ def _by_start(starts, widths, signals, base, by_place) -> np.ndarray:
         for start, width in zip(starts, widths, strict=True)
     ]
     return np.array(rows).T.reshape(len(base), len(rows))
-
-
-def _by_segment(states, parameters, residual, weights, segments: Segments) -> np.ndarray:
-    """Return Z' W Z of every segment, (nw, q, q), for Z = [states, parameters, residual] (n, q)."""
-    z = np.column_stack((states, parameters, residual))
-    weighted = z * weights[:, None]
-    products = np.empty((len(segments), z.shape[1], z.shape[1]))
-    for i in range(z.shape[1]):
-        column = segments.sums(weighted[:, i:] * z[:, i : i + 1])
-        products[:, i, i:] = products[:, i:, i] = column
-    return products

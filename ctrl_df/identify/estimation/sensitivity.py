@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .elimination import products_of, states_for
+
 
 class OutputSensitivity:
     """A fitted model as a linear map: what its parameters and initial states can change in the output.
@@ -35,14 +37,30 @@ class OutputSensitivity:
         out = np.array(columns, dtype=float)
         if self.error_filter is not None:
             return self.error_filter.filtered(out, self.segments[k].slices)
-        for w, where in enumerate(self.segments[k].places):
-            s = self.states[k][where]
-            if s.shape[1]:
-                normal = s.T @ s + np.diag(self.ridge[k][w])
-                size = np.sqrt(np.diag(normal))
-                weights = np.linalg.solve(normal / np.outer(size, size), (s.T @ out[where]) / size[:, None])
-                out[where] -= s @ (weights / size[:, None])
+        states, segments = self.states[k], self.segments[k]
+        if states.shape[1]:
+            solved = states_for(products_of(states, out, None, segments), self.ridge[k])
+            for i, column in enumerate(states.T):
+                for j in range(out.shape[1]):
+                    out[:, j] -= column * segments.spread(solved[:, i, j])
         return out
+
+    def absorbed_by_starts(self, k) -> np.ndarray:
+        """Return columns B (n, m) of one record whose ``B @ B.T`` is what its initial states take away."""
+        states, segments = self.states[k], self.segments[k]
+        ns = states.shape[1]
+        if self.error_filter is not None or not ns:
+            return np.zeros((len(self.parameters[k]), 0))
+        products = products_of(states, np.empty((len(states), 0)), None, segments)
+        i = np.arange(ns)
+        products[:, i, i] += self.ridge[k]
+        size = np.sqrt(products[:, i, i])[:, :, None]
+        eigen, vectors = np.linalg.eigh(products / (size * size.transpose(0, 2, 1)))
+        root = vectors / np.sqrt(np.maximum(eigen, 1e-12))[:, None, :] / size
+        found = np.zeros((len(states), len(segments), ns))
+        for w, where in enumerate(segments.places):
+            found[where, w] = states[where] @ root[w]
+        return found.reshape(len(states), -1)
 
     @property
     def pieces(self) -> list[slice]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..prediction.segments import split
 from ..thresholds import BEGINNINGS, DAMPED, SEGMENT_LEAST
+from .elimination import states_for
 from .noise_model import power
 
 
@@ -87,7 +88,9 @@ class _Record:
         for _ in range(DAMPED):
             which, seen = self._signal(rows)
             some, starts = self.segments.only(which), problem.nuisance[k]
-            trial = problem.within_reach(k, starts[rows] + self._moves(products, starts[rows], rows), rows)
+            off = starts[rows] - self.means[rows]
+            moves = states_for(products, self.precision[rows], self.damping[rows], off)[:, :, 0]
+            trial = problem.within_reach(k, starts[rows] + moves, rows)
             residual = problem.measured[k][seen] - self.simulator.run(some, None, trial)
             problem.nfev += len(rows) / len(self.segments) / len(problem.segments)
             cost = self._cost(some, residual, trial, rows)
@@ -102,16 +105,3 @@ class _Record:
             if not rows.size:
                 return
         self.open[rows] = False
-
-    def _moves(self, products, starts, rows):
-        """Return the damped steps of Gauss and Newton, (nr, ns)."""
-        ns = starts.shape[1]
-        i = np.arange(ns)
-        ss, right = products[:, :ns, :ns].copy(), products[:, :ns, -1].copy()
-        ss[:, i, i] += self.precision[rows]
-        ss[:, i, i] *= 1 + self.damping[rows, None]
-        right -= self.precision[rows] * (starts - self.means[rows])
-        # of one size, whatever the units: pivots are then chosen alike
-        size = np.sqrt(ss[:, i, i])
-        solved = np.linalg.solve(ss / (size[:, :, None] * size[:, None, :]), (right / size)[:, :, None])
-        return solved[:, :, 0] / size
