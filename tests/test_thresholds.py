@@ -127,6 +127,19 @@ def whole(node):
     return isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value % 1 == 0
 
 
+@pytest.mark.parametrize(
+    "room", ["data", "datasets", "planning", "residuals", "results", "smoothing", "tables"]
+)
+def test_rooms_of_identification_take_their_numbers_from_one_place(room):
+    found = [
+        f"{room}/{path.name}:{line}: {value}"
+        for path in sorted((PACKAGE / "identify" / room).glob("*.py"))
+        for line, value in literals(path)
+        if value != 100.0  # per cent
+    ]
+    assert not found, found
+
+
 @pytest.mark.parametrize("package", MATHEMATICS)
 def test_every_tuned_number_of_a_package_has_its_place_and_its_reason(package):
     root = PACKAGE / package

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..estimation.segmented import Scales
-from ..thresholds import WORK_LOW, WORK_MEDIUM
+from ..thresholds import TABLE_STEPS, VARIANCE_LEAST, WORK_LOW, WORK_MEDIUM
 from .errors import log_density, outlying
 from .fit import FittedTable, fit_table
 from .simulated import relative_error, simulate_table
@@ -24,7 +24,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
     def fitted(begin, iterations):
         return fit_either(
             begin, points, (*free, *own), scales,
-            again=False, iterations=iterations, tolerance=1e-2, work=work,
+            again=False, iterations=iterations, tolerance=TABLE_STEPS["try"], work=work,
         )  # fmt: skip
 
     if not hopeful:
@@ -52,4 +52,4 @@ def fit_either(block, points, names, scales, *, again=True, **options) -> Fitted
 
 
 def _likelihood_of(fitted: FittedTable) -> float:
-    return float(log_density(fitted.error, 1e-12)[0].sum())
+    return float(log_density(fitted.error, VARIANCE_LEAST)[0].sum())

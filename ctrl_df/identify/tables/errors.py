@@ -6,7 +6,15 @@ import math
 
 import numpy as np
 
-from ..thresholds import GROSS
+from ..thresholds import (
+    EXPONENT,
+    GROSS,
+    MIXTURE_ROUNDS,
+    NOTHING,
+    OUTLYING_LEAST,
+    OUTLYING_POINT,
+    OUTLYING_SHARE,
+)
 
 
 def rms(error) -> float:
@@ -21,8 +29,12 @@ def outlying(error) -> np.ndarray:
     measured badly, the two differ by as much as N itself, and say nothing of the rest of the plane.
     """
     size = np.abs(error)
-    far = size > np.maximum(10 * np.median(size), 1e-3) if len(size) else np.zeros(0, bool)
-    return far if np.count_nonzero(far) <= max(len(size) // 16, 2) else np.zeros(len(size), bool)
+    far = (
+        size > np.maximum(OUTLYING_POINT * np.median(size), OUTLYING_LEAST)
+        if len(size)
+        else np.zeros(0, bool)
+    )
+    return far if np.count_nonzero(far) <= max(len(size) // OUTLYING_SHARE, 2) else np.zeros(len(size), bool)
 
 
 def log_density(error, least: float) -> tuple[np.ndarray, float]:
@@ -36,15 +48,15 @@ def log_density(error, least: float) -> tuple[np.ndarray, float]:
         The variance is no less.
     """
     size = np.abs(error) ** 2
-    gross = GROSS * np.exp(-np.minimum(size, 700.0))
+    gross = GROSS * np.exp(-np.minimum(size, EXPONENT))
     best = (np.full(len(size), -np.inf), least)
     for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
         variance = max(variance, least)
-        for _ in range(30):
-            usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+        for _ in range(MIXTURE_ROUNDS):
+            usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, EXPONENT))
             share = usual / (usual + gross)
-            variance = max(float(share @ size) / max(float(share.sum()), 1e-300), least)
-        usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
+            variance = max(float(share @ size) / max(float(share.sum()), NOTHING), least)
+        usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, EXPONENT))
         density = np.log(usual + gross)
         if density.sum() > best[0].sum():
             best = density, variance

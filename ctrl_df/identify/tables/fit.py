@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from ..estimation.segmented import Scales
 from ..estimation.variables import Variable
 from ..prediction.simulator import feasible
+from ..thresholds import TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
 from .errors import rms
 from .points import Points
 from .simulated import relative_error, simulate_table
@@ -81,10 +82,8 @@ def fit_table(
         Bounds on the work of one point, `WORK_LOW`, `WORK_MEDIUM` or `WORK_HIGH` (the default).
     """
     table = block.parameters
-    job = _Job(
-        block, points,
-        [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit), _side(block, k)) for k in names], work,
-    )  # fmt: skip
+    sizes = {k: TABLE_UNIT * scales.of(table[k].line_unit) for k in names}
+    job = _Job(block, points, [Variable(k, table[k], s, _side(block, k)) for k, s in sizes.items()], work)
     start = np.array([v.q(table[v.name].value) for v in job.variables])
     fit = _Fit(job, iterations, budget)
     converged = len(start) == 0
@@ -154,7 +153,10 @@ def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.nda
     """Return the slopes (2 n, p) of the weighted errors by scaled parameters."""
     table = block.parameters
     job = _Job(
-        block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit)) for k in names], work
+        block,
+        points,
+        [Variable(k, table[k], TABLE_UNIT * scales.of(table[k].line_unit)) for k in names],
+        work,
     )
     z = np.array([v.q(table[v.name].value) for v in job.variables])
     return job.slopes(z, job.errors(z)) if len(z) else np.zeros((2 * len(points), 0))
@@ -182,11 +184,11 @@ class _Job:
     def slopes(self, z, e) -> np.ndarray:
         columns = []
         for i, variable in enumerate(self.variables):
-            step = 1e-3 if variable.p(z[i] + 1e-3) != variable.p(z[i]) else -1e-3
+            step = TABLE_NUDGE if variable.p(z[i] + TABLE_NUDGE) != variable.p(z[i]) else -TABLE_NUDGE
             moved = z.copy()
             moved[i] += step
             slope = (self.errors(moved) - e) / step
             # where an orbit changes its kind the difference quotient is a jump, not a slope
-            slope[np.abs(slope) > 300.0] = 0.0
+            slope[np.abs(slope) > TABLE_JUMP] = 0.0
             columns.append(slope)
         return np.array(columns).T

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..estimation.segmented import Scales
+from ..thresholds import NEARLY_NOTHING, SCALE_LEAST
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class Points:
         cell = np.zeros(len(self), int)
         for axis in (self.A, self.omega):
             place = np.log(axis)
-            width = max(float(np.ptp(place)), 1e-12)
+            width = max(float(np.ptp(place)), NEARLY_NOTHING)
             cell = cell * side + np.minimum((side * (place - place.min()) / width).astype(int), side - 1)
         order = np.argsort(-np.asarray(size), kind="stable")
         _, first = np.unique(cell[order], return_index=True)
@@ -105,7 +106,7 @@ def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
     scale = np.abs(n)
     for value in np.unique(w):
         here = w == value
-        scale[here] = np.maximum(scale[here], 0.1 * np.median(np.abs(n[here & (n != 0)])))
+        scale[here] = np.maximum(scale[here], SCALE_LEAST * np.median(np.abs(n[here & (n != 0)])))
     return Points(a, w, n, weight, noise, np.concatenate(numbers), scale, records[0].input_unit)
 
 

@@ -21,9 +21,15 @@ from ..thresholds import (
     HOPELESS_ON_TABLE,
     POINTS,
     POINTS_COSTLY,
+    SCATTER_LEAST,
     SIGNIFICANT_TABLE,
     SIGNIFICANT_TABLE_HELD,
+    TABLE_BUDGET,
+    TABLE_ITERATIONS,
+    TABLE_STEPS,
     TOLD_APART,
+    TOP_FREQUENCIES,
+    UNEXPLAINED,
     WORK_MEDIUM,
 )
 from .candidate import fit_either, try_effect
@@ -105,11 +111,21 @@ class TableSearch(Search):
         heavy = inertia(self.block)
         if heavy in self.free:
             moved = inside.take(inside.N != 0)
-            top = moved.omega >= np.quantile(moved.omega, 0.8)
+            top = moved.omega >= np.quantile(moved.omega, TOP_FREQUENCIES)
             mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
             begins.append(self.block.with_parameters({heavy: mass}))
         begins += balanced([self.block], self.free, inside, self.scales)
-        fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
+        fits = [
+            fit_table(
+                b,
+                inside,
+                self.free,
+                self.scales,
+                iterations=TABLE_ITERATIONS["refit"],
+                tolerance=TABLE_STEPS["refit"],
+            )
+            for b in begins
+        ]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
     def _trial(self, key, fitted: FittedTable, extra: int, work=None, confirmed=False) -> TableTrial:
@@ -152,7 +168,11 @@ class TableSearch(Search):
                 begin = self.base.block.with_parameters(values)
             except ValueError:
                 continue
-            again = self._trial("", fit_table(begin, self.inside, self.free, self.scales, iterations=10), 0)
+            again = self._trial(
+                "",
+                fit_table(begin, self.inside, self.free, self.scales, iterations=TABLE_ITERATIONS["rebase"]),
+                0,
+            )
             if again.cost < self.base.cost:
                 self.base = again
         return self.ranked(self.base, best)
@@ -161,7 +181,7 @@ class TableSearch(Search):
         kind = tried.block.effects[-1]
         fitted = fit_either(
             tried.block, self.inside, tried.fitted.names, self.scales, iterations=3 if kind.costly else 12,
-            budget=120, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
+            budget=TABLE_BUDGET, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
         )  # fmt: skip
         return self._trial(tried.key, fitted, tried.extra, confirmed=True)
 
@@ -192,7 +212,9 @@ class TableSearch(Search):
 
         No model gets below the stated noise, or below how exact orbits are.
         """
-        return log_density(self.points.weight * tried.error, max(0.5 * self.points.stated, 1e-6) ** 2)
+        return log_density(
+            self.points.weight * tried.error, max(0.5 * self.points.stated, SCATTER_LEAST) ** 2
+        )
 
     def alike(self, a, b):
         """Whether two candidates' tables differ by less than the scatter lets one see."""
@@ -232,7 +254,9 @@ class TableSearch(Search):
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
-        unexplained = structure > 2.0 * noise and structure > 0.2 * there and not self._scattered(shown)
+        unexplained = (
+            structure > 2.0 * noise and structure > UNEXPLAINED * there and not self._scattered(shown)
+        )
         return Remainder(noise, structure, unexplained)
 
     def _split(self, t) -> tuple[float, float]:

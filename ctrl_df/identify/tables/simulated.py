@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...blocks.core import level
-from ..thresholds import RIGID, WORK_HIGH
+from ..thresholds import NOTHING, RESONANT, RIGID, WORK_HIGH
 from .points import Points
 
 
@@ -56,4 +56,4 @@ def relative_error(simulated, points: Points) -> np.ndarray:
     # a resonance on the grid must not outweigh all other points while a fit is on its way
     error = (points.N - filled) / points.scale
     size = np.abs(error)
-    return np.where(size > 30.0, 30.0 * error / np.maximum(size, 1e-300), error)
+    return np.where(size > RESONANT, RESONANT * error / np.maximum(size, NOTHING), error)
