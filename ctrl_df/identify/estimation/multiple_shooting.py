@@ -199,8 +199,8 @@ class Problem:
     @property
     def _nonsmooth(self) -> bool:
         """Whether events of the model come and go as its parameters move."""
-        nonsmooth = getattr(self.block, "nonsmooth", False)
-        return bool(self.names) and self.error_filter is None and nonsmooth
+        effects = getattr(self.block, "effects", ())
+        return bool(self.names) and self.error_filter is None and any(e.nonsmooth for e in effects)
 
     def _states_first(self, theta):
         """Find the initial states alone: parameters would bend to make up for them, past events."""

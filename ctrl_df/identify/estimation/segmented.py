@@ -298,7 +298,7 @@ class SegmentedData:
 
     def rtol_of(self, block) -> float:
         """Return the tolerance of a model's simulations: events that come and go want the finest."""
-        return RTOL if block.nonsmooth else self.rtol
+        return RTOL if any(e.nonsmooth for e in block.effects) else self.rtol
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
         """Return least and largest values: the model's own, and what the records show of its effects."""
