@@ -15,6 +15,7 @@ MATHEMATICS = {
     "simulate": {
         "program/layout.py",  # what stands where in arrays
         "compiler/packed.py",  # the same, for LLVM
+        "kernel/space.py: 32",  # a size of memory
     },
     "df": {
         "closed_form/kronrod.py",  # nodes and weights
