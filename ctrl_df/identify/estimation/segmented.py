@@ -293,7 +293,7 @@ class SegmentedData:
         starts = same_begins(near, view.segments)
         near = rough.fit(model, (), view=getattr(rough, name), starts=starts, iterations=3)
         found = self.fit(model, (), view=view, starts=near.starts, iterations=1)
-        if not any(e.nonsmooth for e in model.effects):
+        if not model.nonsmooth:
             return found
         # single segments may have begun in a wrong minimum: each goes on by itself
         return self.fit(model, (), view=view, starts=found.starts, iterations=1, followed=RESTARTS_KEPT)
