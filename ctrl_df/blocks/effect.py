@@ -200,9 +200,7 @@ class Effect:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """Its parameters by field name."""
-        return {
-            name: Parameter(getattr(self, name), **spec) for name, spec in stated_parameters(type(self))
-        }
+        return {name: Parameter(getattr(self, name), **spec) for name, spec in stated_parameters(type(self))}
 
     @property
     def values(self) -> tuple[float, ...]:

@@ -222,8 +222,8 @@ that share of the sensors' noise over the motion. Derivatives are differences ov
 0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
 
 RTOL_NONSMOOTH = 0.1
-"""Share of that tolerance for laws with events, which come and go with its errors: a gap and a curved law then
-err by 1e-4 of the sensors' noise (records)."""
+"""Share of that tolerance for laws with events, which come and go with its errors: a gap beside a curved law
+then errs by 1e-4 of the sensors' noise (records)."""
 
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""

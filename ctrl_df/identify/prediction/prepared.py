@@ -89,8 +89,15 @@ def of_block(block, record, u, thin: int) -> PreparedModel:
     time, value, hold = _driven(record, held, thin)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
     return PreparedModel(
-        Engine(inner), inner.core, 0, time + input_delay if input_delay else time, value, float(sum(delays)),
-        output, lags, hold,
+        Engine(inner),
+        inner.core,
+        0,
+        time + input_delay if input_delay else time,
+        value,
+        float(sum(delays)),
+        output,
+        lags,
+        hold,
     )
 
 

@@ -97,9 +97,7 @@ class How(NamedTuple):
     height: float
 
 
-def make_desk(
-    engine, space: Space, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray
-) -> Desk:
+def make_desk(engine, space: Space, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray) -> Desk:
     """Return what a thread needs for the runs of one program in a space; `logged`: keep their events."""
     program = engine.program
     n, ng = engine.nstates, int(program.ints[H_NG]) + 1
