@@ -240,8 +240,9 @@ def split(record: Measurement, segments: Segments, factor: int, least: int) -> S
     """
     begins, ends = [], []
     for i, j in zip(segments.begins, segments.ends, strict=True):
-        edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
-        edges[1:-1] -= (edges[1:-1] - i) % segments.step
+        edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1)
+        edges[1:-1] = i + np.round((edges[1:-1] - i) / segments.step) * segments.step
+        edges = edges.astype(int)
         begins.append(edges[:-1])
         ends.append(edges[1:])
     return _between(record, np.concatenate(begins), np.concatenate(ends)).every(segments.step)
