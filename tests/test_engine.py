@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import ctrl_df as cdf
+from ctrl_df.simulate.engine import Engine, sampled_drive
 from ctrl_df.status import Status
 
 
@@ -301,3 +302,15 @@ def test_bad_input_is_told(call, says):
 def test_unknown_keyword_is_refused():
     with pytest.raises(TypeError, match="unrecognized keyword"):
         cdf.event_response(cdf.Mass(1), [0, 1], nonsense=1)
+
+
+def test_a_run_leaves_nothing_behind_that_the_next_one_sees():
+    """Inputs that rise, then some that are held: what the first were over a step is not what these are."""
+    block = cdf.Mass(1.0).with_effect(cdf.Coulomb(1.0))
+    time, force = np.array([0.0, 0.13, 0.31, 0.6, 1.0]), np.array([0.5, 2.0, 0.9, 1.5, -0.7])
+    used, outputs = Engine(block), []
+    used.run(used.start(), 1.0, sampled_drive(time, 3 * force, "linear"))
+    for engine in (used, Engine(block)):
+        run = engine.run(engine.start(), 1.0, sampled_drive(time, force, "zoh"), np.linspace(0, 1, 50))
+        outputs.append(run.outputs)
+    assert np.array_equal(*outputs)

@@ -138,11 +138,9 @@ class Effect:
         cls.id = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     def __post_init__(self):
-        for field in dataclasses.fields(self):
-            spec = field.metadata.get("parameter")
-            if spec is not None:
-                value = checked(type(self).__name__, field.name, getattr(self, field.name), spec, self.remedy)
-                object.__setattr__(self, field.name, value)
+        for name, spec in stated_parameters(type(self)):
+            value = checked(type(self).__name__, name, getattr(self, name), spec, self.remedy)
+            object.__setattr__(self, name, value)
         self.check()
 
     remedy: ClassVar[str] = ""
@@ -202,16 +200,12 @@ class Effect:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """Its parameters by field name."""
-        return {
-            f.name: Parameter(getattr(self, f.name), **f.metadata["parameter"])
-            for f in dataclasses.fields(self)
-            if "parameter" in f.metadata
-        }
+        return {name: Parameter(getattr(self, name), **spec) for name, spec in stated_parameters(type(self))}
 
     @property
     def values(self) -> tuple[float, ...]:
         """Parameter values in declaration order: the `p` its law sees."""
-        return tuple(getattr(self, f.name) for f in dataclasses.fields(self) if "parameter" in f.metadata)
+        return tuple(getattr(self, name) for name, _ in stated_parameters(type(self)))
 
     def replace(self, **changes: Any) -> Effect:
         """Return the same effect with other parameter values."""
@@ -219,10 +213,17 @@ class Effect:
 
 
 @functools.cache
+def stated_parameters(cls: type[Effect]) -> tuple[tuple[str, dict[str, Any]], ...]:
+    """Return the names of the parameters of an effect class, in declaration order, with what is stated."""
+    return tuple(
+        (f.name, f.metadata["parameter"]) for f in dataclasses.fields(cls) if "parameter" in f.metadata
+    )
+
+
+@functools.cache
 def static_levels(cls: type[Effect]) -> tuple[str, ...]:
     """Return the parameters of an effect class that are static levels, none below the kinetic one."""
-    stated = {f.name: f.metadata.get("parameter", {}) for f in dataclasses.fields(cls)}
-    return tuple(name for name, spec in stated.items() if spec.get("threshold"))
+    return tuple(name for name, spec in stated_parameters(cls) if spec.get("threshold"))
 
 
 def register_effect(cls: _EffectClass) -> _EffectClass:

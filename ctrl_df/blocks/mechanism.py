@@ -16,7 +16,7 @@ from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
-from .effect import Effect, static_levels
+from .effect import Effect, stated_parameters, static_levels
 from .effects import Backlash, Coulomb, Stiction, Viscous
 from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
@@ -74,8 +74,17 @@ class Mechanism(ct.NonlinearIOSystem):
             states=states,
             dt=0,
             name=name,
-            params={key: p.value for key, p in self.parameters.items()},
+            params=self._numbers(),
         )
+
+    def _numbers(self) -> dict[str, float]:
+        """Return the values of `parameters` by name."""
+        found = dict(self._values)
+        for key, effect in zip(self._keys, self._effects, strict=True):
+            for (name, _), value in zip(stated_parameters(type(effect)), effect.values, strict=True):
+                if name != "load_fraction" or len(self._inertias) < 2:
+                    found[f"{key}.{name}"] = value
+        return found
 
     def _labels(self) -> tuple[list[str], list[str], list[str]]:
         """Return the names of inputs, outputs and states."""

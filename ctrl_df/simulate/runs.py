@@ -6,6 +6,7 @@ import os
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import wait
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,7 @@ from .engine import STATUS
 from .groups import Group
 from .kernel import driver, many
 from .kernel.many import Drives, How, Rows
+from .kernel.space import lent_space
 from .program import pointers
 from .program.layout import H_AFFINE
 from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, TOGETHER_RUNS
@@ -150,26 +152,31 @@ def run_many(
 
 
 def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine):
-    def each(values, kind: Any = float):
-        return np.array(np.broadcast_to(np.asarray(values, kind), (runs,)), order="C")
+    def each(values, kind: Any = float, shape: tuple[int, ...] = (runs,)):
+        found = np.empty(shape, kind)
+        found[...] = values
+        return found
 
     times = np.array(times, dtype=float, order="C")
     first = each(first, np.int64)
     count = len(times) - first if count is None else each(count, np.int64)
-    at = np.concatenate(([0], np.cumsum(count)))
+    at = np.zeros(runs + 1, np.int64)
+    np.cumsum(count, out=at[1:])
     clock = np.zeros((runs, 10))
-    clock[:, 0], clock[:, 8] = each(begin), -1
-    par, initial = np.zeros(runs, np.int64), [engine._initial] * runs
+    clock[:, 0], clock[:, 8] = begin, -1
+    par, modes = np.zeros(runs, np.int64), np.zeros(runs + 1, np.int64)
     for group in groups:
         par[group.runs] = group.row
-        for run in group.runs:
-            initial[run] = group.engine._initial
-    modes = np.concatenate(([0], np.cumsum([len(m) for m in initial]))).astype(np.int64)
-    x = np.array(np.broadcast_to(np.asarray(x0, float), (runs, engine.nstates)), order="C")
+        modes[1 + group.runs] = len(group.engine._initial)
+    np.cumsum(modes, out=modes)
+    mode = np.empty(int(modes[-1]), engine._initial.dtype)
+    for group in groups:
+        initial = group.engine._initial
+        mode[modes[group.runs][:, None] + np.arange(len(initial))] = initial
     return Rows(
-        x, np.concatenate(initial), modes, clock, each(end), each(max_steps, np.int64), each(drive, np.int64),
-        par, times, first, count, at[:-1].copy(), np.empty((int(at[-1]), engine.noutputs)),
-        np.full(runs, many.NOT_BEGUN), np.zeros(runs, np.int64),
+        each(x0, shape=(runs, engine.nstates)), mode, modes, clock, each(end), each(max_steps, np.int64),
+        each(drive, np.int64), par, times, first, count, at[:-1].copy(),
+        np.empty((int(at[-1]), engine.noutputs)), each(many.NOT_BEGUN, np.int64), np.zeros(runs, np.int64),
     )  # fmt: skip
 
 
@@ -179,7 +186,8 @@ class _Work:
     def __init__(self, groups, rows, drives, how, kept, states, events):
         for array in (*rows, *drives, *(g.par for g in groups)):
             # compiled code takes them for that
-            assert np.isscalar(array) or (array.flags.c_contiguous and array.flags.writeable)
+            if isinstance(array, np.ndarray):
+                assert array.flags.c_contiguous and array.flags.writeable
         self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
         self.kept, self.states, self.logged = kept, states, events
         self.stop = np.zeros(1, np.int64)
@@ -200,7 +208,8 @@ class _Work:
         curved = int(self.groups[0].engine.program.ints[H_AFFINE])
         if curved not in _ready:
             # compiled, or read from its file, before any thread asks for it
-            self._run(self._desk(self.groups[0]), self.groups[0], np.zeros(0, np.int64))
+            with ExitStack() as lent:
+                self._run(self._desk(self.groups[0], lent), self.groups[0], np.zeros(0, np.int64))
             _ready.add(curved)
         # this thread only waits: it is the one that hears Ctrl-C
         workers = [crew.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)]
@@ -216,21 +225,26 @@ class _Work:
 
     def one_by_one(self) -> None:
         """Make all runs in this thread: they call functions back that nobody knows to be safe elsewhere."""
-        for group in self.groups:
-            desk = self._desk(group)
-            for run in group.runs:
-                pointers.raised.clear()
-                pointers.gave_nan.clear()
-                with pointers.interruptible():
-                    self._run(desk, group, np.array([run]))
-                try:
-                    pointers.raise_kept()
-                except RuntimeError as error:
-                    self._fail(run, error)
-                    continue
-                far = np.max(np.abs(self.rows.x[run]), initial=0.0) >= FAR
-                if self.rows.reason[run] == driver.NAN and pointers.gave_nan and not far:
-                    self._fail(run, RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]})."))
+        with ExitStack() as lent:
+            for group in self.groups:
+                desk = self._desk(group, lent)
+                for run in group.runs:
+                    self._called_back(desk, group, run)
+
+    def _called_back(self, desk, group, run):
+        """Make one run that calls functions back."""
+        pointers.raised.clear()
+        pointers.gave_nan.clear()
+        with pointers.interruptible():
+            self._run(desk, group, np.array([run]))
+        try:
+            pointers.raise_kept()
+        except RuntimeError as error:
+            self._fail(run, error)
+            return
+        far = np.max(np.abs(self.rows.x[run]), initial=0.0) >= FAR
+        if self.rows.reason[run] == driver.NAN and pointers.gave_nan and not far:
+            self._fail(run, RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]})."))
 
     def events(self) -> tuple[np.ndarray, ...]:
         """Return all events that were logged: run, time [s], node, kind."""
@@ -250,18 +264,20 @@ class _Work:
 
     def _work(self, todo):
         desk = at = None
-        while not self.stop[0]:
-            try:
-                group, runs = todo.popleft()
-            except IndexError:
-                return
-            if group is not at:
-                desk, at = self._desk(group), group
-            self._run(desk, group, runs)
+        with ExitStack() as lent:
+            while not self.stop[0]:
+                try:
+                    group, runs = todo.popleft()
+                except IndexError:
+                    return
+                if group is not at:
+                    desk, at = self._desk(group, lent), group
+                self._run(desk, group, runs)
 
-    def _desk(self, group):
+    def _desk(self, group, lent: ExitStack):
+        space = lent.enter_context(lent_space(group.engine.program))
         states = self.kept if self.states else np.empty_like(self.kept)
-        return many.make_desk(group.engine, states, self.states, self.logged, self.stop)
+        return many.make_desk(group.engine, space, states, self.states, self.logged, self.stop)
 
     def _run(self, desk, group, runs):
         done = 0

@@ -17,7 +17,7 @@ from ...simulate.engine import Engine
 from ..data.measurement import Measurement
 from .decimated import lagged, thinned
 
-_THINNED: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
+_DRIVES: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
 REFERENCE = ("reference", "r")
 
 
@@ -86,23 +86,32 @@ def of_block(block, record, u, thin: int) -> PreparedModel:
     if outside:
         kept = [e for k, e in block.named_effects.items() if k not in outside]
         inner = block.with_effects(kept)
-    time, value, hold = t, held, record.input_hold
-    if thin > 1:
-        time, value, hold = _thinned(record, held, thin)
-    time, value = _before(record, time, value)
+    time, value, hold = _driven(record, held, thin)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
     return PreparedModel(
-        Engine(inner), inner.core, 0, time + input_delay, value, float(sum(delays)), output, lags, hold
+        Engine(inner),
+        inner.core,
+        0,
+        time + input_delay if input_delay else time,
+        value,
+        float(sum(delays)),
+        output,
+        lags,
+        hold,
     )
 
 
-def _thinned(record, held, thin):
-    """Return `thinned`, kept for as long as the record lives where no law has changed its input."""
-    if held is not record.u:
-        return thinned(record.t, held, thin)
-    known = _THINNED.setdefault(record, {})
+def _driven(record, held, thin):
+    """Return times and values of an input in steps of `thin` samples, and how to join them.
+
+    Kept for as long as the record lives where no law has changed its input.
+    """
+    known = _DRIVES.setdefault(record, {}) if held is record.u else {}
     if thin not in known:
-        known[thin] = thinned(record.t, held, thin)
+        time, value, hold = record.t, held, record.input_hold
+        if thin > 1:
+            time, value, hold = thinned(time, held, thin)
+        known[thin] = (*_before(record, time, value), hold)
     return known[thin]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -47,6 +48,11 @@ class Sensed:
     values: tuple[np.ndarray, ...]
     weights: tuple[float, ...]
     noise: float
+
+    @cached_property
+    def spans(self) -> list[tuple[float, float]]:
+        """Mean of each output, and ten times its spread: what stands for a model that ran away."""
+        return [(float(np.mean(y)), 10 * max(float(np.std(y)), 1e-300)) for y in self.values]
 
     def within(self, samples) -> np.ndarray:
         """Return the weighted values at some samples, (outputs times samples,)."""

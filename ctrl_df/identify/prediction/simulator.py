@@ -26,7 +26,7 @@ from .sensed import POSITION, sensed
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
 
-_PREPARED = 4  # parameter sets whose models are kept ready
+_PREPARED = 16  # parameter sets whose models are kept ready: those of a Jacobian, and the one they are about
 
 
 class Simulator:
@@ -216,15 +216,16 @@ class Simulator:
         edges = np.cumsum([0, *(len(segments) for segments, _, _ in asked)])
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
         x0, begins, lengths, drive = [], [], [], []
-        drives: dict[int, int] = {}  # parts have one each, shared by all segments
+        drives: dict[tuple[int, int], int] = {}  # shared by all segments, and by parts of one drive
         for part, (segments, _, start) in zip(parts, asked, strict=True):
             x0.append(self._starts(part, segments, start))
             begins.append(self.record.t[segments.begins] - self._late(part))
             lengths.append(segments.counts)
-            drive.append(np.full(len(segments), drives.setdefault(id(part), len(drives))))
+            inputs = id(part.drive_time), id(part.drive_value)
+            drive.append(np.full(len(segments), drives.setdefault(inputs, len(drives))))
         length = np.concatenate(lengths)
         first = np.concatenate(([0], np.cumsum(length)[:-1]))
-        known = {id(p): p for p in parts}
+        known = {(id(p.drive_time), id(p.drive_value)): p for p in parts}
         shared = [known[i] for i in drives]
         groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
         sampled = sampled_drives(
@@ -285,8 +286,8 @@ class Simulator:
         """Return what the sensors make of outputs; what ran away is set aside."""
         record, inside, held = self.record, segments.samples, self.sensed
         seen = []
-        for block, column, y, weight in zip(
-            segments.blocks, held.columns, held.values, held.weights, strict=True
+        for block, column, (centre, limit), weight in zip(
+            segments.blocks, held.columns, held.spans, held.weights, strict=True
         ):
             x = out[block]
             for primitive, later in part.output if column == POSITION else ():
@@ -294,11 +295,10 @@ class Simulator:
                     x += primitive.offset + primitive.rate * (record.t[inside] - later)
                 elif rounded:
                     x = primitive.value(x)
-            limit, centre = 10 * max(float(np.std(y)), 1e-300), float(np.mean(y))
-            with np.errstate(invalid="ignore"):
-                x = np.where(
-                    np.isfinite(x), np.clip(x, centre - 100 * limit, centre + 100 * limit), centre + limit
-                )
+            low, high = centre - 100 * limit, centre + 100 * limit
+            if not (x.min() >= low and x.max() <= high):  # NaN fails both
+                with np.errstate(invalid="ignore"):
+                    x = np.where(np.isfinite(x), np.clip(x, low, high), centre + limit)
             seen.append(x if len(held.columns) == 1 else weight * x)
         return self._joined(seen)
 

@@ -241,8 +241,9 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
         found.append(_from(start, screen, shortest, free))
     if cls.multimodal or screen.block.core.bodies == 2:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user
-        # does.
-        for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies):
+        # does. What changes in proportion to its size finds that within a step.
+        several = cls.multimodal or not cls.proportional
+        for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies if several else 1):
             attempt = _from(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
             found.append(attempt and replace(attempt, nominal=True))
     return starts, [a for a in found if a is not None]

@@ -272,10 +272,9 @@ def forced(prog, drive, segment, t, length, rtol, store):
     nt, nh = drive.time.shape[0], drive.harmonics.shape[1]
     least = 0
     ramped = nt > 0 and drive.linear == 1 and segment + 1 < nt
-    if ramped or nh > 1:
-        for k in range(TERMS + 1):
-            for i in range(nr):
-                store.forcing[k, i] = 0.0
+    for k in range(TERMS + 1):
+        for i in range(nr):
+            store.forcing[k, i] = 0.0
     if ramped:
         for i in range(nr):
             rise = drive.samples[i, segment + 1] - drive.samples[i, segment]

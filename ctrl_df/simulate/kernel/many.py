@@ -21,7 +21,7 @@ from ..program.layout import H_NG, Drive, Program
 from ..thresholds import EVENTS, LOGS, MOST_OUTPUTS, STEPS_AT_ONCE, steps_at_once
 from . import driver
 from .pace import keep_pace
-from .space import space_at, workspace
+from .space import Space, space_at
 
 NOT_BEGUN, UNFINISHED = -1, -2
 """Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
@@ -97,11 +97,10 @@ class How(NamedTuple):
     height: float
 
 
-def make_desk(engine, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray) -> Desk:
-    """Allocate what a thread needs for the runs of one program; `logged`: keep their events."""
+def make_desk(engine, space: Space, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray) -> Desk:
+    """Return what a thread needs for the runs of one program in a space; `logged`: keep their events."""
     program = engine.program
     n, ng = engine.nstates, int(program.ints[H_NG]) + 1
-    space = workspace(program, delays=True)
     keep_pace(program, space)
     room = LOGS * EVENTS if logged else 1
     log_t, log_n, log_k, log_row = (np.zeros(room, kind) for kind in (float, np.int64, np.int64, np.int64))

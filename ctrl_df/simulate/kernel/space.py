@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +31,8 @@ from .glide import Glide, glide_memory
 from .stepper import STAGES
 
 _NONE = np.zeros(0, np.int64)
+_KINDS = 8  # of programs whose spaces are kept, some megabytes each
+_idle: dict[tuple[bytes, bytes], list[Space]] = {}
 LAYOUT = Layout()
 space_at = LAYOUT.opener()
 """A `Space` from its address, in compiled code."""
@@ -59,6 +63,20 @@ class Space(NamedTuple):
     led: np.ndarray  # where the last of these led: time, segment, next output, next tick, whether one ticked
     words: np.ndarray  # all these, laid out
     at: int  # and where
+
+
+@contextmanager
+def lent_space(prog) -> Iterator[Space]:
+    """Lend a space to a thread that begins every run in it afresh; it is kept for programs alike."""
+    kind = prog.nodes.tobytes(), prog.ints.tobytes()
+    try:
+        space = _idle[kind].pop()
+    except LookupError:
+        space = workspace(prog, delays=True)
+    yield space
+    if len(_idle) >= _KINDS and kind not in _idle:
+        _idle.clear()
+    _idle.setdefault(kind, []).append(space)
 
 
 def workspace(prog, delays: bool = False):

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, RIGID, Core
+from ...blocks.effect import stated_parameters
 from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
 from ...checks import returned, shown
 from ..thresholds import PROBED
@@ -215,5 +216,10 @@ def _sort(effects) -> int:
 
 def _narrowest(chain) -> float:
     """Return the smallest speed among the parameters of a chain of friction laws [m/s]; inf if none."""
-    speeds = [p.value for effect in chain for p in effect.parameters.values() if p.unit == "m/s"]
+    speeds = [
+        value
+        for effect in chain
+        for (_, stated), value in zip(stated_parameters(type(effect)), effect.values, strict=True)
+        if stated["unit"] == "m/s"
+    ]
     return min((v for v in speeds if v > 0), default=np.inf)
