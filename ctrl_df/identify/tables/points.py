@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data.frequency_measurement import FrequencyMeasurement
-from ..estimation.segmented import Scales
+from ..estimation.scales import Scales
 from ..thresholds import NEARLY_NOTHING, SCALE_LEAST
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
-from ..estimation.segmented import Scales
+from ..estimation.scales import Scales
 from ..starting.extend import extended
 from ..thresholds import (
     BALANCED_STARTS,
