@@ -22,7 +22,7 @@ BROWSER = next(
 
 @pytest.fixture(scope="module")
 def study():
-    rig = rigs.draw("linear_spring", 14, snr_db=60, n=2000)
+    rig = rigs.draw("linear_spring", 14, excitation="multisine", snr_db=60, n=500)
     train, held = rig.train[0].measurement(), rig.holdout[0].measurement()
     return improve(rig.baseline, train, held, candidates=("linear_spring", "quadratic_drag"), max_effects=1)
 
@@ -70,6 +70,8 @@ def page_of(path):
     return Page(text), text
 
 
+# a ladder and its report, with all that both stand on
+@pytest.mark.quick
 def test_it_needs_nothing_else(path):
     page, text = page_of(path)
     assert not page.open, f"left open: {page.open}"
@@ -89,6 +91,7 @@ def test_pictures_decode_and_are_described(path):
         assert len(description) > 10
 
 
+@pytest.mark.quick
 def test_it_tells_the_story(path, study):
     page, _ = page_of(path)
     words = " ".join(page.words)

@@ -15,6 +15,7 @@ MATHEMATICS = {
     "simulate": {
         "program/layout.py",  # what stands where in arrays
         "compiler/packed.py",  # the same, for LLVM
+        "kernel/space.py: 32",  # a size of memory
     },
     "df": {
         "closed_form/kronrod.py",  # nodes and weights
@@ -125,6 +126,19 @@ def literals(path):
 def whole(node):
     """Whether a node of a formula is a whole number."""
     return isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value % 1 == 0
+
+
+@pytest.mark.parametrize(
+    "room", ["data", "datasets", "planning", "residuals", "results", "smoothing", "tables"]
+)
+def test_rooms_of_identification_take_their_numbers_from_one_place(room):
+    found = [
+        f"{room}/{path.name}:{line}: {value}"
+        for path in sorted((PACKAGE / "identify" / room).glob("*.py"))
+        for line, value in literals(path)
+        if value != 100.0  # per cent
+    ]
+    assert not found, found
 
 
 @pytest.mark.parametrize("package", MATHEMATICS)

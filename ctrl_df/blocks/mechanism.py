@@ -109,6 +109,11 @@ class Mechanism(ct.NonlinearIOSystem):
         return dict(zip(self._keys, self._effects, strict=True))
 
     @property
+    def nonsmooth(self) -> bool:
+        """Whether events of some effect come and go as parameters move (`Effect.nonsmooth`)."""
+        return any(effect.nonsmooth for effect in self.effects)
+
+    @property
     def newest(self) -> str:
         """Name of the effect that was added last."""
         return self._keys[-1]

@@ -16,7 +16,7 @@ from .data.measurement import Measurement
 from .data.quantities import quantity_of
 from .estimation.variables import default_free
 from .prediction.sensed import OUTPUT_COLUMNS
-from .thresholds import SEGMENT_SAMPLES
+from .thresholds import ON_SAMPLE, SEGMENT_SAMPLES
 
 MODES = ("auto", "free", "windows")
 
@@ -87,7 +87,7 @@ def check_window(records: Sequence[Measurement], mode, window) -> None:
         "a comparison", "window", window, "s", remedy="Leave it out for one that fits the motion."
     )
     for record in records:
-        if not length >= SEGMENT_SAMPLES * record.dt * (1 - 1e-9):
+        if not length >= SEGMENT_SAMPLES * record.dt * (1 - ON_SAMPLE):
             raise ValueError(
                 f"window needs a length >= {SEGMENT_SAMPLES * record.dt:g} s ({SEGMENT_SAMPLES} samples of "
                 f"{record.name!r}); got window={window!r}. Leave it out for one that fits the motion."

@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 from ..checks import place_to_write
+from .thresholds import REPORT_BUDGET, REPORT_DPI
 
 _ERRORS = {
     "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
@@ -78,7 +79,7 @@ def _known(study):
 
     names = default_free(study.model)
     try:
-        return refit(study.model, list(study.train), names, budget=200)
+        return refit(study.model, list(study.train), names, budget=REPORT_BUDGET)
     except (ValueError, ArithmeticError):
         return None
 
@@ -191,7 +192,7 @@ def _picture(draw, text) -> dict:
     open_before = plt.get_fignums()
     buffer = io.BytesIO()
     try:
-        draw(width=8.0).figure.savefig(buffer, format="png", dpi=130)
+        draw(width=8.0).figure.savefig(buffer, format="png", dpi=REPORT_DPI)
     finally:
         for number in set(plt.get_fignums()) - set(open_before):
             plt.close(number)

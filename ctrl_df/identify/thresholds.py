@@ -222,8 +222,8 @@ that share of the sensors' noise over the motion. Derivatives are differences ov
 0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
 
 RTOL_NONSMOOTH = 0.1
-"""Share of that tolerance for laws with events, which come and go with its errors: a gap and a curved law then
-err by 1e-4 of the sensors' noise (records)."""
+"""Share of that tolerance for laws with events, which come and go with its errors: a gap beside a curved law
+then errs by 1e-4 of the sensors' noise (records)."""
 
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""
@@ -377,5 +377,244 @@ FORCE_KNOWN = 0.8
 CURVE_BINS, CURVE_LEAST = 25, 4
 """Steps of a curve over a quantity, at most and at least."""
 
+UNLIKE = 0.1
+"""Autocorrelation of a force below which it is another one: what is left adds less than its own scatter."""
+
 CURVE_ALONE = 4
 """Instants that know of different forces, for each step of a curve: its error is half their spread."""
+
+SMOOTHER_BEGIN, SMOOTHER_USUAL = (0.3, 0.1), (0.1, 0.1)
+"""Size of the missing force over the known one, its time over a to-and-fro motion: where their search begins,
+and most probable before any data."""
+
+SMOOTHER_DAMPED, SMOOTHER_SPREADS = (0.7, 0.2), (0.02, 0.05)
+"""Size of the simplex, logarithmic, in the first two rounds and later; of it and of the likelihood at its
+end."""
+
+SMOOTHER_EVALUATIONS = 60
+"""Of the likelihood, for each of its rounds."""
+
+SMOOTHER_JITTER, SMOOTHER_DRIVEN = 1e-4, 1e-3
+"""Process noise of every state, over its scale, and of speeds, over what the known force gives them in a
+step: matrices stay regular."""
+
+UNLIKELY = -1e300
+"""Logarithm of a likelihood that is none."""
+
+PARAMETER_NUDGE = 1e-4
+"""Of parameters, relative, where runs of a whole record are differenced."""
+
+HELD_BACK = 0.1
+"""Share of the largest gain below which a state is moved by no force: it sticks."""
+
+SLOWLY = 0.05
+"""Speed, over its rms, below which a record hardly moves."""
+
+# --- rounding ---------------------------------------------------------------------------------------
+
+NOTHING, NEARLY_NOTHING = 1e-300, 1e-12
+"""What quotients are divided by where their divisor may be zero: of any size, of the size of one."""
+
+FAINT = 1e-30
+"""Power, over all of it, that is none."""
+
+DEPENDENT = 1e-9
+"""Singular value, over the largest, of columns that depend on each other: noise of a millionth shows more."""
+
+# --- describing functions ---------------------------------------------------------------------------
+
+RESONANT = 30.0
+"""Relative error of a point that counts as no larger: a resonance on the grid must not outweigh all others
+while a fit is on its way."""
+
+SCALE_LEAST = 0.1
+"""Share of the median ``|N|`` at a frequency that errors are relative to at least."""
+
+OUTLYING_POINT, OUTLYING_LEAST, OUTLYING_SHARE = 10, 1e-3, 16
+"""Error over the median, and at least, from which a point is of another motion; one in so many may be, or
+two."""
+
+MIXTURE_ROUNDS, EXPONENT = 30, 700.0
+"""Rounds of a mixture's variance; largest exponent whose exponential is a number."""
+
+VARIANCE_LEAST, SCATTER_LEAST = 1e-12, 1e-6
+"""Variance and size of relative errors at least: exact orbits are no better."""
+
+TABLE_NUDGE, TABLE_JUMP = 1e-3, 300.0
+"""Step of a scaled parameter; slope that is a jump: where an orbit changes its kind."""
+
+TABLE_UNIT = 0.1
+"""Of the scales of a table, the unit in which its parameters are moved."""
+
+TABLE_STEPS = {"try": 1e-2, "refit": 1e-4, "last": 1e-6}
+"""Relative gain at which a fit to a table stops: while effects are tried, of the model itself, at the end."""
+
+TABLE_ITERATIONS = {"rebase": 10, "refit": 25, "last": 40}
+"""Steps of such fits at most."""
+
+TABLE_BUDGET = 120
+"""Tables computed for one of the best candidates."""
+
+TOP_FREQUENCIES = 0.8
+"""Quantile of the frequencies from which the mass shows alone."""
+
+UNEXPLAINED = 0.2
+"""Share of the structure that was there, from which what the best candidate leaves is unexplained."""
+
+BALANCE_RTOL, BALANCE_NUDGE, BALANCE_RANK = 1e-4, 1e-3, 1e-6
+"""Of forces that are balanced: tolerance of hidden states, step of a parameter, singular value left out."""
+
+BALANCE_GAIN, BALANCE_LOWEST = 1e-3, 1e-2
+"""Relative gain of a round that is none; share of a positive parameter that a round leaves of it at least."""
+
+START_COMMON, START_SAME = 0.1, 1e-5
+"""Share of the mean error added to every point's, so that one of another motion hides no good start; relative
+difference of tables that an effect does not change."""
+
+DRY_SHARES, DELAYS, UNKNOWN_SIZES = (0.1, 0.3, 0.6), (0.02, 0.1, 0.4, 1.2), (0.1, 1.0)
+"""Levels of friction, over the friction there is or the least force applied; times over the shortest period;
+multiples of the usual size of a parameter that has no default."""
+
+FLAT_SINGULAR, FLAT_COLUMN, FLAT_INVERSE = 1e-5, 1e-6, 1e-8
+"""Singular value, over the largest, of a direction that a table does not determine; slope, over the largest,
+of a parameter that it does not; singular value that an inverse takes at least."""
+
+TAKES_PART = 0.1
+"""Component of such a direction from which a parameter takes part in it."""
+
+# --- tests and regions ------------------------------------------------------------------------------
+
+LEVEL = 0.01
+"""Level of tests: one in a hundred by chance."""
+
+SMALLEST_SAID = 1e-6
+"""Probability below which that is all that is said."""
+
+TWO_SIDED = 1.96
+"""Standard deviations of a 95 % band."""
+
+WHITENESS_LAGS = 25
+"""Lags of a test of whiteness at most."""
+
+INPUT_LAGS = 3000
+"""Lags of a test for traces of the input at most; a tenth of the samples."""
+
+DECORRELATED = 0.37
+"""Correlation at which a first-order signal has forgotten: 1/e."""
+
+BANDWIDTH, AT_ROOT = 1.1447, 1e-6
+"""Andrews' (1991) factor of the bandwidth of Bartlett's kernel; distance of a correlation from one, at
+least."""
+
+FASTEST, LOW_SPEED, MEDIUM_SPEED = 0.95, 0.1, 0.6
+"""Quantile of the speeds that is fast, and shares of it below which a motion is slow, and of medium speed."""
+
+AFTER_REVERSAL = 0.15
+"""Share of the time between two reversals that is just after one."""
+
+REGION_SAMPLES, RECORD_SAMPLES, SPECTRUM_LEAST = 60, 50, 100
+"""Independent samples of a region at least; samples of a record for regions, and for a spectrum."""
+
+FREE_ORDER = 12
+"""Order of the noise model of a residual, while free forces are fitted to it."""
+
+FREE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
+"""Range of a quantity left out at either end, as a quantile, and steps of a free force over it."""
+
+HUM_WINDOW = 161
+"""Frequencies whose median is the power beside a hum."""
+
+HORIZON_TOLERANCE = 1e-2
+"""Relative gain at which initial states of a stretch are found."""
+
+SMOOTHED_ENDS = 0.6
+"""Periods of the cutoff at either end that a smoothed signal is not used of."""
+
+SHOWN_PROBABILITY = 0.01
+"""Of a candidate that is worth a word."""
+
+LEAST_WIDTH = 30
+"""Letters of the first column of a ladder."""
+
+# --- shapes of plans --------------------------------------------------------------------------------
+
+PLAN_SLACK = 1.0001
+"""Over a limit, that is rounding."""
+
+PLAN_MOVES = 0.2
+"""Least swing of the candidates' outputs, over the largest: below, one of them does not move."""
+
+PLAN_BAND, PLAN_SINES = (0.3, 8.0, 10.0), 20
+"""Frequencies over that of the motion: lowest, highest of a multisine, of a chirp; sines of the former."""
+
+PLAN_STEPS, PLAN_STEP_RATE, PLAN_STEP_SIZES = 400, 0.5, (0.4, 0.6)
+"""Random steps, their rate over that of the motion, and their sizes: at least, and how much more at most."""
+
+PLAN_TRIANGLE = 0.4
+"""Rate of a triangle, over that of the motion."""
+
+SIGMA_LEAST = 1e-6
+"""Relative noise of a table that plans count with at least."""
+
+# --- reading and checking ---------------------------------------------------------------------------
+
+MINIMUM = 10
+"""Samples of a record at least: fewer have no derivatives."""
+
+BESIDE, LEAP, FAST = 5, 20.0, 5.0
+"""Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
+
+USUAL_STEPS = (0.05, 0.95)
+"""Quantiles between which steps of time lie that are usual."""
+
+REGULAR = 0.01
+"""Difference of steps of time, over their median, that is jitter."""
+
+ON_SAMPLE = 1e-9
+"""Of a step: difference of instants that rounding makes."""
+
+MOST_COLUMNS = 99
+"""Of a matrix: more is a row of samples."""
+
+BLOCK, SAMPLE_ROWS = 100_000, 2000
+"""Rows converted at once, so that memory stays near the size of the file; rows that the decimal mark is read
+off."""
+
+BINARY, BINARY_LOOK = 0.002, 100_000
+"""Share of control characters from which a file is no text; characters that are looked at."""
+
+NANOSECONDS = 1e9
+"""In a second: times of day are kept as whole ones."""
+
+# --- signals ----------------------------------------------------------------------------------------
+
+FEW_VALUES, ON_STEP, ON_STEPS = 0.9, 0.05, 0.9
+"""Share of different values, over the samples, up to which a signal may be rounded; distance from a multiple
+of the step, over it, and share of the samples within it."""
+
+SPECTRUM_LENGTH = 16
+"""Samples of a segment of a spectrum at least."""
+
+WHITE_BAND = 0.95
+"""Share of the Nyquist frequency up to which noise is white: beyond, filters of instruments act."""
+
+QUARTILE = 0.6745
+"""Of a normal distribution: half the values lie within so many standard deviations."""
+
+FLOOR_LEAST = 1e-14
+"""Noise floor, over the largest power, that rounding makes."""
+
+CUTOFF_LOWEST, CUTOFF_HIGHEST = 0.1, 0.4
+"""Cutoff of a signal that is all noise, over the Nyquist frequency; the highest, over the sampling rate."""
+
+PADDING = 30
+"""Samples by which a signal is continued at its ends, at least, before it is filtered."""
+
+THINNED_BAND, THINNED_RIPPLE = 0.7, 5e-4
+"""Band that thinning keeps, over the new Nyquist frequency, and its ripple [dB]: flat within 1e-4, 49 dB down
+at that frequency."""
+
+# --- reports ----------------------------------------------------------------------------------------
+
+REPORT_BUDGET, REPORT_DPI = 200, 130
+"""Simulations of the refit that tells standard errors; dots per inch of its pictures."""

@@ -74,6 +74,18 @@ def path_of(t, x, v=None, *, still: float = 0.0, slow: float = 0.0) -> Path:
     return Path(np.column_stack([every, _directions(every[:, 1], still)]), number, unknown)
 
 
+def sine_path(amplitude: float, omega: float, phase: np.ndarray) -> Path:
+    """Return the motion ``amplitude cos(omega t)`` through its places at phases omega t (n,), with speeds."""
+    return path_of(phase / omega, amplitude * np.cos(phase), -amplitude * omega * np.sin(phase))
+
+
+def harmonics(values: np.ndarray, phase: np.ndarray, orders: int) -> np.ndarray:
+    """Return the harmonics Y_k (..., orders + 1) of values (..., n) at even phases over whole periods."""
+    y = 2.0 / len(phase) * (values @ np.exp(-1j * np.outer(phase, np.arange(orders + 1))))
+    y[..., 0] *= 0.5
+    return y
+
+
 def _turns(v0, b, c):
     """Return the pieces in which v0 + b s + c s^2 changes sign within 0 < s < 1, and where."""
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...simulate.imposed import imposed_forces, path_of
+from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ..thresholds import CREEPING, IMPOSED_SAMPLES, LAPS, NOTHING, SETTLED
 
 
@@ -17,7 +17,7 @@ def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[
     """
     # the motion turns midway between samples: a jump there costs the sum nothing
     phase = 2 * math.pi * (np.arange(IMPOSED_SAMPLES + 1) + 0.5) / IMPOSED_SAMPLES
-    path = path_of(phase / omega, amplitude * np.cos(phase), -amplitude * omega * np.sin(phase))
+    path = sine_path(amplitude, omega, phase)
     z, residual = np.zeros((1, core.nstates - 2)), math.inf
     for _ in range(LAPS):
         force, _, states = imposed_forces([core], path, z, states=True)
@@ -28,7 +28,4 @@ def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[
             break
     if residual > CREEPING or not np.all(np.isfinite(force)):
         return np.full(orders + 1, np.nan, complex), math.nan
-    k = np.arange(orders + 1)[:, None]
-    y = 2.0 * np.mean(force[0, :IMPOSED_SAMPLES] * np.exp(-1j * k * phase[:IMPOSED_SAMPLES]), axis=1)
-    y[0] *= 0.5
-    return y / amplitude, residual
+    return harmonics(force[0, :-1], phase[:-1], orders) / amplitude, residual

@@ -7,12 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...checks import is_number, shown
+from ..thresholds import BESIDE, FAST, LEAP, MINIMUM, USUAL_STEPS
 from .derivatives import grain, step_of
-
-MINIMUM = 10
-
-_BESIDE, _LEAP, _FAST = 5, 20.0, 5.0
-"""Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -84,7 +80,7 @@ def check_times(owner: str, t: np.ndarray) -> None:
             "Drop the repeated rows, or write the times with more digits."
         )
     middle = float(np.median(steps))
-    low, high = np.quantile(steps, [0.05, 0.95])
+    low, high = np.quantile(steps, USUAL_STEPS)
     if high > 1.5 * low:
         return  # irregular on purpose: every interval is as good as another
     limit = max(1.5 * middle, 1.5 * high)
@@ -124,11 +120,11 @@ def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
     """
     steps = np.abs(np.diff(x))
     around = np.zeros(len(steps))
-    for lag in range(1, _BESIDE + 1):
+    for lag in range(1, BESIDE + 1):
         around[lag:] = np.maximum(around[lag:], steps[:-lag])
         around[:-lag] = np.maximum(around[:-lag], steps[lag:])
-    alone = steps > _LEAP * np.maximum(around, max(step_of(x), grain(x)))
-    leaps = np.flatnonzero(alone & (steps > _FAST * np.max(steps[~alone], initial=0.0)))
+    alone = steps > LEAP * np.maximum(around, max(step_of(x), grain(x)))
+    leaps = np.flatnonzero(alone & (steps > FAST * np.max(steps[~alone], initial=0.0)))
     jumps = np.zeros(len(steps))
     jumps[leaps] = np.diff(x)[leaps]
     between = x[1:] - np.cumsum(jumps)

@@ -7,13 +7,29 @@ import math
 import numpy as np
 
 from ...checks import number
+from ..thresholds import (
+    CUTOFF_HIGHEST,
+    CUTOFF_LOWEST,
+    FEW_VALUES,
+    FLOOR_LEAST,
+    ON_SAMPLE,
+    ON_STEP,
+    ON_STEPS,
+    PADDING,
+    QUARTILE,
+    REGULAR,
+    SPECTRUM_LENGTH,
+    THINNED_BAND,
+    THINNED_RIPPLE,
+    WHITE_BAND,
+)
 
 
 def uniform(t: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Return (dt, times, values) on a regular grid; irregular samples are interpolated linearly."""
     steps = np.diff(t)
     middle = float(np.median(steps))
-    if np.all(np.abs(steps - middle) <= 0.01 * middle):
+    if np.all(np.abs(steps - middle) <= REGULAR * middle):
         return float((t[-1] - t[0]) / (len(t) - 1)), t, y
     n = max(round(float((t[-1] - t[0]) / middle)) + 1, len(t))
     grid = np.linspace(t[0], t[-1], n)
@@ -27,7 +43,7 @@ def step_of(y: np.ndarray) -> float:
     values repeat.
     """
     values = np.unique(y)
-    if len(values) < 3 or len(values) > 0.9 * len(y):
+    if len(values) < 3 or len(values) > FEW_VALUES * len(y):
         return 0.0
     # Values equal but for floating-point dust are one value.
     gaps = np.diff(values)
@@ -37,20 +53,22 @@ def step_of(y: np.ndarray) -> float:
     quantum = float(np.min(gaps))
     quantum = float(np.median(gaps[gaps < 1.5 * quantum]))
     off = np.abs(gaps / quantum - np.round(gaps / quantum))
-    return quantum if np.mean(off < 0.05 + 1e-9 * len(y)) > 0.9 else 0.0
+    return quantum if np.mean(off < ON_STEP + ON_SAMPLE * len(y)) > ON_STEPS else 0.0
 
 
 def spectrum(y: np.ndarray, dt: float, segments: int = 12) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies [Hz] and one-sided spectral density of a signal (averaged, Hann window)."""
     from scipy.signal import welch
 
-    length = min(len(y), max(2 ** int(math.log2(max(2 * len(y) // segments, 16))), 16))
+    length = min(
+        len(y), max(2 ** int(math.log2(max(2 * len(y) // segments, SPECTRUM_LENGTH))), SPECTRUM_LENGTH)
+    )
     return welch(y, 1 / dt, nperseg=length, detrend="linear")  # type: ignore[return-value]
 
 
 def white_level(f: np.ndarray, p: np.ndarray) -> float:
     """Return the density of the floor between half and 95 % of the Nyquist frequency."""
-    band = (f > 0.5 * f[-1]) & (f < 0.95 * f[-1])
+    band = (f > 0.5 * f[-1]) & (f < WHITE_BAND * f[-1])
     return float(np.median(p[band])) if np.any(band) else float(p[-1])
 
 
@@ -73,16 +91,16 @@ def grain(y: np.ndarray) -> float:
 
 def usual_noise(y: np.ndarray) -> float:
     """Return the rms of white noise that explains the usual fourth difference: steps are left aside."""
-    return float(np.median(np.abs(np.diff(y, 4)))) / (0.6745 * math.sqrt(70))
+    return float(np.median(np.abs(np.diff(y, 4)))) / (QUARTILE * math.sqrt(70))
 
 
 def automatic_cutoff(y: np.ndarray, dt: float) -> float:
     """Return the frequency [Hz] above which the signal is no more than ten times its noise floor in power."""
     f, p = spectrum(y, dt, 24)
-    floor = max(white_level(f, p), 1e-14 * float(np.max(p)))
+    floor = max(white_level(f, p), FLOOR_LEAST * float(np.max(p)))
     above = np.flatnonzero(p > 10 * floor)
-    cutoff = 1.5 * f[above[-1]] if len(above) else 0.1 * f[-1]
-    return float(min(max(cutoff, 4 / (len(y) * dt), f[1]), 0.4 / dt))
+    cutoff = 1.5 * f[above[-1]] if len(above) else CUTOFF_LOWEST * f[-1]
+    return float(min(max(cutoff, 4 / (len(y) * dt), f[1]), CUTOFF_HIGHEST / dt))
 
 
 def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -> np.ndarray:
@@ -101,7 +119,7 @@ def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -
     slope = (values[-1] - values[0]) / (grid[-1] - grid[0])
     rest = values - values[0] - slope * (grid - grid[0])
     sos = butter(4, cutoff * 2 * dt, output="sos")
-    pad = int(min(len(rest) - 1, max(3 / (cutoff * dt), 30)))
+    pad = int(min(len(rest) - 1, max(3 / (cutoff * dt), PADDING)))
     d = sosfiltfilt(sos, rest, padtype="odd", padlen=pad)
     for _ in range(order):
         d = np.gradient(d, dt, edge_order=2)
@@ -115,7 +133,7 @@ def thinned(y: np.ndarray, factor: int) -> np.ndarray:
 
     # Flat within 1e-4 (odd order: exact at 0 Hz), 49 dB down at the new Nyquist frequency, both ways
     # together.
-    sos = cheby1(9, 5e-4, 0.7 / factor, output="sos")
+    sos = cheby1(9, THINNED_RIPPLE, THINNED_BAND / factor, output="sos")
     pad = min(len(y) - 1, 40 * factor)
     return sosfiltfilt(sos, y, padtype="odd", padlen=pad)[::factor]
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...checks import choice, count, mapping, number, shown, unknown_keywords
 from ...units import si_unit, to_si
+from ..thresholds import MINIMUM, ON_SAMPLE, REGULAR
 from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
@@ -289,7 +290,7 @@ class Measurement:
         """Whether all intervals agree within 1 %."""
         steps = np.diff(self.t)
         middle = np.median(steps)
-        return bool(np.all(np.abs(steps - middle) <= 0.01 * middle))
+        return bool(np.all(np.abs(steps - middle) <= REGULAR * middle))
 
     def noise_floor(self) -> float:
         """Estimate the rms of the output's noise [output unit] from the top of its spectrum.
@@ -324,10 +325,10 @@ class Measurement:
         """Return the samples with ``start <= t <= stop`` [s]; at least 10 must remain."""
         low = self.t[0] if start is None else number("slice", "start", start, "s", infinite=True)
         high = self.t[-1] if stop is None else number("slice", "stop", stop, "s", infinite=True)
-        margin = 1e-9 * max(self.dt, abs(low), abs(high))
+        margin = ON_SAMPLE * max(self.dt, abs(low), abs(high))
         first = int(np.searchsorted(self.t, low - margin, "left"))
         last = int(np.searchsorted(self.t, high + margin, "right"))
-        if last - first < 10:
+        if last - first < MINIMUM:
             raise ValueError(
                 f"a slice needs 10 samples or more; {low:g} to {high:g} s holds {max(last - first, 0)} of "
                 f"{self.name!r}, which runs from {self.t[0]:g} to {self.t[-1]:g} s. Widen it."
@@ -361,12 +362,12 @@ class Measurement:
                 f"windows needs an overlap that moves on by a sample at least; got overlap={overlap!r} of "
                 f"{length:g} s. Lower it."
             )
-        number_of = max(int((self.duration - length) / (length * (1 - overlap)) + 1 + 1e-9), 1)
+        number_of = max(int((self.duration - length) / (length * (1 - overlap)) + 1 + ON_SAMPLE), 1)
         starts = self.t[0] + length * (1 - overlap) * np.arange(number_of)
-        edges = np.searchsorted(self.t, starts - 1e-9 * self.dt)
-        ends = np.searchsorted(self.t, starts + length - 1e-9 * self.dt)
+        edges = np.searchsorted(self.t, starts - ON_SAMPLE * self.dt)
+        ends = np.searchsorted(self.t, starts + length - ON_SAMPLE * self.dt)
         ends[-1] = len(self.t)
-        pairs = [(a, b) for a, b in zip(edges, ends, strict=True) if b - a >= 10]
+        pairs = [(a, b) for a, b in zip(edges, ends, strict=True) if b - a >= MINIMUM]
         return tuple(self._part(slice(a, b), f"{self.name} [{i}]") for i, (a, b) in enumerate(pairs))
 
     def decimate(self, factor) -> Measurement:
@@ -386,7 +387,7 @@ class Measurement:
             raise ValueError(
                 "decimate needs regular sampling; these intervals differ by more than 1 %. Resample first."
             )
-        if len(self.t) // factor < 10:
+        if len(self.t) // factor < MINIMUM:
             raise ValueError(
                 f"decimate needs 10 samples left; {len(self.t)} samples over {factor} are too few."
             )

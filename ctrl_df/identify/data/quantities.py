@@ -36,6 +36,11 @@ def quantity_of(unit: str) -> str:
     return next((q for q, units in UNITS.items() if any(dimension(u) == powers for u in units)), OTHER)
 
 
+def word_of(unit: str) -> str:
+    """Return what a channel in this unit is called: a velocity, or a speed where something turns."""
+    return next((word for word, (_, own) in _WORDS.items() if own == unit), "output")
+
+
 def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tuple[str, float, str]:
     """Return quantity, factor to SI and SI unit of a channel.
 

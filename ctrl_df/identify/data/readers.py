@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ...checks import is_number, mapping, names, path_of, shown
+from ..thresholds import MOST_COLUMNS
 from .text_table import read_csv, refuse_text
 
 __all__ = ["find_column", "read_csv", "read_dataframe", "read_mat", "read_response", "select", "stem"]
 
-_MOST_COLUMNS = 99  # of a matrix
 INDEX = "index of the frame"
 _UNIT = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
@@ -65,7 +65,7 @@ def _flatten(name, value, table):
         table[name] = value.astype(float)
     elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim == 2:
         wide = value.shape[1] > value.shape[0]
-        for k, line in enumerate((value if wide else value.T)[:_MOST_COLUMNS]):
+        for k, line in enumerate((value if wide else value.T)[:MOST_COLUMNS]):
             table[f"{name}.{k}"] = line.astype(float)
 
 

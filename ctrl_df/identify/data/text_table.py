@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ...checks import choice, path_of, shown
+from ..thresholds import BINARY, BINARY_LOOK, BLOCK, NANOSECONDS, SAMPLE_ROWS
 
-_BLOCK = 100_000  # rows converted at once, so that memory stays near the size of the file
-_SAMPLE = 2000  # rows that the decimal mark is read off
 _BOMS = (
     (b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe\x00\x00", "utf-32"), (b"\x00\x00\xfe\xff", "utf-32"),
     (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"),
@@ -76,7 +75,7 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
             return list(csv.reader((lines[i] for i in some), delimiter=mark))
         return [lines[i].split(mark) for i in some]
 
-    sample = [[c.strip() for c in row] for row in rows(at[: _SAMPLE + 2])]
+    sample = [[c.strip() for c in row] for row in rows(at[: SAMPLE_ROWS + 2])]
     header, used = _header(sample, path)
     data, at = sample[used:], at[used:]
     if not any(_plain(c) or _is_clock(c) for row in data for c in row):
@@ -88,8 +87,8 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
     clocks = [j for j in range(len(header)) if j < len(data[0]) and _is_clock(data[0][j])]
     columns: list[list[np.ndarray]] = [[] for _ in header]
     table = Table()
-    for k in range(0, len(at), _BLOCK):
-        some = at[k : k + _BLOCK]
+    for k in range(0, len(at), BLOCK):
+        some = at[k : k + BLOCK]
         if mark == " " or quoted:
             split = rows(some)
             sizes, cells = list(map(len, split)), [cell for row in split for cell in row]
@@ -155,7 +154,7 @@ def _decoded(path: Path) -> str:
             break
         except UnicodeDecodeError:
             continue
-    if text is None or len(_CONTROL.findall(text[:100_000])) > 0.002 * min(len(text), 100_000):
+    if text is None or len(_CONTROL.findall(text[:BINARY_LOOK])) > BINARY * min(len(text), BINARY_LOOK):
         raise ValueError(
             f"a table needs a text file with columns; {path} is binary. "
             "Export it as CSV, or read a .mat file with from_mat."
@@ -314,7 +313,7 @@ def _times_of_day(cells):
         a, b, c = m.groups()
         # two parts are minutes and seconds only where no hours could be meant: hours and minutes otherwise
         out[i] = 3600 * int(a) + 60 * int(b) + float((c or "0").replace(",", "."))
-    return np.round(out * 1e9), bad
+    return np.round(out * NANOSECONDS), bad
 
 
 def _since_first(values):
@@ -323,7 +322,7 @@ def _since_first(values):
     since = (values - values[0]).astype(float)
     if np.nanmax(np.abs(values), initial=0) < 2 * day:
         since = since + day * np.cumsum(np.concatenate(([0.0], np.diff(since) < -0.5 * day)))
-    return since / 1e9
+    return since / NANOSECONDS
 
 
 def _in_seconds(name, table) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from ..planning.sines import stepped_sines
 from ..tables.compare import comparison_of_tables, inner_block
-from ..tables.fit import fit_table, points_of, table_scales
+from ..tables.fit import fit_table
+from ..tables.points import points_of, table_scales
 from ..tables.search import TableSearch
 from ..tables.uncertainty import uncertainty
+from ..thresholds import TABLE_ITERATIONS, TABLE_STEPS
 from .dataset import Dataset, Estimate
 
 
@@ -30,7 +32,15 @@ class TableDataset(Dataset):
         begin = block.with_parameters(dict(start)) if start else block
         points = points_of(self.records)
         scales = table_scales(begin, points)
-        found = fit_table(begin, points, names, scales, iterations=40, tolerance=1e-6, budget=budget)
+        found = fit_table(
+            begin,
+            points,
+            names,
+            scales,
+            iterations=TABLE_ITERATIONS["last"],
+            tolerance=TABLE_STEPS["last"],
+            budget=budget,
+        )
         covariance, errors, doubtful = uncertainty(found)
         table = found.block.parameters
         at_bound = tuple(

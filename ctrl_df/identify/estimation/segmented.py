@@ -308,7 +308,7 @@ class SegmentedData:
         starts = same_begins(near, view.segments)
         near = rough.fit(model, (), view=getattr(rough, name), starts=starts, iterations=3)
         found = self.fit(model, (), view=view, starts=near.starts, iterations=1)
-        if not any(e.nonsmooth for e in model.effects):
+        if not model.nonsmooth:
             return found
         # single segments may have begun in a wrong minimum: each goes on by itself
         return self.fit(model, (), view=view, starts=found.starts, iterations=1, followed=RESTARTS_KEPT)
@@ -317,14 +317,11 @@ class SegmentedData:
 def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
     """Cut records into segments; without records held out, every third ninth of each is."""
     records = tuple(records)
-    thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
-    thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
-    step, thin = thin, thinnable((*records, *validation), thin)
     if validation:
-        learn = SegmentedRecords(records, tuple(cut(r, _count(r), step) for r in records))
-        judge = SegmentedRecords(tuple(validation), tuple(cut(r, _count(r), step) for r in validation))
+        learn = SegmentedRecords(records, tuple(cut(r, _count(r)) for r in records))
+        judge = SegmentedRecords(tuple(validation), tuple(cut(r, _count(r)) for r in validation))
     else:
-        whole = [cut(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1), step) for r in records]
+        whole = [cut(r, HOLDOUT_PARTS * max(round(_count(r) / HOLDOUT_PARTS), 1)) for r in records]
         third = [(np.arange(len(w)) * HOLDOUT_PARTS // len(w)) % 3 == 2 for w in whole]
         if any(not np.any(t) or np.all(t) for t in third):
             raise ValueError(
@@ -333,6 +330,9 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
             )
         learn = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
+    thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
+    thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    step, thin = thin, thinnable((*records, *validation), thin)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = scales_of(block, records)

@@ -12,7 +12,19 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..prediction.simulator import free_run
 from ..results.experiment import Experiment, separated
-from ..thresholds import PLAN_MARGIN, PLAN_SIZES
+from ..thresholds import (
+    NOTHING,
+    PLAN_BAND,
+    PLAN_MARGIN,
+    PLAN_MOVES,
+    PLAN_SINES,
+    PLAN_SIZES,
+    PLAN_SLACK,
+    PLAN_STEP_RATE,
+    PLAN_STEP_SIZES,
+    PLAN_STEPS,
+    PLAN_TRIANGLE,
+)
 
 
 def input_that_separates(
@@ -55,12 +67,12 @@ def input_that_separates(
             u = force * size * shape if loop is None else centre + PLAN_MARGIN * reach * size * shape
             ys, asked, gaps = play(u)
             far = max(float(np.max(np.abs(y - centre))) for y in ys)
-            if not np.isfinite(far) or far > PLAN_MARGIN * reach * 1.0001 or asked > force:
+            if not np.isfinite(far) or far > PLAN_MARGIN * reach * PLAN_SLACK or asked > force:
                 continue
-            separation = min(gaps) / max(diagnosis.noise, 1e-300)
+            separation = min(gaps) / max(diagnosis.noise, NOTHING)
             # A record in which nothing may move teaches one bit; where all candidates move it teaches their
             # shape.
-            moves = min(float(np.ptp(y)) for y in ys) > 0.2 * max(float(np.ptp(y)) for y in ys)
+            moves = min(float(np.ptp(y)) for y in ys) > PLAN_MOVES * max(float(np.ptp(y)) for y in ys)
             if best is None or (moves, separation) > (best_moves, best.separation):
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
     if best is None:
@@ -196,22 +208,25 @@ def _references(t, record):
 def _shapes(t, record):
     """Return inputs of peak one, each ending its motion near where it began."""
     f0 = 1.0 / max(facts(record).swing, 10 * (t[1] - t[0]))
-    span = t[-1] + t[1]
+    span, (lowest, many, highest) = t[-1] + t[1], PLAN_BAND
     rng = np.random.default_rng(0)
-    k = np.unique(np.round(np.geomspace(max(0.3 * f0 * span, 1), 8 * f0 * span, 20)))
+    k = np.unique(np.round(np.geomspace(max(lowest * f0 * span, 1), many * f0 * span, PLAN_SINES)))
     sum_of_sines = np.sum(
         np.sin(2 * math.pi * k[:, None] * t / span + rng.uniform(0, 2 * math.pi, len(k))[:, None]), axis=0
     )
-    low, high = 0.3 * f0, 10 * f0
+    low, high = lowest * f0, highest * f0
     rate = math.log(high / low)
     chirp = np.sin(2 * math.pi * low * span / rate * (np.exp(rate * t / span) - 1))
+    least, more = PLAN_STEP_SIZES
     # each period + - - +: neither speed nor place is left over
-    quarter = np.floor(4 * t * 0.5 * f0) % 4
+    quarter = np.floor(4 * t * PLAN_STEP_RATE * f0) % 4
     pulses = (
         np.where((quarter == 0) | (quarter == 3), 1.0, -1.0)
-        * (0.4 + 0.6 * rng.uniform(size=400))[np.floor(t * 0.5 * f0).astype(int) % 400]
+        * (least + more * rng.uniform(size=PLAN_STEPS))[
+            np.floor(t * PLAN_STEP_RATE * f0).astype(int) % PLAN_STEPS
+        ]
     )
-    triangle = 2 / math.pi * np.arcsin(np.cos(2 * math.pi * 0.4 * f0 * t))
+    triangle = 2 / math.pi * np.arcsin(np.cos(2 * math.pi * PLAN_TRIANGLE * f0 * t))
     return {
         "multisine": sum_of_sines / np.max(np.abs(sum_of_sines)),
         "chirp": chirp,

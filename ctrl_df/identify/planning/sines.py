@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..results.experiment import Experiment, separated
-from ..thresholds import COUNTED, SETTLE, SINES, WORK_MEDIUM
+from ..thresholds import COUNTED, NOTHING, SETTLE, SIGMA_LEAST, SINES, WORK_MEDIUM
 
 
 def stepped_sines(
@@ -53,9 +53,9 @@ def stepped_sines(
         found.append(np.asarray(describing_function(m, A[:, None], omega[None], **options)))
     size = np.max(np.abs(np.nan_to_num(found)), axis=0)
     far = A[:, None] * size
-    sigma = max(diagnosis.noise, 1e-6)
+    sigma = max(diagnosis.noise, SIGMA_LEAST)
     gaps = [
-        np.abs(np.nan_to_num(a) - np.nan_to_num(b)) / np.maximum(size, 1e-300)
+        np.abs(np.nan_to_num(a) - np.nan_to_num(b)) / np.maximum(size, NOTHING)
         for a, b in itertools.combinations(found, 2)
     ]
     separation = np.where((far <= reach) & (size > 0), np.min(gaps, axis=0) / sigma, 0.0)

@@ -219,29 +219,21 @@ def make_segments(record: Measurement, length: float | None = None) -> Segments:
     return cut(record, 1 if length is None else max(round(record.duration / length), 1))
 
 
-def cut(record: Measurement, count: int, step: int = 1) -> Segments:
-    """Cut a record into `count` segments of equal time, of 20 samples at least.
-
-    They begin at every `step`-th sample, where an input given in such steps has its values: outputs that
-    count lie there, too, and simulations go from one to the next.
-    """
+def cut(record: Measurement, count: int) -> Segments:
+    """Cut a record into `count` segments of equal time, of 20 samples at least."""
     n = len(record)
     count = max(min(count, n // 20), 1)
-    edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1)) // step * step
+    edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
     edges[0], edges[-1] = 0, n
     edges = np.unique(edges)
     return _between(record, edges[:-1], edges[1:])
 
 
 def split(record: Measurement, segments: Segments, factor: int, least: int) -> Segments:
-    """Split each segment into up to `factor` equal parts, none shorter than `least` samples.
-
-    They begin where samples of the segment count.
-    """
+    """Split each segment into up to `factor` equal parts, none shorter than `least` samples."""
     begins, ends = [], []
     for i, j in zip(segments.begins, segments.ends, strict=True):
         edges = np.linspace(i, j, max(min(factor, (j - i) // least), 1) + 1).astype(int)
-        edges[1:-1] -= (edges[1:-1] - i) % segments.step
         begins.append(edges[:-1])
         ends.append(edges[1:])
     return _between(record, np.concatenate(begins), np.concatenate(ends)).every(segments.step)

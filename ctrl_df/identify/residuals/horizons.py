@@ -18,7 +18,7 @@ from ..prediction.initial_states import CONTINUED, FREE
 from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
-from ..thresholds import FULL_SAMPLES, HORIZONS, SHORTEST_HORIZON
+from ..thresholds import FULL_SAMPLES, HORIZON_TOLERANCE, HORIZONS, NOTHING, SHORTEST_HORIZON
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
     longest = max(r.duration for r in records)
     horizon = longest / 2.0 ** np.arange(len(found) - 1, -1, -1)
     return ErrorByHorizon(
-        horizon, np.sqrt(squares / count), np.sqrt(squares / max(power, 1e-300)), records[0].output_unit,
+        horizon, np.sqrt(squares / count), np.sqrt(squares / max(power, NOTHING)), records[0].output_unit,
         ", ".join(r.name for r in records),
     )  # fmt: skip
 
@@ -113,8 +113,8 @@ def _fitted(model, records, parts, thin, begins, shorter) -> FitResult:
     near: Any = same_begins(shorter[-1], segments) if shorter else None
     for rate, iterations in ((4 * thin, 3 if shorter else 8), (thin, 2)):
         found = fit_segments(
-            model, records, segments, (), thin=rate, starts=near, iterations=iterations, tolerance=1e-2,
-            begins=begins,
+            model, records, segments, (), thin=rate, starts=near, iterations=iterations,
+            tolerance=HORIZON_TOLERANCE, begins=begins,
         )  # fmt: skip
         near = found.starts
     return found

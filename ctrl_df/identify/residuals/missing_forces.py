@@ -18,7 +18,17 @@ from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
-from ..thresholds import FINER, REVERSAL_REACHES, TEST_FORCE
+from ..thresholds import (
+    DEPENDENT,
+    FINER,
+    FREE_ORDER,
+    FREE_STEPS,
+    HUM_WINDOW,
+    NOTHING,
+    REVERSAL_REACHES,
+    SLOWLY,
+    TEST_FORCE,
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,9 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
             answers.append([a for family in answers for a in family])
         for family in answers:
             alive = [
-                (c, span) for c, span in family if np.linalg.norm(c) > 1e-9 * scene.scale * math.sqrt(len(c))
+                (c, span)
+                for c, span in family
+                if np.linalg.norm(c) > DEPENDENT * scene.scale * math.sqrt(len(c))
             ]
             if alive:
                 tables.append((kind, np.array([c for c, _ in alive]).T, [span for _, span in alive]))
@@ -73,13 +85,13 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     units = dict(zip("xf", facts(record).units, strict=True))
     if data.disturbed:
         # the residual is of forces here, as the fits see it
-        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=12)
+        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=FREE_ORDER)
     found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=12)
+        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=FREE_ORDER)
         found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
@@ -90,7 +102,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
 def _regressed(kind, matrix, spans, residual, noise, segments, units) -> tuple[MissingForce, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain."""
     white, filtered = noise.filtered(residual, segments), noise.filtered(matrix, segments)
-    weights, *_ = np.linalg.lstsq(filtered, white, rcond=1e-9)
+    weights, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
     left = white - filtered @ weights
     # a frequency is found by looking at many
     extra = matrix.shape[1] + (2 if kind == "frequency" else 0)
@@ -148,9 +160,9 @@ class _Scene:
         every = {k: np.concatenate([m[k] for m in self.motion]) for k in ("t", "x", "v", "u")}
         for kind, name, tail, count, factors in (
             ("time", "t", 0.0, 8, (_one, _direction, _acceleration)),
-            ("position", "x", 0.005, 12, (_one, _direction)),
-            ("low_speed", "v", 0.01, 12, (_one,)),
-            ("load", "u", 0.01, 8, (_one, _direction)),
+            ("position", "x", *FREE_STEPS["position"], (_one, _direction)),
+            ("low_speed", "v", *FREE_STEPS["low_speed"], (_one,)),
+            ("load", "u", *FREE_STEPS["load"], (_one, _direction)),
         ):
             families = []
             for n in (count, FINER * count):
@@ -178,7 +190,7 @@ class _Scene:
         # fine enough that a line between two bins is not lost
         e = np.diff(e, 0 if facts(record).imposed else 2 - sensed(record).columns[0])
         power = np.abs(np.fft.rfft(e * np.hanning(len(e)), 4 * count)) ** 2
-        ratio = power / (median_filter(power, 161, mode="nearest") + 1e-300)
+        ratio = power / (median_filter(power, HUM_WINDOW, mode="nearest") + NOTHING)
         ratio[:12] = 0.0
         return float(np.argmax(ratio)) / (4 * count * dt)
 
@@ -219,12 +231,12 @@ def _one(m):
 
 
 def _direction(m):
-    slow = 0.05 * float(np.sqrt(np.mean(m["v"] ** 2))) + 1e-300
+    slow = SLOWLY * float(np.sqrt(np.mean(m["v"] ** 2))) + NOTHING
     return np.tanh(m["v"] / slow)
 
 
 def _acceleration(m):
-    return m["a"] / (float(np.sqrt(np.mean(m["a"] ** 2))) + 1e-300)
+    return m["a"] / (float(np.sqrt(np.mean(m["a"] ** 2))) + NOTHING)
 
 
 def _since(length):

@@ -14,6 +14,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..thresholds import (
+    AFTER_REVERSAL,
+    FAINT,
+    FASTEST,
+    LEVEL,
+    LOW_SPEED,
+    MEDIUM_SPEED,
+    NEARLY_NOTHING,
+    NOTHING,
+    RECORD_SAMPLES,
+    REGION_SAMPLES,
+    SMALLEST_SAID,
+)
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
 
@@ -65,7 +78,7 @@ class Regions(tuple[Region, ...]):
     @property
     def significant(self) -> Regions:
         """Those whose share of the error is beyond chance (p < 0.01)."""
-        return Regions(r for r in self if r.p_value < 0.01)
+        return Regions(r for r in self if r.p_value < LEVEL)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -143,7 +156,7 @@ def error_regions(
         worst = max(worst, min(region.p_value * (count - i), 1.0))
         worst_bias = min(region.bias_p_value * count, 1.0)
         adjusted.append(replace(region, p_value=worst, bias_p_value=worst_bias))
-    adjusted.sort(key=lambda region: (region.p_value >= 0.01, -region.excess))
+    adjusted.sort(key=lambda region: (region.p_value >= LEVEL, -region.excess))
     return Regions(replace(region, sentence=_sentence(region)) for region in adjusted)
 
 
@@ -164,25 +177,30 @@ def _parts(t, bins, units, position=None, velocity=None, force=None) -> Iterator
 
 
 def _by_velocity(t, velocity, position, unit):
-    fast = float(np.quantile(np.abs(velocity), 0.95))
-    low = 0.1 * fast
+    fast = float(np.quantile(np.abs(velocity), FASTEST))
+    low = LOW_SPEED * fast
     yield "direction", "v > 0", velocity > low, (low, math.inf)
     yield "direction", "v < 0", velocity < -low, (-math.inf, -low)
     speed = np.abs(velocity)
     yield "low_speed", f"|v| < {low:.2g} {unit}/s", speed < low, (0.0, low)
     yield (
         "low_speed",
-        f"{low:.2g} < |v| < {0.6 * fast:.2g} {unit}/s",
-        (speed >= low) & (speed < 0.6 * fast),
-        (low, 0.6 * fast),
+        f"{low:.2g} < |v| < {MEDIUM_SPEED * fast:.2g} {unit}/s",
+        (speed >= low) & (speed < MEDIUM_SPEED * fast),
+        (low, MEDIUM_SPEED * fast),
     )
-    yield "low_speed", f"|v| > {0.6 * fast:.2g} {unit}/s", speed >= 0.6 * fast, (0.6 * fast, math.inf)
+    yield (
+        "low_speed",
+        f"|v| > {MEDIUM_SPEED * fast:.2g} {unit}/s",
+        speed >= MEDIUM_SPEED * fast,
+        (MEDIUM_SPEED * fast, math.inf),
+    )
     turns = reversals(velocity, low)
     if len(turns) < 3:
         return
     since = time_since(t, turns)
     usual = float(np.median(np.diff(t[turns])))
-    first = 0.15 * usual
+    first = AFTER_REVERSAL * usual
     yield "after_reversal", f"within {first:.2g} s", since < first, (0.0, first)
     middle = 0.5 * usual
     yield (
@@ -240,7 +258,7 @@ class _Null:
             return Region(kind, label, share, expected, 1.0, 0.0, 1.0, span)
         inside, outside = self._pairs(mask), self._pairs(~mask)
         squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
-        ratio = share / max(1 - share, 1e-300) * (1 - expected) / expected
+        ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
         p = float(f_distribution.sf(ratio, *squares))
         # A step between the region and the rest colours the residual by itself: without it the test is
         # sharper, where enough independent samples remain to know the two means.
@@ -248,10 +266,10 @@ class _Null:
         rest = self.r - np.where(mask, mean_in, mean_out)
         error_filter, power = self._colour(rest), float(np.mean(rest * rest))
         means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
-        if min(means) < 60:
+        if min(means) < REGION_SAMPLES:
             error_filter, power = self.rho, self.power
             means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
-        z = mean_in / math.sqrt(max(power, 1e-30 * self.power) / means[0])
+        z = mean_in / math.sqrt(max(power, FAINT * self.power) / means[0])
         bias_p = float(2 * t_distribution.sf(abs(z), max(means[0] - 1, 1)))
         if share > expected:  # more error than its part: by its spread, or by its mean
             p = min(1.0, 2 * min(p, bias_p))
@@ -279,9 +297,9 @@ def _bands(t, r, signals) -> list[Region]:
     total = float(power[1:].sum())
     if total == 0 or len(bands) < 6:
         return []
-    density = np.array([power[a:b].mean() for a, b in bands]) + 1e-30 * total
+    density = np.array([power[a:b].mean() for a, b in bands]) + FAINT * total
     references = [np.array([_periodogram(x)[a:b].mean() for a, b in bands]) for x in signals]
-    relative = [density / (x + 1e-12 * x.max()) for x in references if x.max() > 0]
+    relative = [density / (x + NEARLY_NOTHING * x.max()) for x in references if x.max() > 0]
     found = []
     for i, (a, b) in enumerate(bands):
         near = [j for j in (i - 2, i - 1, i + 1, i + 2) if 0 <= j < len(bands)]
@@ -329,10 +347,10 @@ def _sentence(region: Region) -> str:
     text = (
         f"{region.share:.0%} of the squared error lies in {place}, against {region.expected_share:.0%} {of}"
     )
-    if region.p_value >= 0.01:
+    if region.p_value >= LEVEL:
         return f"{text}: no more than chance (p = {_p(region.p_value)})."
     text += f" (p {_p(region.p_value)})"
-    if region.bias_p_value < 0.01:
+    if region.bias_p_value < LEVEL:
         side = "above" if region.bias > 0 else "below"
         text += (
             f"; the measured output lies {side} the model there, by {abs(region.bias):.2g} of the rms error"
@@ -341,12 +359,12 @@ def _sentence(region: Region) -> str:
 
 
 def _p(p: float) -> str:
-    return "< 1e-6" if p < 1e-6 else f"{p:.2g}"
+    return "< 1e-6" if p < SMALLEST_SAID else f"{p:.2g}"
 
 
 def _checked(t, values, name="residual"):
     t, x = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
-    if t.shape != x.shape or t.ndim != 1 or len(t) < 50:
+    if t.shape != x.shape or t.ndim != 1 or len(t) < RECORD_SAMPLES:
         raise ValueError(
             f"error_regions needs 1-D arrays of equal length, 50 samples or more; t has shape {t.shape} and "
             f"{name} {x.shape}."

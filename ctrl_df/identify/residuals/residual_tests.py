@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..estimation.noise_model import noise_model
+from ..thresholds import AT_ROOT, BANDWIDTH, DECORRELATED, INPUT_LAGS, NOTHING, TWO_SIDED, WHITENESS_LAGS
 
 
 def rmse(residual) -> float:
@@ -36,7 +37,7 @@ def autocorrelation(residual, lags: int) -> np.ndarray:
     """Return the autocorrelation at lags 0 ... `lags` (biased estimate, mean removed)."""
     r = _series(residual)
     r = r - r.mean()
-    return _crosscovariance(r, r, lags)[lags:] / max(float(np.mean(r * r)), 1e-300)
+    return _crosscovariance(r, r, lags)[lags:] / max(float(np.mean(r * r)), NOTHING)
 
 
 def _crosscovariance(a, b, lags):
@@ -93,7 +94,7 @@ def whiteness(residual, lags: int | None = None, *, fitted: int = 0, alpha: floa
 
     r = _series(residual)
     n = len(r)
-    lags = min(25, max(n // 5, 1)) if lags is None else int(lags)
+    lags = min(WHITENESS_LAGS, max(n // 5, 1)) if lags is None else int(lags)
     if not 0 < lags < n or fitted >= lags:
         raise ValueError(
             f"whiteness needs 0 <= fitted < lags < {n} (the samples); got lags={lags}, fitted={fitted}."
@@ -103,7 +104,7 @@ def whiteness(residual, lags: int | None = None, *, fitted: int = 0, alpha: floa
     statistic = float(n * (n + 2) * np.sum(rho**2 / (n - k)))
     dof = lags - fitted
     p = float(chi2.sf(statistic, dof))
-    return Whiteness(statistic, dof, p, p >= alpha, k, rho, 1.96 / math.sqrt(n))
+    return Whiteness(statistic, dof, p, p >= alpha, k, rho, TWO_SIDED / math.sqrt(n))
 
 
 # --- colour ---------------------------------------------------------------------------------------
@@ -147,9 +148,9 @@ def long_run_variance(x, bandwidth: int | None = None) -> float:
     if power == 0:
         return 0.0
     if bandwidth is None:
-        rho = min(max(float(x[1:] @ x[:-1]) / (n * power), 0.0), 1 - 1e-6)
+        rho = min(max(float(x[1:] @ x[:-1]) / (n * power), 0.0), 1 - AT_ROOT)
         alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
-        bandwidth = math.ceil(1.1447 * (alpha * n) ** (1 / 3))
+        bandwidth = math.ceil(BANDWIDTH * (alpha * n) ** (1 / 3))
     m = int(min(max(bandwidth, 1), n // 4))
     c = _crosscovariance(x, x, m)[m:]
     weights = 1 - np.arange(1, m + 1) / (m + 1)
@@ -220,23 +221,23 @@ def input_residual_test(u, residual, lags=None, *, alpha: float = 0.01, fitted: 
     columns = np.column_stack([x[top - k : n - k] for k in lags])
     target = e[top:] - e[top:].mean()
     columns = columns - columns.mean(axis=0)
-    spread = np.sqrt(np.mean(columns**2, axis=0)) * max(float(np.sqrt(np.mean(target**2))), 1e-300)
-    correlation = columns.T @ target / len(target) / np.maximum(spread, 1e-300)
+    spread = np.sqrt(np.mean(columns**2, axis=0)) * max(float(np.sqrt(np.mean(target**2))), NOTHING)
+    correlation = columns.T @ target / len(target) / np.maximum(spread, NOTHING)
     basis, s, _ = np.linalg.svd(columns, full_matrices=False)
     basis = basis[:, s > 1e-5 * s[0]] if s[0] > 0 else basis[:, :0]
     rank = max(basis.shape[1] - fitted, 1)
     explained = float(np.sum((basis.T @ target) ** 2))
     left, dof = float(target @ target) - explained, len(target) - basis.shape[1] - 1
-    statistic = explained / rank / max(left / dof, 1e-300)
+    statistic = explained / rank / max(left / dof, NOTHING)
     p = float(f_distribution.sf(statistic, rank, dof)) if basis.shape[1] else 1.0
-    band = 1.96 / math.sqrt(len(target))
+    band = TWO_SIDED / math.sqrt(len(target))
     return InputTest(statistic, rank, dof, p, p >= alpha, lags, correlation, band)
 
 
 def _spread_lags(u, count=20):
-    top = max(min(len(u) // 10, 3000), 1)
+    top = max(min(len(u) // 10, INPUT_LAGS), 1)
     rho = autocorrelation(u, top)
-    below = np.flatnonzero(rho < 0.37)
+    below = np.flatnonzero(rho < DECORRELATED)
     reach = min(max(5 * int(below[0]) if len(below) else top, count), len(u) // 4)
     return np.unique(np.linspace(0, reach, count).round().astype(int))
 

@@ -28,6 +28,7 @@ from ..residuals.residual_tests import (
     whiteness,
 )
 from ..smoothing.missing_force import MissingForce, missing_force, missing_of_imposed
+from ..thresholds import RECORD_SAMPLES, SMOOTHED_ENDS, SPECTRUM_LEAST
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +115,7 @@ class RecordComparison:
     @cached_property
     def input_test(self) -> InputTest | None:
         """Test of the residual for traces of the input; None for records too short."""
-        if len(self.residual) < 100:
+        if len(self.residual) < SPECTRUM_LEAST:
             return None
         return input_residual_test(self.record.u, self.residual, fitted=self.fitted)
 
@@ -125,7 +126,7 @@ class RecordComparison:
         A position error remembers what went wrong before. As long as the residual is not white, its regions
         are therefore those of its second derivative, the error of acceleration, which stands where it arises.
         """
-        if len(self.residual) < 50:
+        if len(self.residual) < RECORD_SAMPLES:
             return Regions()
         known = facts(self.record)
         velocity = self.record.velocity if self.record.velocity is not None else known.velocity
@@ -150,13 +151,13 @@ class RecordComparison:
         t, dt = self.record.t, facts(self.record).dt
         order = 2 - sensed(self.record).columns[0]
         cutoff = automatic_cutoff(self.residual - self.residual.mean(), dt)
-        out, margin = np.empty(len(t)), int(0.6 / (cutoff * dt)) + 1
+        out, margin = np.empty(len(t)), int(SMOOTHED_ENDS / (cutoff * dt)) + 1
         for a, b in zip(self.edges[:-1], self.edges[1:], strict=True):
             out[a:b] = derivative(t[a:b], self.residual[a:b], order, cutoff)
         good = np.ones(len(t), bool)
         for edge in self.edges:
             good[max(edge - margin, 0) : edge + margin] = False
-        if np.count_nonzero(good) < 50:
+        if np.count_nonzero(good) < RECORD_SAMPLES:
             return self.residual, slice(None)
         out[~good] = np.interp(t[~good], t[good], out[good])
         first, last = np.flatnonzero(good)[[0, -1]]

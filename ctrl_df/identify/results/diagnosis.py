@@ -13,7 +13,7 @@ from ...drawing import draw, go_on
 from ..course import COMPLETE
 from ..data.measurement import Measurement
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
-from ..thresholds import RULED_OUT
+from ..thresholds import RULED_OUT, SHOWN_PROBABILITY
 
 CALIBRATED = (
     "Probabilities are those of the candidates and of nothing missing, all equal beforehand, by the "
@@ -223,7 +223,10 @@ class Diagnosis:
         """Candidates the data leave open."""
         if self.verdict == NONE:
             return ()
-        return tuple(c for c in self.ranking if c.confirmed and c.probability > 0.01)[:4] or self.ranking[:2]
+        return (
+            tuple(c for c in self.ranking if c.confirmed and c.probability > SHOWN_PROBABILITY)[:4]
+            or self.ranking[:2]
+        )
 
     @property
     def next_experiment(self):

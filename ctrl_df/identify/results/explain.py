@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..thresholds import SHOWN_PROBABILITY
 from .diagnosis import AMBIGUOUS, NONE, UNKNOWN, certainty, rivals
 
 
@@ -52,7 +53,7 @@ def explain(d, words) -> str:
         )
     if d.verdict == AMBIGUOUS:
         open_ones = [first, *rivals(d.ranking)]
-        shared = [c for c in d.ranking if c not in open_ones and c.probability > 0.01]
+        shared = [c for c in d.ranking if c not in open_ones and c.probability > SHOWN_PROBABILITY]
         names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [*open_ones, *shared])
         doubts = "".join(f" {s}" for s in d.doubts)
         return (

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...drawing import draw, go_on
 from ..course import COMPLETE
+from ..thresholds import LEAST_WIDTH
 from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
 from .neighbours import Neighbours
 
@@ -150,7 +151,7 @@ class Study:
 
     def table(self) -> str:
         """Return one line a step."""
-        w = max(30, *(len(step.name) for step in self.steps))
+        w = max(LEAST_WIDTH, *(len(step.name) for step in self.steps))
         lines = [f"{'step':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>10}"]
         for step in self.steps:
             lines.append(

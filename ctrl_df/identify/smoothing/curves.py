@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST
+from ..residuals.residual_tests import autocorrelation
+from ..thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST, DEPENDENT, NOTHING, UNLIKE
 
 
 @dataclass(frozen=True)
@@ -60,15 +61,15 @@ def curve_over(values, force, std, own, known) -> Curve:
         bins = np.empty(len(use), int)
         bins[order] = np.arange(len(use)) * count // len(use)
         both = np.column_stack([rest, (bins[:, None] == np.arange(count)) * root[:, None]])
-        fit = np.linalg.lstsq(both, y, rcond=1e-9)[0]
+        fit = np.linalg.lstsq(both, y, rcond=DEPENDENT)[0]
         left = y - both @ fit
         together = _together(left)
         count = int(np.clip(len(use) / together / CURVE_ALONE, CURVE_LEAST, count))
     count = int(bins.max()) + 1
     alone = np.column_stack([rest, root])
-    before = y - alone @ np.linalg.lstsq(alone, y, rcond=1e-9)[0]
+    before = y - alone @ np.linalg.lstsq(alone, y, rcond=DEPENDENT)[0]
     free = max(len(use) / together, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
-    share = 1.0 - float(left @ left) / free[1] / max(float(before @ before) / free[0], 1e-300)
+    share = 1.0 - float(left @ left) / free[1] / max(float(before @ before) / free[0], NOTHING)
     partial = (y - rest @ fit[: rest.shape[1]]) / root
     weight = root**2
     total = np.bincount(bins, weight, count)
@@ -80,10 +81,6 @@ def curve_over(values, force, std, own, known) -> Curve:
 
 def _together(d) -> float:
     """Return over how many samples a force is much the same: they count as one."""
-    spread, total = float(d @ d), 1.0
-    for lag in range(1, len(d) // 4 if spread > 0 else 1):
-        correlation = float(d[:-lag] @ d[lag:]) / spread
-        if correlation < 0.1:
-            break
-        total += 2.0 * correlation
-    return total
+    alike = autocorrelation(d, max(len(d) // 4 - 1, 0))
+    until = np.argmax(alike < UNLIKE) if np.any(alike < UNLIKE) else len(alike)
+    return 1.0 + 2.0 * float(np.sum(alike[1:until]))

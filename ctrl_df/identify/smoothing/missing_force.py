@@ -17,7 +17,7 @@ from ..prediction.prepared import REFERENCE
 from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
-from ..thresholds import FORCE_KNOWN
+from ..thresholds import FORCE_KNOWN, PARAMETER_NUDGE, SLOWLY
 from .curves import Curve, curve_over
 from .smoother import smooth_record
 
@@ -175,7 +175,7 @@ def missing_of_imposed(model, record: Measurement, residual) -> MissingForce:
     start = np.zeros((1, len(simulator.nuisances)))
     table = simulator.block.parameters
     free = [k for k in default_free(simulator.block) if table[k].value != 0]
-    steps = {k: 1e-4 * table[k].value for k in free}
+    steps = {k: PARAMETER_NUDGE * table[k].value for k in free}
     runs = simulator.run_all(
         [(whole, None, start), *((whole, {k: table[k].value + d}, start) for k, d in steps.items())]
     )
@@ -191,7 +191,7 @@ def missing_of_imposed(model, record: Measurement, residual) -> MissingForce:
 
 def _quantities(coordinates, position, velocity, load):
     """Return what forces are drawn against, the units of these and of the time, and that of the force."""
-    slow = 0.05 * float(np.sqrt(np.mean(velocity**2)))
+    slow = SLOWLY * float(np.sqrt(np.mean(velocity**2)))
     travelled = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(position)))))
     marks = np.maximum.accumulate(np.where(_turned(velocity, slow), travelled, 0.0))
     unit, force = coordinates.unit, coordinates.force_unit

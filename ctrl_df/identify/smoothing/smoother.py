@@ -21,11 +21,19 @@ from ..data.measurement import Measurement
 from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION
 from ..thresholds import (
+    SMOOTHER_BEGIN,
+    SMOOTHER_DAMPED,
+    SMOOTHER_DRIVEN,
     SMOOTHER_ESTIMATED,
+    SMOOTHER_EVALUATIONS,
+    SMOOTHER_JITTER,
     SMOOTHER_LEAK,
     SMOOTHER_ROUNDS,
+    SMOOTHER_SPREADS,
     SMOOTHER_STEPS,
     SMOOTHER_STILL,
+    SMOOTHER_USUAL,
+    UNLIKELY,
 )
 from .kalman import smoothed
 from .steps import Linearized, Steps
@@ -70,13 +78,14 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     mean, cov = mean / scale, np.array([np.diag((row / scale) ** 2) for row in std])
     leak = _leak(steps, known, scale)
     first = cov[0]
-    sizes = np.log([0.3, 0.1 * known.swing, known.noise])
+    force, time = SMOOTHER_BEGIN
+    sizes = np.log([force, time * known.swing, known.noise])
     evidence = -math.inf
     for turn in range(SMOOTHER_ROUNDS):
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
         told = _Told(lin, steps, leak, mean[0], first, known)
         if turn < SMOOTHER_ESTIMATED:
-            sizes = told.likeliest(sizes, 0.7 if turn < 2 else 0.2)
+            sizes = told.likeliest(sizes, SMOOTHER_DAMPED[min(turn // 2, 1)])
         new, cov, evidence = told.smoothed(sizes)
         moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
         mean = new
@@ -93,11 +102,11 @@ def _leak(steps: Steps, known, scale) -> np.ndarray:
     """Return variances that keep the covariances of the states regular, and change nothing else."""
     n = len(steps.free)
     place = known.noise if steps.simulator.sensed.columns[0] == POSITION else known.noise * known.swing
-    q = (1e-4 * scale[:-1]) ** 2
+    q = (SMOOTHER_JITTER * scale[:-1]) ** 2
     for body in range(steps.core.bodies):
         dt = float(np.median(np.diff(steps.times)))
         q[2 * body] = (SMOOTHER_LEAK * place) ** 2 / len(steps)
-        q[2 * body + 1] = (1e-3 * known.force * dt / sum(steps.core.masses)) ** 2
+        q[2 * body + 1] = (SMOOTHER_DRIVEN * known.force * dt / sum(steps.core.masses)) ** 2
     return q[:n] / scale[:-1] ** 2
 
 
@@ -156,13 +165,15 @@ class _Told:
     def likeliest(self, sizes, width):
         """Return the sizes of most evidence, sought about those given."""
         corners = np.vstack([sizes, sizes + width * np.eye(len(sizes))])
-        how = {"initial_simplex": corners, "maxfev": 60, "xatol": 0.02, "fatol": 0.05}
+        apart, gained = SMOOTHER_SPREADS
+        how = {"initial_simplex": corners, "maxfev": SMOOTHER_EVALUATIONS, "xatol": apart, "fatol": gained}
         return minimize(lambda p: -self.evidence(p), sizes, method="Nelder-Mead", options=how).x
 
     def evidence(self, sizes) -> float:
         """Return log p(record | sizes) + log p(sizes): wide priors about the scales of the record."""
-        usual = np.log([0.1, 0.1 * self.known.swing, self.known.noise])
+        force, time = SMOOTHER_USUAL
+        usual = np.log([force, time * self.known.swing, self.known.noise])
         value = self.smoothed(sizes, back=False)[2] - 0.5 * float(
             np.sum(((sizes - usual) / [4.0, 1.5, 1.0]) ** 2)
         )
-        return value if math.isfinite(value) else -1e300
+        return value if math.isfinite(value) else UNLIKELY

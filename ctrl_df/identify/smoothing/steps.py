@@ -18,7 +18,7 @@ from ..prediction import initial_states
 from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION
 from ..prediction.simulator import Simulator
-from ..thresholds import SMOOTHER_NUDGE, SMOOTHER_RTOL, UNPLACED
+from ..thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL, UNPLACED
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class Steps:
         up = mean[:-1].copy()
         up[:, -1] += pushed
         gain = (self.run(up, every)[0][:, speed] - base) / pushed
-        gain = np.where(gain > 0.1 * np.max(gain), gain, np.inf)  # what sticks is moved by no force
+        gain = np.where(gain > HELD_BACK * np.max(gain), gain, np.inf)  # what sticks is moved by no force
         for name in mine:
             value = parameters[name].value
             nudge = SMOOTHER_NUDGE * (abs(value) or pushed)

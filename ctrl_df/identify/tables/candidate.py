@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 from ..estimation.scales import Scales
-from ..thresholds import WORK_LOW, WORK_MEDIUM
-from .fit import (
-    FittedTable,
-    fit_table,
-    log_density,
-    outlying,
-    relative_error,
-    simulate_table,
-)
+from ..thresholds import TABLE_STEPS, VARIANCE_LEAST, WORK_LOW, WORK_MEDIUM
+from .errors import log_density, outlying
+from .fit import FittedTable, fit_table
+from .simulated import relative_error, simulate_table
 from .starts import best_starts
 
 
@@ -29,7 +24,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
     def fitted(begin, iterations):
         return fit_either(
             begin, points, (*free, *own), scales,
-            again=False, iterations=iterations, tolerance=1e-2, work=work,
+            again=False, iterations=iterations, tolerance=TABLE_STEPS["try"], work=work,
         )  # fmt: skip
 
     if not hopeful:
@@ -57,4 +52,4 @@ def fit_either(block, points, names, scales, *, again=True, **options) -> Fitted
 
 
 def _likelihood_of(fitted: FittedTable) -> float:
-    return float(log_density(fitted.error, 1e-12)[0].sum())
+    return float(log_density(fitted.error, VARIANCE_LEAST)[0].sum())

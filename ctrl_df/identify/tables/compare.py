@@ -12,7 +12,10 @@ from ...drawing import draw
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..residuals.comparison_base import ComparisonBase
 from ..residuals.regions import Region, Regions
-from .fit import Points, counted, points_of, relative_error, rms, simulate_table
+from ..thresholds import LEVEL, NOTHING
+from .errors import rms
+from .points import Points, counted, points_of
+from .simulated import relative_error, simulate_table
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Scatter:
 
     def __bool__(self) -> bool:
         """Return whether the errors are mere scatter (at the level of 1 %)."""
-        return self.p_value >= 0.01
+        return self.p_value >= LEVEL
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +190,7 @@ def plane_regions(points: Points, error) -> Regions:
             share, expected = float(size[inside].sum()) / total, n / len(points)
             if n == len(points):
                 continue
-            ratio = share / max(1 - share, 1e-300) * (1 - expected) / expected
+            ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
             p = float(f_distribution.sf(ratio, 2 * n, 2 * (len(points) - n)))
             label = f"{low:.3g} to {high:.3g} {unit}" if high > low else f"{low:.3g} {unit}"
             bias = float(np.mean(error[inside].real)) / math.sqrt(total / len(points))
@@ -203,7 +206,7 @@ def plane_regions(points: Points, error) -> Regions:
             f" (p {'< 1e-6' if p < 1e-6 else f'= {p:.2g}'})."
         )
         regions.append(Region(kind, label, share, expected, p, bias, 1.0, span, sentence))
-    regions.sort(key=lambda r: (r.p_value >= 0.01, -r.excess))
+    regions.sort(key=lambda r: (r.p_value >= LEVEL, -r.excess))
     return Regions(regions)
 
 

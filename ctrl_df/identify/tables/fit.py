@@ -1,215 +1,21 @@
-"""A block beside measured tables N(A, omega): relative errors, and their least squares.
-
-N of a drive falls by decades over frequency, and a stepped sine is as good, relative to what it measures, at
-one end as at the other: errors are relative to ``|N|``, weighted by the stated standard errors where there
-are any. Where the block has no periodic answer or stands still, its N counts as zero.
-"""
+"""Least squares of the relative errors of points."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from ...blocks.core import level
-from ..data.frequency_measurement import FrequencyMeasurement
 from ..estimation.scales import Scales
 from ..estimation.variables import Variable
 from ..prediction.simulator import feasible
-from ..thresholds import GROSS, RIGID, WORK_HIGH
-
-
-@dataclass(frozen=True, eq=False)
-class Points:
-    """Measured points of all tables in a row.
-
-    Attributes
-    ----------
-    A, omega, N : (n,) arrays
-        Amplitude, frequency [rad/s], measured N.
-    weight : (n,) array
-        One over the relative standard error, scaled to a mean square of one.
-    noise : float
-        rms of the stated relative standard errors; NaN where none are stated.
-    record : (n,) array of int
-        Which table a point belongs to.
-    scale : (n,) array
-        What errors are relative to: ``|N|``, or a tenth of the median ``|N|`` at that frequency where a point
-        is less (a mass that sticks or is about to, an antiresonance: there the scatter does not shrink with
-        N).
-    unit : str
-        Of the amplitudes.
-    """
-
-    A: np.ndarray
-    omega: np.ndarray
-    N: np.ndarray
-    weight: np.ndarray
-    noise: float
-    record: np.ndarray
-    scale: np.ndarray
-    unit: str = "N"
-
-    def __len__(self) -> int:
-        """Return the number of points."""
-        return len(self.A)
-
-    def take(self, where) -> Points:
-        """Return some of the points."""
-        parts = {k: getattr(self, k)[where] for k in ("A", "omega", "N", "weight", "record", "scale")}
-        return replace(self, **parts)
-
-    def without(self, where) -> Points:
-        """Return the same points, some of them of no weight."""
-        return replace(self, weight=np.where(where, 0.0, self.weight))
-
-    def thinned(self, count: int, size) -> Points:
-        """Return up to `count` points: that of largest `size` in every cell of the logarithmic plane."""
-        if len(self) <= count:
-            return self
-        side = max(int(math.sqrt(count)), 2)
-        cell = np.zeros(len(self), int)
-        for axis in (self.A, self.omega):
-            place = np.log(axis)
-            width = max(float(np.ptp(place)), 1e-12)
-            cell = cell * side + np.minimum((side * (place - place.min()) / width).astype(int), side - 1)
-        order = np.argsort(-np.asarray(size), kind="stable")
-        _, first = np.unique(cell[order], return_index=True)
-        return self.take(np.sort(order[first]))
-
-
-def points_of(records: Sequence[FrequencyMeasurement]) -> Points:
-    """Return the measured points of several tables in a row.
-
-    N = 0 says that the mass stood still. At frequencies where nothing moved there is no scale to measure by:
-    those points are left out, see `counted`.
-    """
-    rows, sigmas, numbers = [], [], []
-    for i, r in enumerate(records):
-        keep = counted(r)
-        row, column = np.nonzero(keep)
-        rows.append((r.A[row], r.omega[column], r.N[keep]))
-        sigmas.append(r.noise_of_points[keep[np.isfinite(r.N)]])
-        numbers.append(np.full(len(row), i))
-    a, w, n = (np.concatenate(column) for column in zip(*rows, strict=True))
-    sigma, known = np.concatenate(sigmas), np.concatenate(sigmas)
-    if np.all(np.isfinite(known)):
-        noise = math.sqrt(float(np.mean(sigma**2)))
-        weight = 1 / sigma
-        weight = weight / math.sqrt(float(np.mean(weight**2)))
-    else:
-        noise, weight = math.nan, np.ones(len(a))
-    scale = np.abs(n)
-    for value in np.unique(w):
-        here = w == value
-        scale[here] = np.maximum(scale[here], 0.1 * np.median(np.abs(n[here & (n != 0)])))
-    return Points(a, w, n, weight, noise, np.concatenate(numbers), scale, records[0].input_unit)
-
-
-def counted(record: FrequencyMeasurement) -> np.ndarray:
-    """Return which cells (na, nw) of a table count: measured, where some amplitude moved the mass."""
-    measured = np.isfinite(record.N)
-    return measured & np.any(measured & (record.N != 0), axis=0)
-
-
-def simulate_table(model, points: Points, work=None) -> np.ndarray:
-    """Return N of the model at the points; NaN where it has no answer within the work allowed."""
-    N = np.empty(len(points), complex)
-    rigid = _rigid(model, points, RIGID[1] if work in (None, WORK_HIGH) else RIGID[0])
-    for some, block in ((rigid, _without_bristles(model) if rigid.any() else model), (~rigid, model)):
-        if some.any():
-            N[some] = _described(block, points.A[some], points.omega[some], work or WORK_HIGH)
-    return N
-
-
-def _described(model, A, omega, work) -> np.ndarray:
-    from ...df.describing import quiet_describing_function as describing_function
-    from ...df.dispatch import method_for
-
-    options: dict[str, Any] = dict(work) if method_for(model).takes_options else {}
-    return np.asarray(describing_function(model, A, omega, **options))
-
-
-def _without_bristles(model):
-    return model.with_effects([e for e in model.effects if e.role != "presliding"])
-
-
-def _rigid(model, points: Points, share: float) -> np.ndarray:
-    """Return where the bristles of a model yield over next to nothing of the measured swing.
-
-    There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by
-    less than that share.
-    """
-    bristles = [e for e in getattr(model, "effects", ()) if e.role == "presliding" and e.level == 0]
-    if not bristles:
-        return np.zeros(len(points), bool)
-    friction = [e for e in model.effects if e.role == "friction" and e.side == "motor"]
-    bend = level(friction, 0.0, 1.0, 0.0) / bristles[0].stiffness
-    return bend < share * points.A * np.abs(points.N)
-
-
-def relative_error(simulated, points: Points) -> np.ndarray:
-    """Return ``(measured - simulated) / scale``, complex; a NaN of the model counts as N = 0."""
-    filled = np.where(np.isfinite(simulated), simulated, 0.0)
-    # a resonance on the grid must not outweigh all other points while a fit is on its way
-    error = (points.N - filled) / points.scale
-    size = np.abs(error)
-    return np.where(size > 30.0, 30.0 * error / np.maximum(size, 1e-300), error)
-
-
-def rms(error) -> float:
-    """Return the root mean square of complex errors."""
-    return math.sqrt(float(np.mean(np.abs(error) ** 2))) if len(error) else math.nan
-
-
-def outlying(error) -> np.ndarray:
-    """Return which points err by ten times the median: one in sixteen (two) at most, else none.
-
-    Motions coexist (backlash, ripple): where the drive was found in another one than the model, or was
-    measured badly, the two differ by as much as N itself, and say nothing of the rest of the plane.
-    """
-    size = np.abs(error)
-    far = size > np.maximum(10 * np.median(size), 1e-3) if len(size) else np.zeros(0, bool)
-    return far if np.count_nonzero(far) <= max(len(size) // 16, 2) else np.zeros(len(size), bool)
-
-
-def log_density(error, least: float) -> tuple[np.ndarray, float]:
-    """Return the log density [nats] of every point's error, and the variance of what is mere scatter.
-
-    Parameters
-    ----------
-    error : (n,) complex array
-        Taken as a mixture: scatter of a variance fitted to them, and a few gross errors about as large as N.
-    least : float
-        The variance is no less.
-    """
-    size = np.abs(error) ** 2
-    gross = GROSS * np.exp(-np.minimum(size, 700.0))
-    best = (np.full(len(size), -np.inf), least)
-    for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
-        variance = max(variance, least)
-        for _ in range(30):
-            usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
-            share = usual / (usual + gross)
-            variance = max(float(share @ size) / max(float(share.sum()), 1e-300), least)
-        usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, 700.0))
-        density = np.log(usual + gross)
-        if density.sum() > best[0].sum():
-            best = density, variance
-    return best
-
-
-def table_scales(block, points: Points) -> Scales:
-    """Return typical sizes of force, position, speed and mass in the tables."""
-    swing = points.A * np.abs(points.N)
-    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
-    return Scales(
-        float(np.median(points.A)), float(np.median(swing)), float(np.median(swing * points.omega)), mass
-    )
+from ..thresholds import TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
+from .errors import rms
+from .points import Points
+from .simulated import relative_error, simulate_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,10 +82,8 @@ def fit_table(
         Bounds on the work of one point, `WORK_LOW`, `WORK_MEDIUM` or `WORK_HIGH` (the default).
     """
     table = block.parameters
-    job = _Job(
-        block, points,
-        [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit), _side(block, k)) for k in names], work,
-    )  # fmt: skip
+    sizes = {k: TABLE_UNIT * scales.of(table[k].line_unit) for k in names}
+    job = _Job(block, points, [Variable(k, table[k], s, _side(block, k)) for k, s in sizes.items()], work)
     start = np.array([v.q(table[v.name].value) for v in job.variables])
     fit = _Fit(job, iterations, budget)
     converged = len(start) == 0
@@ -349,7 +153,10 @@ def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.nda
     """Return the slopes (2 n, p) of the weighted errors by scaled parameters."""
     table = block.parameters
     job = _Job(
-        block, points, [Variable(k, table[k], 0.1 * scales.of(table[k].line_unit)) for k in names], work
+        block,
+        points,
+        [Variable(k, table[k], TABLE_UNIT * scales.of(table[k].line_unit)) for k in names],
+        work,
     )
     z = np.array([v.q(table[v.name].value) for v in job.variables])
     return job.slopes(z, job.errors(z)) if len(z) else np.zeros((2 * len(points), 0))
@@ -377,11 +184,11 @@ class _Job:
     def slopes(self, z, e) -> np.ndarray:
         columns = []
         for i, variable in enumerate(self.variables):
-            step = 1e-3 if variable.p(z[i] + 1e-3) != variable.p(z[i]) else -1e-3
+            step = TABLE_NUDGE if variable.p(z[i] + TABLE_NUDGE) != variable.p(z[i]) else -TABLE_NUDGE
             moved = z.copy()
             moved[i] += step
             slope = (self.errors(moved) - e) / step
             # where an orbit changes its kind the difference quotient is a jump, not a slope
-            slope[np.abs(slope) > 300.0] = 0.0
+            slope[np.abs(slope) > TABLE_JUMP] = 0.0
             columns.append(slope)
         return np.array(columns).T

@@ -12,12 +12,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...simulate.imposed import imposed_forces, path_of
+from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
 from ..estimation.scales import Scales
 from ..prediction.simulator import feasible
-from ..thresholds import BALANCE_PERIODS, BALANCE_ROUNDS, BALANCE_SAMPLES
-from .fit import Points
+from ..thresholds import (
+    BALANCE_GAIN,
+    BALANCE_LOWEST,
+    BALANCE_NUDGE,
+    BALANCE_PERIODS,
+    BALANCE_RANK,
+    BALANCE_ROUNDS,
+    BALANCE_RTOL,
+    BALANCE_SAMPLES,
+    NEARLY_NOTHING,
+)
+from .points import Points
 
 
 def can_be_imposed(block) -> bool:
@@ -45,20 +55,17 @@ class ForceBalance:
         self.amplitude = moved.A
         angle = 2 * np.pi * np.arange(BALANCE_SAMPLES * BALANCE_PERIODS + 1) / BALANCE_SAMPLES
         self.paths = [
-            path_of(angle / w, x * np.cos(angle), -x * w * np.sin(angle))
-            for x, w in zip(moved.A * np.abs(moved.N), moved.omega, strict=True)
+            sine_path(x, w, angle) for x, w in zip(moved.A * np.abs(moved.N), moved.omega, strict=True)
         ]
-        last = slice(-BALANCE_SAMPLES - 1, -1)
-        self._last, self._wave = last, 2 / BALANCE_SAMPLES * np.exp(-1j * angle[last])
+        self._last = slice(-BALANCE_SAMPLES - 1, -1)
+        self._angle = angle[self._last]
 
     def forces(self, blocks: Sequence) -> np.ndarray:
         """Return first harmonics of the forces over A, (blocks, points)."""
         cores = [b.core for b in blocks]
         z0 = np.zeros((len(blocks), cores[0].nstates - 2))
-        found = [
-            imposed_forces(cores, path, z0, rtol=1e-4)[0][:, self._last] @ self._wave for path in self.paths
-        ]
-        return np.stack(found, axis=1) / self.amplitude
+        forces = [imposed_forces(cores, path, z0, rtol=BALANCE_RTOL)[0][:, self._last] for path in self.paths]
+        return harmonics(np.stack(forces, axis=1), self._angle, 1)[..., 1] / self.amplitude
 
     def error(self, blocks: Sequence) -> np.ndarray:
         """Return the root mean square of what misses in each block's balance, over A."""
@@ -73,7 +80,7 @@ class ForceBalance:
             if moved is None:
                 break
             size = float(self.error([moved])[0])
-            done = not size < (1 - 1e-3) * best[0]
+            done = not size < (1 - BALANCE_GAIN) * best[0]
             best = min(best, (size, moved), key=lambda pair: pair[0])
             if done:
                 break
@@ -84,7 +91,7 @@ class ForceBalance:
         table, moved, steps = block.parameters, [], []
         for name in names:
             p = table[name]
-            step = 1e-3 * (abs(p.value) or scales.of(p.line_unit))
+            step = BALANCE_NUDGE * (abs(p.value) or scales.of(p.line_unit))
             if p.value + step > p.upper:
                 step = -step
             moved.append(block.with_parameters(feasible(block, {name: p.value + step})))
@@ -96,18 +103,22 @@ class ForceBalance:
         if np.count_nonzero(known) < len(names):
             return None
         usual = np.median(np.abs(missing[known]))
-        trust = 1 / np.sqrt(1 + (np.abs(missing[known]) / (3 * usual + 1e-12)) ** 2)  # a few err grossly
+        trust = 1 / np.sqrt(
+            1 + (np.abs(missing[known]) / (3 * usual + NEARLY_NOTHING)) ** 2
+        )  # a few err grossly
         size = np.linalg.norm(slopes[:, known], axis=1)
         size[size == 0] = 1.0
         left = (trust * slopes[:, known] / size[:, None]).T
         right = trust * missing[known]
         change, *_ = np.linalg.lstsq(
-            np.concatenate([left.real, left.imag]), np.concatenate([right.real, right.imag]), rcond=1e-6
+            np.concatenate([left.real, left.imag]),
+            np.concatenate([right.real, right.imag]),
+            rcond=BALANCE_RANK,
         )
         values = {}
         for name, delta in zip(names, change / size, strict=True):
             p = table[name]
-            low = p.lower if p.lower > 0 or not p.strict else 1e-2 * abs(p.value)
+            low = p.lower if p.lower > 0 or not p.strict else BALANCE_LOWEST * abs(p.value)
             values[name] = float(np.clip(p.value + delta, low, p.upper))
         try:
             return block.with_parameters(feasible(block, values))

@@ -21,27 +21,23 @@ from ..thresholds import (
     HOPELESS_ON_TABLE,
     POINTS,
     POINTS_COSTLY,
+    SCATTER_LEAST,
     SIGNIFICANT_TABLE,
     SIGNIFICANT_TABLE_HELD,
+    TABLE_BUDGET,
+    TABLE_ITERATIONS,
+    TABLE_STEPS,
     TOLD_APART,
+    TOP_FREQUENCIES,
+    UNEXPLAINED,
     WORK_MEDIUM,
 )
 from .candidate import fit_either, try_effect
 from .compare import comparison_of_tables, plane_regions, scatter
-from .fit import (
-    FittedTable,
-    Points,
-    counted,
-    fit_table,
-    log_density,
-    outlying,
-    points_of,
-    relative_error,
-    rms,
-    simulate_table,
-    slopes_of,
-    table_scales,
-)
+from .errors import log_density, outlying, rms
+from .fit import FittedTable, fit_table, slopes_of
+from .points import Points, counted, points_of, table_scales
+from .simulated import relative_error, simulate_table
 from .starts import balanced
 from .uncertainty import uncertainty
 
@@ -115,11 +111,21 @@ class TableSearch(Search):
         heavy = inertia(self.block)
         if heavy in self.free:
             moved = inside.take(inside.N != 0)
-            top = moved.omega >= np.quantile(moved.omega, 0.8)
+            top = moved.omega >= np.quantile(moved.omega, TOP_FREQUENCIES)
             mass = float(np.median(1 / (np.abs(moved.N[top]) * moved.omega[top] ** 2)))
             begins.append(self.block.with_parameters({heavy: mass}))
         begins += balanced([self.block], self.free, inside, self.scales)
-        fits = [fit_table(b, inside, self.free, self.scales, iterations=25, tolerance=1e-4) for b in begins]
+        fits = [
+            fit_table(
+                b,
+                inside,
+                self.free,
+                self.scales,
+                iterations=TABLE_ITERATIONS["refit"],
+                tolerance=TABLE_STEPS["refit"],
+            )
+            for b in begins
+        ]
         return min(fits, key=lambda f: float(f.weighted @ f.weighted))
 
     def _trial(self, key, fitted: FittedTable, extra: int, work=None, confirmed=False) -> TableTrial:
@@ -162,7 +168,11 @@ class TableSearch(Search):
                 begin = self.base.block.with_parameters(values)
             except ValueError:
                 continue
-            again = self._trial("", fit_table(begin, self.inside, self.free, self.scales, iterations=10), 0)
+            again = self._trial(
+                "",
+                fit_table(begin, self.inside, self.free, self.scales, iterations=TABLE_ITERATIONS["rebase"]),
+                0,
+            )
             if again.cost < self.base.cost:
                 self.base = again
         return self.ranked(self.base, best)
@@ -171,7 +181,7 @@ class TableSearch(Search):
         kind = tried.block.effects[-1]
         fitted = fit_either(
             tried.block, self.inside, tried.fitted.names, self.scales, iterations=3 if kind.costly else 12,
-            budget=120, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
+            budget=TABLE_BUDGET, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
         )  # fmt: skip
         return self._trial(tried.key, fitted, tried.extra, confirmed=True)
 
@@ -202,8 +212,9 @@ class TableSearch(Search):
 
         No model gets below the stated noise, or below how exact orbits are.
         """
-        stated = self.points.noise if math.isfinite(self.points.noise) else 0.0
-        return log_density(self.points.weight * tried.error, max(0.5 * stated, 1e-6) ** 2)
+        return log_density(
+            self.points.weight * tried.error, max(0.5 * self.points.stated, SCATTER_LEAST) ** 2
+        )
 
     def alike(self, a, b):
         """Whether two candidates' tables differ by less than the scatter lets one see."""
@@ -243,7 +254,9 @@ class TableSearch(Search):
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
-        unexplained = structure > 2.0 * noise and structure > 0.2 * there and not self._scattered(shown)
+        unexplained = (
+            structure > 2.0 * noise and structure > UNEXPLAINED * there and not self._scattered(shown)
+        )
         return Remainder(noise, structure, unexplained)
 
     def _split(self, t) -> tuple[float, float]:
@@ -259,7 +272,7 @@ class TableSearch(Search):
                     # second differences see scatter six times as strong as a smooth print
                     differences.append(e[line[2:]] - 2 * e[line[1:-1]] + e[line[:-2]])
         total = rms(e)
-        stated = p.noise if math.isfinite(p.noise) else 0.0
+        stated = p.stated
         if not differences:
             return (stated, math.sqrt(max(total**2 - stated**2, 0.0))) if stated else (total, 0.0)
         rough = float(np.median(np.abs(np.concatenate(differences)))) / math.sqrt(6 * math.log(2))

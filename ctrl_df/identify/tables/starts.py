@@ -18,10 +18,23 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
+from ..estimation.scales import Scales
 from ..starting.extend import extended
-from ..thresholds import BALANCED_STARTS, HOPELESS_START, TABLE_SIZES, WORK_MEDIUM
-from .fit import Points, Scales, relative_error, simulate_table
+from ..thresholds import (
+    BALANCED_STARTS,
+    DELAYS,
+    DRY_SHARES,
+    HOPELESS_START,
+    NEARLY_NOTHING,
+    START_COMMON,
+    START_SAME,
+    TABLE_SIZES,
+    UNKNOWN_SIZES,
+    WORK_MEDIUM,
+)
 from .force_balance import ForceBalance, can_be_imposed
+from .points import Points
+from .simulated import relative_error, simulate_table
 
 
 @dataclass(frozen=True)
@@ -54,13 +67,13 @@ class Plane:
 
     def taken_from_friction(self, make) -> Iterator:
         """Yield effects of sizes of the model's friction, and the share of it that stays."""
-        for f in (0.1, 0.3, 0.6):
+        for f in DRY_SHARES:
             yield make(f * self.friction if self.friction > 0 else f * self.force.low), 1.0 - f
-        yield make(0.1 * self.force.low), 1.0
+        yield make(DRY_SHARES[0] * self.force.low), 1.0
 
     def in_periods(self, make) -> Iterator:
         """Yield effects of times comparable with the shortest period."""
-        for f in (0.02, 0.1, 0.4, 1.2):
+        for f in DELAYS:
             yield make(f / self.omega.high), 1.0
 
     @property
@@ -90,7 +103,7 @@ def _any(cls, plane: Plane):
         if f is fields[0]:
             grids[f] = (*TABLE_SIZES, *(-m for m in TABLE_SIZES)) if spec["lower"] < 0 else TABLE_SIZES
         elif f.default is dataclasses.MISSING:
-            grids[f] = (0.1, 1.0)
+            grids[f] = UNKNOWN_SIZES
     for multiples in itertools.product(*grids.values()):
         sized = {}
         for f, multiple in zip(grids, multiples, strict=True):
@@ -155,7 +168,7 @@ def best_starts(
     before = simulate_table(block, points, work)
     size = left(before)
     # a single point of another motion must not hide a good start
-    common = 0.1 * float(np.mean(size)) + 1e-12
+    common = START_COMMON * float(np.mean(size)) + NEARLY_NOTHING
     scored, silent = [], int(np.isnan(before).sum())
     begins = list(proposals(cls, block, points))
     own = (
@@ -166,7 +179,7 @@ def best_starts(
             table = simulate_table(grown, points, work)
         except (ValueError, ArithmeticError):
             continue
-        if not np.allclose(table, before, rtol=1e-5, atol=0, equal_nan=True):
+        if not np.allclose(table, before, rtol=START_SAME, atol=0, equal_nan=True):
             # a model that runs away where the machine moved steadily comes after all that do not
             lost = int(np.isnan(table).sum()) > silent
             scored.append((lost, float(np.sum(np.log(left(table) + common))), len(scored), grown))

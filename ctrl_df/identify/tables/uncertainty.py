@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR, NOTHING, TAKES_PART
 from .fit import FittedTable
 
 
@@ -17,18 +18,18 @@ def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[
     slope = np.array([v.slope(q) for v, q in zip(found.variables, found.q, strict=True)])
     size = np.linalg.norm(j, axis=0)
     for k, s in zip(names, size, strict=True):
-        if s < 1e-6 * max(float(size.max()), 1e-300):
+        if s < FLAT_COLUMN * max(float(size.max()), NOTHING):
             doubtful[k] = f"{k} leaves no trace in these data: its value is the start value."
     live = [i for i, k in enumerate(names) if k not in doubtful]
     residual = float(found.weighted @ found.weighted) / max(len(found.weighted) - len(live), 1)
     covariance = np.full((len(names), len(names)), np.inf)
     if live:
         _, s, vt = np.linalg.svd(j[:, live] / size[live], full_matrices=False)
-        for direction in vt[s < 1e-5 * s[0]]:
-            alike = [names[live[i]] for i in np.flatnonzero(np.abs(direction) > 0.1)]
+        for direction in vt[s < FLAT_SINGULAR * s[0]]:
+            alike = [names[live[i]] for i in np.flatnonzero(np.abs(direction) > TAKES_PART)]
             for k in alike:
                 doubtful[k] = f"{' and '.join(alike)} cannot be told apart on these data. Fix one of them."
-        inverse = (vt.T / np.maximum(s, 1e-8 * s[0]) ** 2) @ vt
+        inverse = (vt.T / np.maximum(s, FLAT_INVERSE * s[0]) ** 2) @ vt
         unit = slope[live] / size[live]
         covariance[np.ix_(live, live)] = residual * inverse * np.outer(unit, unit)
     errors = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from ...checks import known_name
+from ...identify.data.quantities import word_of
 from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
@@ -68,7 +69,7 @@ def comparison_plot(
             lines[0] += top.plot(data.t, m.simulated, color=color, ls=style, lw=1.0, label=name)
             color = ERROR if len(models) == 1 else color
             lines[1] += below.plot(data.t, m.residual, color=color, ls=style, lw=0.7)
-        top.set_ylabel(f"{_said(chosen)} [{unit}]")
+        top.set_ylabel(f"{word_of(chosen.record.output_unit)} [{unit}]")
         top.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{size * value:.4g}"))
         below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
         over = "free run" if chosen.windows == 1 else f"{chosen.windows} windows"
@@ -89,13 +90,6 @@ def comparison_plot(
         lines[2] = _regions(bars, chosen.where, rows)
         top.tick_params(labelbottom=False)
         return drawn.finished(lines, data.name if title is None else title)
-
-
-def _said(comparison) -> str:
-    """Return what the output is, in a word."""
-    return {"m": "position", "rad": "angle", "m/s": "velocity", "rad/s": "speed"}.get(
-        comparison.record.output_unit, "output"
-    )
 
 
 def _readable(values, unit):

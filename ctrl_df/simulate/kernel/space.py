@@ -31,7 +31,7 @@ from .glide import Glide, glide_memory
 from .stepper import STAGES
 
 _NONE = np.zeros(0, np.int64)
-_KINDS = 32  # of programs whose spaces are kept
+_KINDS = 8  # of programs whose spaces are kept, some megabytes each
 _idle: dict[tuple[bytes, bytes], list[Space]] = {}
 LAYOUT = Layout()
 space_at = LAYOUT.opener()
