@@ -67,3 +67,19 @@ def test_other_phase_of_the_record_held_out():
     data = prepare(best.model, [run], [held])
     _, error = data.segmentations[0].errors(best.model)
     assert error * np.std(held.y) < 1.1 * 2e-4
+
+
+def test_behind_an_elastic_joint():
+    """The sensor sees the load, the ripple acts on the motor: the motion of one body does not show it."""
+    known = [cdf.Coulomb(1.5), cdf.Viscous(15.0), cdf.Compliance(1200.0, damping=8.0, load_fraction=0.4)]
+    model, ripple = cdf.Mass(5.0, known), cdf.PositionRipple(0.6, wavelength=0.025, phase=1.0)
+    rng, t = np.random.default_rng(3), np.arange(0, 6, 2e-3)
+    runs = []
+    for phase in (0.0, 2.0):
+        u = 12 * np.sin(2.1 * t + phase) + 6 * np.sin(5.3 * t + 2 * phase)
+        x = np.asarray(cdf.event_response(model.with_effect(ripple), t, u, input_hold="zoh").outputs)[0]
+        runs.append(cdf.Measurement(t, u, x + 1e-4 * rng.standard_normal(t.size)))
+    found = cdf.diagnose(model, runs[0], holdout=runs[1], candidates=["position_ripple", "drift"])
+    assert found.verdict == "effect"
+    assert found.best.parameters["wavelength"] == pytest.approx(0.025, rel=2e-3)
+    assert found.best.parameters["amplitude"] == pytest.approx(0.6, rel=0.05)

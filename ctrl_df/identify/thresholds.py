@@ -296,9 +296,9 @@ JOINT_DAMPING = 0.1
 """Joints tried: share of the mass behind them, resonance over the rate of the motion (its speed over its
 stroke), damping ratio. Resonances that are neighbours lie a third apart."""
 
-LONG_WAVES, LONG_WAVE_TURNS = 5, 30.0
+LONG_WAVES, LONG_WAVE_TURNS = 5, (6.0, 30.0)
 """Ripples that fits begin with by what they change in the output; wavelengths to the stroke up to which they
-are looked for there (200 runs of the segments: half a second of a joint; shorter ones show in the motion)."""
+are sought there, of one body and of two (200 runs of the segments then, a second at most)."""
 
 RIPPLE_TURNS, RIPPLE_STEP, RIPPLE_COARSEST = 400.0, 0.3, 6.0
 """Ripples tried: wavelengths to the stroke at most; between two of them (one turn apart they are orthogonal);

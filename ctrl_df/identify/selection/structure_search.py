@@ -189,7 +189,9 @@ class StructureSearch(Search):
             return base, []
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        short = self.segmentations[0].sampled
+        # where short segments show nothing but noise no minimum is the right one
+        shows = self.nearest.rmse > GROWTH * self.data.noise or self.data.disturbed
+        short = self.segmentations[0].sampled if shows else data
         return base, tried(classes, screen, short, self.free, nominal, executor, screened, reached)
 
     def rivals(self, model, names, classes, executor=None):

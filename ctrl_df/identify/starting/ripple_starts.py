@@ -16,7 +16,8 @@ from .ripple_spectrum import RippleSpectrum, Wave
 def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
     """Return amplitude, wavelength and phase of the long waves that explain most of the residual.
 
-    Sine and cosine are two small changes, fitted together.
+    Sine and cosine are two small changes, fitted together. Of two bodies shorter waves are sought here, too:
+    what the motion shows (`waves`) is that of one.
 
     Parameters
     ----------
@@ -27,7 +28,7 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
     span = float(np.ptp(screen.motion.x))
     amplitude = 0.01 * screen.scales.force
     left, found = {}, {}
-    for turn in np.arange(0.6, LONG_WAVE_TURNS, RIPPLE_STEP):
+    for turn in np.arange(0.6, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP):
         pair = []
         for phase in (0.0, math.pi / 2):
             block = extended(screen.block, make(amplitude, span / turn, phase))
