@@ -221,10 +221,6 @@ RTOL, RTOL_COARSE, RTOL_OVER_NOISE = 1e-8, 1e-5, 1e-3
 that share of the sensors' noise over the motion. Derivatives are differences over which the output moves by
 0.3 times the noise: errors of a thousandth of it change them by less than a hundredth."""
 
-RTOL_NONSMOOTH = 0.1
-"""Share of that tolerance for laws with events, which come and go with its errors: a gap beside a curved law
-then errs by 1e-4 of the sensors' noise (records)."""
-
 FULL_SAMPLES = 12_000
 """Steps of the input of a longer record at the full rate."""
 

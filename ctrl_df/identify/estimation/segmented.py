@@ -28,7 +28,6 @@ from ..thresholds import (
     RESTARTS_KEPT,
     RTOL,
     RTOL_COARSE,
-    RTOL_NONSMOOTH,
     RTOL_OVER_NOISE,
     SCREEN_SAMPLES,
     SHORTEST,
@@ -250,9 +249,8 @@ class SegmentedData:
         )  # fmt: skip
 
     def rtol_of(self, block) -> float:
-        """Return the tolerance of a model's simulations: events that come and go want a finer one."""
-        nonsmooth = any(e.nonsmooth for e in block.effects)
-        return max(RTOL, RTOL_NONSMOOTH * self.rtol) if nonsmooth else self.rtol
+        """Return the tolerance of a model's simulations: events that come and go want the finest."""
+        return RTOL if block.nonsmooth else self.rtol
 
     def limits_of(self, block) -> dict[str, tuple[float, float]]:
         """Return least and largest values: the model's own, and what the records show of its effects."""
