@@ -189,8 +189,9 @@ class StructureSearch(Search):
             return base, []
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        # where short segments show nothing but noise no minimum is the right one
-        shows = self.nearest.rmse > GROWTH * self.data.noise or self.data.disturbed
+        # where short segments show noise alone (its rms, to three standard deviations) no minimum is right
+        most = (1 + 3 / math.sqrt(2 * self.nearest.count)) * self.data.noise
+        shows = self.nearest.rmse > most or self.data.disturbed
         short = self.segmentations[0].sampled if shows else data
         return base, tried(classes, screen, short, self.free, nominal, executor, screened, reached)
 
