@@ -64,5 +64,10 @@ class Gravity(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Return pendulums of shares of the force."""
-        return [cls(f * screen.scales.force) for f in (0.1, 0.4)]
+        """Return the pendulum whose sine and cosine explain most of the output, and shares of the force."""
+        shares = [cls(f * screen.scales.force) for f in (0.1, 0.4)]
+        wave = screen.long_wave(lambda size, _, phase: cls(size, math.pi - phase), cls.wavelength)
+        if wave is None:
+            return shares
+        _, torque, phase = wave
+        return [cls(torque, math.remainder(math.pi - phase, 2 * math.pi)), *shares]

@@ -26,28 +26,36 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
         ``make(amplitude, wavelength, phase)``, the effect.
     """
     span = float(np.ptp(screen.motion.x))
-    amplitude = 0.01 * screen.scales.force
     left, found = {}, {}
     for turn in np.arange(0.6, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP):
-        pair = []
-        for phase in (0.0, math.pi / 2):
-            block = extended(screen.block, make(amplitude, span / turn, phase))
-            change = None if block is None else screen.change(block)
-            if change is None:
-                break
-            pair.append(screen.project(change))
-        if len(pair) < 2:
-            continue
-        matrix = np.array(pair).T
-        w, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
-        left[turn] = float(np.sum((screen.residual - matrix @ w) ** 2))
-        found[turn] = amplitude * float(np.hypot(*w)), span / turn, math.atan2(w[1], w[0])
+        wave = long_wave(screen, make, span / turn)
+        if wave is not None:
+            left[turn], amplitude, phase = wave
+            found[turn] = amplitude, span / turn, phase
     best = []
     for turn in sorted(left, key=left.__getitem__):
         # nearer than a turn it is the same wave
         if len(best) < LONG_WAVES and all(abs(turn - b) > 1.0 for b in best):
             best.append(turn)
     return [found[turn] for turn in best]
+
+
+def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, float] | None:
+    """Return what a wave of this length leaves of the residual (its square), its amplitude and phase.
+
+    None where it cannot be simulated.
+    """
+    size, pair = 0.01 * screen.scales.force, []
+    for phase in (0.0, math.pi / 2):
+        block = extended(screen.block, make(size, wavelength, phase))
+        change = None if block is None else screen.change(block)
+        if change is None:
+            return None
+        pair.append(screen.project(change))
+    matrix = np.array(pair).T
+    w, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
+    left = float(np.sum((screen.residual - matrix @ w) ** 2))
+    return left, size * float(np.hypot(*w)), math.atan2(w[1], w[0])
 
 
 def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:

@@ -21,7 +21,7 @@ from .extend import extended
 from .proposals import proposals
 from .regression import ForceFit, Start, force_fit, motion_of, regressed
 from .ripple_spectrum import Wave
-from .ripple_starts import long_waves, waves
+from .ripple_starts import long_wave, long_waves, waves
 from .value_grid import value_grid
 
 
@@ -81,6 +81,10 @@ class Screen:
     def long_waves(self, make: Callable) -> list[tuple[float, float, float]]:
         """Return amplitude [N], wavelength [m] and phase of the long ripples that explain most."""
         return long_waves(self, make)
+
+    def long_wave(self, make: Callable, wavelength: float) -> tuple[float, float, float] | None:
+        """Return what a ripple of this length leaves of the residual, its amplitude [N] and its phase."""
+        return long_wave(self, make, wavelength)
 
     def waves(self, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
         """Yield ripples of any length that explain most, with values of the model's parameters beside."""
