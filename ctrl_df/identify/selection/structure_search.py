@@ -139,12 +139,14 @@ class StructureSearch(Search):
         if there.rmse > GROWTH * base.rmse:
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
             self.course.stage("the same over long segments")
-            self.base = CandidateFit("", there)
+            near, self.base = self.base, CandidateFit("", there)
             moved = self._over_long_windows(base.rmse, there.rmse, found)
             if moved is not None:
                 base, again = self._look(classes, executor, longest)
                 found = _best_of(base, [*moved, *again])
                 self.course.known(found)
+            # what it is compared with from here on errs over these segments
+            self.base = min(near, CandidateFit("", self.data.moved(there)), key=lambda t: t.train.rmse)
         if found:
             self._rebase(found)
         return found

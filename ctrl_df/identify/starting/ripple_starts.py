@@ -26,18 +26,15 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
         ``make(amplitude, wavelength, phase)``, the effect.
     """
     span = float(np.ptp(screen.motion.x))
-    left, found = {}, {}
-    for turn in np.arange(0.6, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP):
-        wave = long_wave(screen, make, span / turn)
-        if wave is not None:
-            left[turn], amplitude, phase = wave
-            found[turn] = amplitude, span / turn, phase
+    turns = np.arange(0.6, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP)
+    tried = ((turn, long_wave(screen, make, span / turn)) for turn in turns)
+    found = {turn: wave for turn, wave in tried if wave is not None}
     best = []
-    for turn in sorted(left, key=left.__getitem__):
+    for turn in sorted(found, key=lambda turn: found[turn][0]):
         # nearer than a turn it is the same wave
         if len(best) < LONG_WAVES and all(abs(turn - b) > 1.0 for b in best):
             best.append(turn)
-    return [found[turn] for turn in best]
+    return [(amplitude, span / turn, phase) for turn in best for _, amplitude, phase in (found[turn],)]
 
 
 def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, float] | None:
