@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from types import MappingProxyType
@@ -79,12 +79,14 @@ class Mechanism(ct.NonlinearIOSystem):
 
     def _numbers(self) -> dict[str, float]:
         """Return the values of `parameters` by name."""
-        found = dict(self._values)
+        return dict(self._values) | {name: value for name, value, _ in self._of_effects()}
+
+    def _of_effects(self) -> Iterator[tuple[str, float, dict[str, Any]]]:
+        """Yield the parameters of its effects: full name, value, what is stated of it."""
         for key, effect in zip(self._keys, self._effects, strict=True):
-            for (name, _), value in zip(stated_parameters(type(effect)), effect.values, strict=True):
+            for (name, spec), value in zip(stated_parameters(type(effect)), effect.values, strict=True):
                 if name != "load_fraction" or len(self._inertias) < 2:
-                    found[f"{key}.{name}"] = value
-        return found
+                    yield f"{key}.{name}", value, spec
 
     def _labels(self) -> tuple[list[str], list[str], list[str]]:
         """Return the names of inputs, outputs and states."""
@@ -152,11 +154,8 @@ class Mechanism(ct.NonlinearIOSystem):
             k: self._own(Parameter(v, **{**_MASS, "meaning": k.replace("_", " ")}))
             for k, v in self._values.items()
         }
-        for key, effect in zip(self._keys, self._effects, strict=True):
-            for name, p in effect.parameters.items():
-                if name == "load_fraction" and len(self._inertias) == 2:
-                    continue
-                table[f"{key}.{name}"] = self._own(p)
+        for name, value, spec in self._of_effects():
+            table[name] = self._own(Parameter(value, **spec))
         return MappingProxyType(table)
 
     def _own(self, parameter: Parameter) -> Parameter:
