@@ -63,6 +63,9 @@ HOPELESS_ON_TABLE = -SIGNIFICANT
 """Evidence on a few points of a table below which a candidate is not confirmed: as much as makes an effect,
 but against it."""
 
+BY_CHANCE = 3.0
+"""Standard deviations up to which a difference may be chance: one in 370 is larger."""
+
 # --- ratios of errors -------------------------------------------------------------------------------
 
 PROCESS_NOISE = 50.0
@@ -88,16 +91,20 @@ SAME = 1.001
 """Error over the least that counts as the same: well below the spread of an rms, 1/sqrt(2 n), which is 0.007
 for 10,000 samples."""
 
-FLOOR = 1.03
+FLOOR = round(1 + 1 / math.sqrt(2 * 500), 2)
 """Error over the least that the shortest segments leave up to which a fit has nothing to gain: the spread of
-an rms over 500 effective samples, 1 + 1/sqrt(1000)."""
+an rms over 500 effective samples, 1.03."""
 
-GROWTH = 1.35
-"""Best error over segments four times as long that still counts as the same: three standard deviations for
-100 effective samples, exp(3 / sqrt(100))."""
+GROWTH = round(math.exp(BY_CHANCE / math.sqrt(100)), 2)
+"""Best error over segments four times as long that still counts as the same: chance for 100 effective
+samples, 1.35."""
 
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 """Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
+
+STRUCTURE_LEAST = 0.1
+"""Power of the baseline's error beyond noise, over that of the noise, below which there is hardly any: of 200
+effective samples noise has that spread."""
 
 LEFT = 0.2
 """Share of the structure (rms) that the best candidate may leave: 4 % of its power. Rigs with something
@@ -110,9 +117,8 @@ UNMOVED = 0.5
 """Error over the shortest segments, of the output's rms, beyond which a model explains no motion: one that
 stands still at a fitted place and speed errs by as much over half a turn of a sine."""
 
-NOISIER = 1.4
-"""Error on held-out segments over that on fitted ones that may be chance: three standard deviations for 80
-effective samples, exp(3 / sqrt(80))."""
+NOISIER = round(math.exp(BY_CHANCE / math.sqrt(80)), 1)
+"""Error on held-out segments over that on fitted ones that may be chance for 80 effective samples, 1.4."""
 
 GROWN = 2.0
 """Error over the least that the shortest segments leave, up to which it may be noise: slow noise of thrice
@@ -123,6 +129,10 @@ OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
 
 GOOD = 0.25
 """Share of the segments that are taken to be right when others are compared with them."""
+
+ANOTHER_START = (1.5, 0.02)
+"""Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
+(rigs). Only work depends on it."""
 
 HOPELESS_START = HOPELESS
 """Error of a start on a table over that of the model itself from which it is none."""
@@ -159,9 +169,10 @@ SIZE_PRIOR = 3.0
 """Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
 and a half lies `PARAMETER_RANGE`."""
 
-PASSED = 2.15e-3
-"""Speed, over the typical one, at which a bump of friction is gone to 1 % that only breaking away shows: a
-Gaussian one of a thousandth of the typical speed, sqrt(log 100) of its width away."""
+PASSED, BUMP_LEFT = 2.15e-3, 0.01
+"""Speed, over the typical one, at which a bump of friction is gone that only breaking away shows, and the
+share of it that is left then: a Gaussian one of a thousandth of the typical speed, sqrt(log 100) of its width
+away."""
 
 RIGID = (2e-3, 3e-4)
 """Deflection of bristles, as a share of the swing, below which they are rigid: when quick, when careful."""
@@ -251,6 +262,13 @@ RIVALS = 2
 BRANCHES = 3
 """Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
 hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
+
+EFFORT_TRIED, EFFORT_BENT, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
+"""Steps of the fit of an effect at most, and the relative gain of its cost that is none: one whose minimum
+may be long and bent takes more; from segments to others less (rigs)."""
+
+EFFORT_CONFIRMED, EFFORT_ENDED = (3, 1e-3), (8, 1e-6)
+"""The same at the full rate, and of near equals: a gain of a millionth is 0.005 nats of 10,000 samples."""
 
 BEGUN, KEPT, JOINTS, JOINTS_TRIED = 2, 2, 3, 4
 """Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load
@@ -525,6 +543,10 @@ HORIZON_TOLERANCE = 1e-2
 
 SMOOTHED_ENDS = 0.6
 """Periods of the cutoff at either end that a smoothed signal is not used of."""
+
+FORCE_ALIKE = 0.98
+"""Share of the best one's evidence that another kind of force must bring to be named beside it, but for what
+makes an effect: of large evidence two hundredths are a matter of the noise model."""
 
 SHOWN_PROBABILITY = 0.01
 """Of a candidate that is worth a word."""

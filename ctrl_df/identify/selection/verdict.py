@@ -20,7 +20,7 @@ from ..results.diagnosis import (
     rivals,
 )
 from ..results.explain import explain, explain_so_far, falls_behind, undetermined
-from ..thresholds import FLOOR
+from ..thresholds import EXPONENT, FLOOR
 from .lasting import lasting
 from .search import Remainder, Search
 
@@ -160,7 +160,7 @@ def _probabilities(chosen) -> list[float]:
     if not chosen:
         return []
     top = max(chosen[0].evidence, 0.0)
-    weights = np.exp(np.clip([*(t.evidence - top for t in chosen), -top], -700, 0))
+    weights = np.exp(np.clip([*(t.evidence - top for t in chosen), -top], -EXPONENT, 0))
     return (weights / weights.sum())[:-1].tolist()
 
 
