@@ -23,13 +23,13 @@ from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import (
+from ..thresholds import HOPELESS
+from .thresholds import (
     ANOTHER_START,
     BEGUN,
     EFFORT_BENT,
     EFFORT_MOVED,
     EFFORT_TRIED,
-    HOPELESS,
     JOINTS,
     KEPT,
     LOAD_SHARES,

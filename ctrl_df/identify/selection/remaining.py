@@ -11,9 +11,10 @@ from ..prediction.segments import facts
 from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
-from ..thresholds import FORCE_ALIKE, GROWN, LEFT, NOISIER, NOTHING
+from ..thresholds import NOTHING
 from .evidence import rounds
 from .search import Located, Remainder
+from .thresholds import FORCE_ALIKE, GROWN, LEFT, NOISIER
 
 
 def remainder(

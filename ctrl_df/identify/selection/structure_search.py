@@ -21,9 +21,14 @@ from ..prediction.sensed import POSITION, sensed
 from ..prediction.simulator import feasible
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
-from ..thresholds import (
+from ..thresholds import BY_CHANCE, GROWTH, HOPELESS, PROCESS_NOISE, SIGNIFICANT, STILL_POSSIBLE, UNMOVED
+from .attempts import itself, own_names, tried
+from .equivalence import indistinguishable
+from .evidence import ranked, rounds
+from .remaining import located, remainder
+from .search import Remainder, Search, Words
+from .thresholds import (
     BUMP_LEFT,
-    BY_CHANCE,
     CONFIRMED,
     CONFIRMED_FORCED,
     EFFORT_CONFIRMED,
@@ -32,26 +37,15 @@ from ..thresholds import (
     EXACT,
     EXPLAINS_LITTLE,
     FLOOR,
-    GROWTH,
-    HOPELESS,
     LEFT,
     PASSED,
-    PROCESS_NOISE,
     PROMISING,
     SHOWS_HARDLY,
-    SIGNIFICANT,
     SIGNIFICANT_HELD,
     SIZE_KNOWN,
-    STILL_POSSIBLE,
     STOPPED_EARLY,
     STRUCTURE_LEAST,
-    UNMOVED,
 )
-from .attempts import itself, own_names, tried
-from .equivalence import indistinguishable
-from .evidence import ranked, rounds
-from .remaining import located, remainder
-from .search import Remainder, Search, Words
 
 
 class StructureSearch(Search):

@@ -20,9 +20,10 @@ from ..results.diagnosis import (
     rivals,
 )
 from ..results.explain import explain, explain_so_far, falls_behind, undetermined
-from ..thresholds import EXPONENT, FLOOR
+from ..thresholds import EXPONENT
 from .lasting import lasting
 from .search import Remainder, Search
+from .thresholds import FLOOR
 
 
 def diagnosed(search: Search, classes, executor=None, course: Course | None = None, limits=None) -> Diagnosis:
