@@ -12,11 +12,11 @@ from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.selection.rounding import rounding_evidence
+from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.starting.extend import applicable
 from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
-from ctrl_df.identify.thresholds import LOAD_SHARES
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
 BLOCKS = {

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...checks import is_number, shown
-from ..thresholds import BESIDE, FAST, LEAP, MINIMUM, USUAL_STEPS
 from .derivatives import grain, step_of
+from .thresholds import BESIDE, FAST, LEAP, MINIMUM, USUAL_STEPS
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:

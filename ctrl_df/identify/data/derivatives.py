@@ -7,16 +7,15 @@ import math
 import numpy as np
 
 from ...checks import number
-from ..thresholds import (
+from ..thresholds import ON_SAMPLE, QUARTILE
+from .thresholds import (
     CUTOFF_HIGHEST,
     CUTOFF_LOWEST,
     FEW_VALUES,
     FLOOR_LEAST,
-    ON_SAMPLE,
     ON_STEP,
     ON_STEPS,
     PADDING,
-    QUARTILE,
     REGULAR,
     SPECTRUM_LENGTH,
     THINNED_BAND,

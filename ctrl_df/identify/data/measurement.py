@@ -12,10 +12,11 @@ import numpy as np
 
 from ...checks import choice, count, mapping, number, shown, unknown_keywords
 from ...units import si_unit, to_si
-from ..thresholds import MINIMUM, ON_SAMPLE, REGULAR
+from ..thresholds import ON_SAMPLE
 from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
+from .thresholds import MINIMUM, REGULAR
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
 

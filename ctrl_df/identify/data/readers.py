@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...checks import is_number, mapping, names, path_of, shown
-from ..thresholds import MOST_COLUMNS
 from .text_table import read_csv, refuse_text
+from .thresholds import MOST_COLUMNS
 
 __all__ = ["find_column", "read_csv", "read_dataframe", "read_mat", "read_response", "select", "stem"]
 

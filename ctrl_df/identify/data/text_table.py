@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...checks import choice, path_of, shown
-from ..thresholds import BINARY, BINARY_LOOK, BLOCK, NANOSECONDS, SAMPLE_ROWS
+from .thresholds import BINARY, BINARY_LOOK, BLOCK, NANOSECONDS, SAMPLE_ROWS
 
 _BOMS = (
     (b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe\x00\x00", "utf-32"), (b"\x00\x00\xfe\xff", "utf-32"),

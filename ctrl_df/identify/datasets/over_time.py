@@ -10,6 +10,7 @@ from ..estimation.multiple_shooting import Stage
 from ..estimation.problem import Problem
 from ..estimation.refit_records import blurred, doubts, refit_records
 from ..estimation.states import find_states
+from ..estimation.thresholds import RESTARTS_KEPT
 from ..planning.inputs import input_that_separates
 from ..prediction.prepared import REFERENCE
 from ..prediction.segments import make_segments
@@ -17,7 +18,6 @@ from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
-from ..thresholds import RESTARTS_KEPT
 from .dataset import Dataset, Estimate
 
 

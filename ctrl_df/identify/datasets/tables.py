@@ -7,8 +7,8 @@ from ..tables.compare import comparison_of_tables, inner_block
 from ..tables.fit import fit_table
 from ..tables.points import points_of, table_scales
 from ..tables.search import TableSearch
+from ..tables.thresholds import TABLE_ITERATIONS, TABLE_STEPS
 from ..tables.uncertainty import uncertainty
-from ..thresholds import TABLE_ITERATIONS, TABLE_STEPS
 from .dataset import Dataset, Estimate
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..thresholds import ANGLE_WORTH, ANGLES
 from .fit import FitResult
+from .thresholds import ANGLE_WORTH, ANGLES
 
 
 def reestimated_per_record(near: FitResult, fit) -> FitResult:

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from ..thresholds import MANY_SEGMENTS
 from .multiple_shooting import Solution, Stage
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
+from .thresholds import MANY_SEGMENTS
 
 
 def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity):

@@ -15,12 +15,13 @@ from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
-from ..thresholds import RESTARTS_KEPT, RTOL
+from ..thresholds import RTOL
 from .covariance import covariance_of
 from .multiple_shooting import Solution, Stage
 from .noise_model import NoiseModel
 from .problem import Problem
 from .sensitivity import OutputSensitivity
+from .thresholds import RESTARTS_KEPT
 from .variables import default_free, step_of_sensor
 
 

@@ -19,11 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from ..thresholds import GOOD
+from ..thresholds import QUARTILE
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
 from .restarts import restarted_segments, scanned_gap_states
 from .states import descend, find_states
+from .thresholds import GOOD
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ class Stage(SegmentOutputs):
         if not robust:
             return [np.ones(len(r)) for r in residual]
         everything = np.concatenate(residual)
-        sigma = max(1.4826 * float(np.median(np.abs(everything))), self.problem.noise)
+        sigma = max(float(np.median(np.abs(everything))) / QUARTILE, self.problem.noise)
         return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), 1e-300)) for r in residual]
 
     def _step(self, h, g, theta, damping):

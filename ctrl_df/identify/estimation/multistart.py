@@ -16,20 +16,19 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from ..prediction.simulator import feasible
-from ..thresholds import (
+from ..thresholds import HOPELESS, STILL_POSSIBLE
+from .common_friction import dry_level
+from .fit import FitResult
+from .segmented import CandidateFit, SegmentedData
+from .thresholds import (
     BETTER,
-    HOPELESS,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
     RESTARTS_KEPT,
     SAME,
     STATIC_FACTORS,
-    STILL_POSSIBLE,
 )
-from .common_friction import dry_level
-from .fit import FitResult
-from .segmented import CandidateFit, SegmentedData
 
 
 def nonsmooth_names(found: FitResult) -> list[str]:

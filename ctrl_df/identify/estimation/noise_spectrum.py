@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..thresholds import NOISE_KNOWN, NOISE_PASSES, NOISE_SHARE
 from .noise_model import noise_model
+from .thresholds import NOISE_KNOWN, NOISE_PASSES, NOISE_SHARE
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,11 @@ from ..data.derivatives import step_of
 from ..data.measurement import Measurement
 from ..prediction.segments import facts
 from ..prediction.simulators import simulator_of
-from ..thresholds import HOLDOUT_PARTS, PROCESS_NOISE, SEGMENT_LEAST
+from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .segmented import prepare
+from .thresholds import HOLDOUT_PARTS, SEGMENT_LEAST
 from .variables import step_of_sensor
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..prediction.sensed import sensed
-from ..thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, UNFOLLOWED
 from .outputs import States
+from .thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, UNFOLLOWED
 
 
 def restarted_segments(stage, found):

@@ -16,28 +16,25 @@ from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
-from ..thresholds import (
-    BRIEF,
-    FILTERED,
-    FULL_SAMPLES,
-    GROWTH,
-    HOLDOUT_PARTS,
-    LEVELS,
-    NOISE_FREE,
-    PARAMETER_RANGE,
-    RESTARTS_KEPT,
-    RTOL,
-    RTOL_COARSE,
-    RTOL_OVER_NOISE,
-    SCREEN_SAMPLES,
-    SHORTEST,
-)
+from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, RTOL
 from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
 from .noise_model import NoiseModel, acceleration_filter
 from .scales import Scales, scales_of
 from .segmented_records import SegmentedRecords
 from .starts import same_begins
+from .thresholds import (
+    BRIEF,
+    FILTERED,
+    HOLDOUT_PARTS,
+    LEVELS,
+    PARAMETER_RANGE,
+    RESTARTS_KEPT,
+    RTOL_COARSE,
+    RTOL_OVER_NOISE,
+    SCREEN_SAMPLES,
+    SHORTEST,
+)
 from .variables import RecordScales
 
 

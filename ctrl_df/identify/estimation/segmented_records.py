@@ -9,7 +9,7 @@ import numpy as np
 from ..data.measurement import Measurement
 from ..prediction.segments import Segments, split
 from ..prediction.sensed import sensed
-from ..thresholds import SEGMENT_LEAST
+from .thresholds import SEGMENT_LEAST
 
 
 @dataclass(frozen=True)

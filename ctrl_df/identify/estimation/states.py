@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..prediction.segments import split
-from ..thresholds import BEGINNINGS, DAMPED, SEGMENT_LEAST
 from .elimination import states_for
 from .noise_model import power
+from .thresholds import BEGINNINGS, DAMPED, SEGMENT_LEAST
 
 
 def find_states(stage) -> list[np.ndarray]:

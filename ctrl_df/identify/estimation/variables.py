@@ -13,7 +13,7 @@ from ...blocks.primitives import Ramp
 from ...units import dimension, size
 from ..prediction.segments import Facts, facts
 from ..prediction.sensed import POSITION, sensed
-from ..thresholds import SIZE_PRIOR
+from .thresholds import SIZE_PRIOR
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..prediction.simulator import free_run
 from ..results.experiment import Experiment, separated
-from ..thresholds import (
-    NOTHING,
+from ..thresholds import NOTHING
+from .thresholds import (
     PLAN_BAND,
     PLAN_MARGIN,
     PLAN_MOVES,

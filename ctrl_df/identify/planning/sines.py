@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..results.experiment import Experiment, separated
-from ..thresholds import COUNTED, NOTHING, SETTLE, SIGMA_LEAST, SINES, WORK_MEDIUM
+from ..tables.thresholds import WORK_MEDIUM
+from ..thresholds import NOTHING
+from .thresholds import COUNTED, SETTLE, SIGMA_LEAST, SINES
 
 
 def stepped_sines(

@@ -10,10 +10,10 @@ from ...blocks.core import Core
 from ...simulate.imposed import imposed_forces
 from ...simulate.imposed_response import imposable
 from ..data.imposed import imposed_motion
-from ..thresholds import HIDDEN_RTOL
 from . import initial_states
 from .segments import Segments
 from .simulator import Simulator
+from .thresholds import HIDDEN_RTOL
 
 
 class ImposedSimulator(Simulator):

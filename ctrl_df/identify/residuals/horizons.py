@@ -18,7 +18,8 @@ from ..prediction.initial_states import CONTINUED, FREE
 from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
-from ..thresholds import FULL_SAMPLES, HORIZON_TOLERANCE, HORIZONS, NOTHING, SHORTEST_HORIZON
+from ..thresholds import FULL_SAMPLES, NOTHING
+from .thresholds import HORIZON_TOLERANCE, HORIZONS, SHORTEST_HORIZON
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,17 +18,8 @@ from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
-from ..thresholds import (
-    DEPENDENT,
-    FINER,
-    FREE_ORDER,
-    FREE_STEPS,
-    HUM_WINDOW,
-    NOTHING,
-    REVERSAL_REACHES,
-    SLOWLY,
-    TEST_FORCE,
-)
+from ..thresholds import DEPENDENT, NOTHING, SLOWLY
+from .thresholds import FINER, FREE_ORDER, FREE_STEPS, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
 
 
 @dataclass(frozen=True)

@@ -14,21 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..thresholds import (
-    AFTER_REVERSAL,
-    FAINT,
-    FASTEST,
-    LEVEL,
-    LOW_SPEED,
-    MEDIUM_SPEED,
-    NEARLY_NOTHING,
-    NOTHING,
-    RECORD_SAMPLES,
-    REGION_SAMPLES,
-    SMALLEST_SAID,
-)
+from ..thresholds import LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
+from .thresholds import AFTER_REVERSAL, FAINT, FASTEST, LOW_SPEED, MEDIUM_SPEED, REGION_SAMPLES, SMALLEST_SAID
 
 KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..estimation.noise_model import noise_model
-from ..thresholds import AT_ROOT, BANDWIDTH, DECORRELATED, INPUT_LAGS, NOTHING, TWO_SIDED, WHITENESS_LAGS
+from ..thresholds import NOTHING
+from .thresholds import AT_ROOT, BANDWIDTH, DECORRELATED, INPUT_LAGS, TWO_SIDED, WHITENESS_LAGS
 
 
 def rmse(residual) -> float:

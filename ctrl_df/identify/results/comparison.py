@@ -28,7 +28,8 @@ from ..residuals.residual_tests import (
     whiteness,
 )
 from ..smoothing.missing_force import MissingForce, missing_force, missing_of_imposed
-from ..thresholds import RECORD_SAMPLES, SMOOTHED_ENDS, SPECTRUM_LEAST
+from ..thresholds import RECORD_SAMPLES
+from .thresholds import SMOOTHED_ENDS, SPECTRUM_LEAST
 
 
 @dataclass(frozen=True, eq=False)

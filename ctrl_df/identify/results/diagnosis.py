@@ -13,7 +13,8 @@ from ...drawing import draw, go_on
 from ..course import COMPLETE
 from ..data.measurement import Measurement
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
-from ..thresholds import RULED_OUT, SHOWN_PROBABILITY
+from ..thresholds import RULED_OUT
+from .thresholds import SHOWN_PROBABILITY
 
 CALIBRATED = (
     "Probabilities are those of the candidates and of nothing missing, all equal beforehand, by the "

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..thresholds import SHOWN_PROBABILITY
 from .diagnosis import AMBIGUOUS, NONE, UNKNOWN, certainty, rivals
+from .thresholds import SHOWN_PROBABILITY
 
 
 def named(effect) -> str:

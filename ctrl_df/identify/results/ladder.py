@@ -9,9 +9,9 @@ from typing import Any
 
 from ...drawing import draw, go_on
 from ..course import COMPLETE
-from ..thresholds import LEAST_WIDTH
 from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
 from .neighbours import Neighbours
+from .thresholds import LEAST_WIDTH
 
 
 @dataclass(frozen=True, eq=False)

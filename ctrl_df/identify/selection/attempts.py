@@ -23,7 +23,18 @@ from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import BEGUN, HOPELESS, JOINTS, KEPT, LOAD_SHARES, PROMISES
+from ..thresholds import HOPELESS
+from .thresholds import (
+    ANOTHER_START,
+    BEGUN,
+    EFFORT_BENT,
+    EFFORT_MOVED,
+    EFFORT_TRIED,
+    JOINTS,
+    KEPT,
+    LOAD_SHARES,
+    PROMISES,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +231,9 @@ def _begin_joint(job) -> list[Attempt]:
     for near in resonating(cls, screen, share, JOINTS):
         names = own_names(near.model)
         found.append(
-            Attempt(cls.id, near.model, (*free, *names), screen.data, 14, 3e-3, len(names), near.starts, near)
+            Attempt(
+                cls.id, near.model, (*free, *names), screen.data, *EFFORT_BENT, len(names), near.starts, near
+            )
         )
     return found
 
@@ -236,7 +249,8 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
         begun = [_from(s, screen, shortest, free) for s in (*own, *best)]
         return starts, [a for a in begun if a is not None]
     for i, start in enumerate(starts):
-        if i and not starts[0].values and start.left > 1.5 * starts[0].left + 0.02:
+        share, beyond = ANOTHER_START
+        if i and not starts[0].values and start.left > share * starts[0].left + beyond:
             break
         found.append(_from(start, screen, shortest, free))
     if cls.multimodal or screen.block.core.bodies == 2:
@@ -260,10 +274,9 @@ def _from(start: Start, screen: Screen, shortest: SegmentedData, free) -> Attemp
     if start.effect.multimodal:
         # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
         bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
-        steps, tolerance = (14, 3e-3) if bent else (6, 1e-2)
-        return Attempt(key, block, names, shortest, steps, tolerance, len(added))
+        return Attempt(key, block, names, shortest, *(EFFORT_BENT if bent else EFFORT_TRIED), len(added))
     begin = None if start.values else screen.starts(block)
-    return Attempt(key, block, names, screen.data, 6, 1e-2, len(added), begin)
+    return Attempt(key, block, names, screen.data, *EFFORT_TRIED, len(added), begin)
 
 
 def _first(job) -> Attempt:
@@ -292,7 +305,7 @@ def _finish(job) -> CandidateFit:
     trial = attempt.trial
     if attempt.data is data:
         return trial
-    return replace(trial, train=data.moved(trial.train, 4, 1e-2, hopeless))
+    return replace(trial, train=data.moved(trial.train, *EFFORT_MOVED, hopeless))
 
 
 def _spread(effects, count):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..estimation.noise_model import NoiseModel, whitened_power
-from ..thresholds import TOLD_APART
+from ..thresholds import NOTHING, TOLD_APART
 
 
 def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_APART) -> bool:
@@ -20,4 +20,4 @@ def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_AP
     """
     difference = [a - b for a, b in zip(first, second, strict=True)]
     power, _ = whitened_power(difference, noise)
-    return 0.5 * power / max(noise.sigma, 1e-300) ** 2 < nats
+    return 0.5 * power / max(noise.sigma, NOTHING) ** 2 < nats

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from ..estimation.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..estimation.segmented import CandidateFit
-from ..thresholds import REFUTED
 from .rounding import rounding_evidence
+from .thresholds import REFUTED
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 from ...blocks.massless import without_answer
-from ..thresholds import FLOOR
 from .structure_search import StructureSearch
+from .thresholds import FLOOR
 
 
 class ImposedSearch(StructureSearch):

@@ -21,11 +21,11 @@ from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
-from ..thresholds import BRANCHES, CONFIRMED, SHOWS_HARDLY
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .search import Search
 from .structure import Structure, plainness
+from .thresholds import BRANCHES, CONFIRMED, SHOWS_HARDLY
 from .verdict import diagnosed, worth
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..prediction.segments import facts
 from ..results.diagnosis import Baseline, CandidateEffect
-from ..thresholds import GROWTH, OUTLASTING, UNMOVED
+from ..thresholds import GROWTH, UNMOVED
+from .thresholds import OUTLASTING
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
-from ..thresholds import RIVALS, RULED_OUT
+from ..thresholds import RULED_OUT
 from .search import Search
 from .structure import Structure, exchanged, parameters_of, plainness
+from .thresholds import RIVALS
 from .verdict import worth
 
 

@@ -11,9 +11,10 @@ from ..prediction.segments import facts
 from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
-from ..thresholds import GROWN, LEFT, NOISIER
+from ..thresholds import NOTHING
 from .evidence import rounds
 from .search import Located, Remainder
+from .thresholds import FORCE_ALIKE, GROWN, LEFT, NOISIER
 
 
 def remainder(
@@ -45,7 +46,7 @@ def remainder(
         # what the right model misses over long segments it misses over short ones
         structure = max(structure, math.sqrt(max(best.train.rmse**2 - (GROWN * floor) ** 2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
-    there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, 1e-300))
+    there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, NOTHING))
     assert best.validation is not None and base.validation is not None
     floors = [
         math.sqrt(float(np.mean([facts(r).noise ** 2 for r in v.records])))
@@ -54,7 +55,7 @@ def remainder(
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
     expected = NOISIER * spread * max(1.0, floors[1] / floors[0])
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
-    there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, 1e-300))
+    there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
     unexplained = telling if rounded else share > LEFT
     return Remainder(spread, max(structure, outside), unexplained, missed)
@@ -82,7 +83,7 @@ def located(
     where = find_regions(shown, data.train)
     if not unknown:
         return Located(where, tuple(where.kinds) if where is not None else ())
-    kinds = tuple(m.kind for m in missed if m.evidence > 0.98 * missed[0].evidence - significant)
+    kinds = tuple(m.kind for m in missed if m.evidence > FORCE_ALIKE * missed[0].evidence - significant)
     return Located(where, kinds, _sentences(left, missed, where, measure))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ..thresholds import RIVALS
 from .search import Search
 from .structure import Structure, exchanged
+from .thresholds import RIVALS
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ..thresholds import COARSE, FINEST, STRAY
+from .thresholds import COARSE, FINEST, STRAY
 
 
 def rounding_evidence(measured, simulated, step: float) -> float:

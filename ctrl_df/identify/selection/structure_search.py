@@ -21,31 +21,31 @@ from ..prediction.sensed import POSITION, sensed
 from ..prediction.simulator import feasible
 from ..starting.regression import force_regression, motion_of
 from ..starting.screen import Screen
-from ..thresholds import (
-    CONFIRMED,
-    CONFIRMED_FORCED,
-    EXACT,
-    EXPLAINS_LITTLE,
-    FLOOR,
-    GROWTH,
-    HOPELESS,
-    LEFT,
-    PASSED,
-    PROCESS_NOISE,
-    PROMISING,
-    SHOWS_HARDLY,
-    SIGNIFICANT,
-    SIGNIFICANT_HELD,
-    SIZE_KNOWN,
-    STILL_POSSIBLE,
-    STOPPED_EARLY,
-    UNMOVED,
-)
+from ..thresholds import BY_CHANCE, GROWTH, HOPELESS, PROCESS_NOISE, SIGNIFICANT, STILL_POSSIBLE, UNMOVED
 from .attempts import itself, own_names, tried
 from .equivalence import indistinguishable
 from .evidence import ranked, rounds
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
+from .thresholds import (
+    BUMP_LEFT,
+    CONFIRMED,
+    CONFIRMED_FORCED,
+    EFFORT_CONFIRMED,
+    EFFORT_ENDED,
+    EFFORT_MOVED,
+    EXACT,
+    EXPLAINS_LITTLE,
+    FLOOR,
+    LEFT,
+    PASSED,
+    PROMISING,
+    SHOWS_HARDLY,
+    SIGNIFICANT_HELD,
+    SIZE_KNOWN,
+    STOPPED_EARLY,
+    STRUCTURE_LEAST,
+)
 
 
 class StructureSearch(Search):
@@ -173,7 +173,7 @@ class StructureSearch(Search):
             return None
         longest = self.segmentations[-1]
         best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
-        moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, 4, 1e-2)), best)
+        moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, *EFFORT_MOVED)), best)
         shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
         return None if shows and min(t.train.rmse for t in moved) <= 0.5 * there else moved
 
@@ -191,8 +191,8 @@ class StructureSearch(Search):
             return base, []
         screen = Screen(base, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        # where short segments show noise alone (its rms, to three standard deviations) no minimum is right
-        most = (1 + 3 / math.sqrt(2 * self.nearest.count)) * self.data.noise
+        # where short segments show noise alone (its rms, but for chance) no minimum is right
+        most = (1 + BY_CHANCE / math.sqrt(2 * self.nearest.count)) * self.data.noise
         shows = self.nearest.rmse > most or self.data.disturbed
         short = self.segmentations[0].sampled if shows else data
         return base, tried(classes, screen, short, self.free, nominal, executor, screened, reached)
@@ -244,7 +244,9 @@ class StructureSearch(Search):
         self.course.stage("the best refitted at the full rate, and tried on what is held out")
         pairs = [(t, f) for t, f in zip((self.base, *found), stages[at], strict=True) if f is not None]
         best = side_by_side(
-            lambda pair: fine.validate(replace(pair[0], train=fine.moved(pair[1], 3, 1e-3), confirmed=True)),
+            lambda pair: fine.validate(
+                replace(pair[0], train=fine.moved(pair[1], *EFFORT_CONFIRMED), confirmed=True)
+            ),
             pairs,
         )
         self.base = best[0]
@@ -309,7 +311,7 @@ class StructureSearch(Search):
         """
         fine, fit = self.data.fine, tried.train
         if exactly:
-            fit = fine.moved(fit, 8, 1e-6)
+            fit = fine.moved(fit, *EFFORT_ENDED)
         if own(fit) and fit.rmse > floor and least > floor and not fine.disturbed:
             fit = restarted(fit, fine.fit, own(fit), beyond(fit, least))
         return thresholds_refined(
@@ -340,7 +342,7 @@ class StructureSearch(Search):
         without, speed = [e for e in beside if e is not effect], PASSED * self.data.scales.speed
         kinetic = level(without, 1.0, 1.0, speed)
         bump = level(beside, 1.0, 1.0, speed) - kinetic
-        return bump <= 0.01 * (level(beside, 0.0, 1.0, 0.0) - kinetic)
+        return bump <= BUMP_LEFT * (level(beside, 0.0, 1.0, 0.0) - kinetic)
 
     # --- what it comes to -----------------------------------------------------------------------------
 
@@ -480,4 +482,4 @@ def _left(base, best, at) -> float:
     """Return the share of the baseline's error beyond noise that the best leaves; 1 where hardly any is."""
     noise = best[0] ** 2
     there = base[at] ** 2 - noise
-    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > 0.1 * noise else 1.0
+    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > STRUCTURE_LEAST * noise else 1.0

@@ -20,9 +20,10 @@ from ..results.diagnosis import (
     rivals,
 )
 from ..results.explain import explain, explain_so_far, falls_behind, undetermined
-from ..thresholds import FLOOR
+from ..thresholds import EXPONENT
 from .lasting import lasting
 from .search import Remainder, Search
+from .thresholds import FLOOR
 
 
 def diagnosed(search: Search, classes, executor=None, course: Course | None = None, limits=None) -> Diagnosis:
@@ -160,7 +161,7 @@ def _probabilities(chosen) -> list[float]:
     if not chosen:
         return []
     top = max(chosen[0].evidence, 0.0)
-    weights = np.exp(np.clip([*(t.evidence - top for t in chosen), -top], -700, 0))
+    weights = np.exp(np.clip([*(t.evidence - top for t in chosen), -top], -EXPONENT, 0))
     return (weights / weights.sum())[:-1].tolist()
 
 

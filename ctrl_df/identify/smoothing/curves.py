@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..residuals.residual_tests import autocorrelation
-from ..thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST, DEPENDENT, NOTHING, UNLIKE
+from ..thresholds import DEPENDENT, NOTHING
+from .thresholds import CURVE_ALONE, CURVE_BINS, CURVE_LEAST, UNLIKE
 
 
 @dataclass(frozen=True)

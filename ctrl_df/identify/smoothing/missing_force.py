@@ -17,9 +17,10 @@ from ..prediction.prepared import REFERENCE
 from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
-from ..thresholds import FORCE_KNOWN, PARAMETER_NUDGE, SLOWLY
+from ..thresholds import SLOWLY
 from .curves import Curve, curve_over
 from .smoother import smooth_record
+from .thresholds import FORCE_KNOWN, PARAMETER_NUDGE
 
 AGAINST = ("time", "position", "velocity", "load", "reversal")
 

@@ -20,7 +20,9 @@ from ...blocks.mechanism import Mechanism
 from ..data.measurement import Measurement
 from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION
-from ..thresholds import (
+from .kalman import smoothed
+from .steps import Linearized, Steps
+from .thresholds import (
     SMOOTHER_BEGIN,
     SMOOTHER_DAMPED,
     SMOOTHER_DRIVEN,
@@ -35,8 +37,6 @@ from ..thresholds import (
     SMOOTHER_USUAL,
     UNLIKELY,
 )
-from .kalman import smoothed
-from .steps import Linearized, Steps
 
 
 @dataclass(frozen=True)

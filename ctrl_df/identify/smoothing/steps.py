@@ -18,7 +18,8 @@ from ..prediction import initial_states
 from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION
 from ..prediction.simulator import Simulator
-from ..thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL, UNPLACED
+from ..thresholds import UNPLACED
+from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL
 
 
 @dataclass(frozen=True)

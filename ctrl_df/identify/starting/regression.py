@@ -16,9 +16,9 @@ from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.scales import Scales
 from ..prediction.segments import facts, load_of
-from ..thresholds import STRONG
 from .extend import extended
 from .own_laws import Columns, allowed, own_columns
+from .thresholds import STRONG
 
 
 @dataclass(frozen=True)

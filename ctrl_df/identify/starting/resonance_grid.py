@@ -8,9 +8,9 @@ about.
 from __future__ import annotations
 
 from ..estimation.fit import FitResult
-from ..thresholds import JOINT_DAMPING, JOINTS_TRIED, RESONANCES
 from .extend import extended
 from .screen import Screen
+from .thresholds import JOINT_DAMPING, JOINTS_TRIED, RESONANCES
 
 
 def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]:

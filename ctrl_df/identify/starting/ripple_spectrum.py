@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..prediction.segments import facts
-from ..thresholds import RIPPLE_COARSEST, RIPPLE_STEP, RIPPLE_TURNS, SPECTRUM_SAMPLES
+from .thresholds import RIPPLE_COARSEST, RIPPLE_STEP, RIPPLE_TURNS, SPECTRUM_SAMPLES
 
 _PLAIN = ("dry", "linear", "constant")
 

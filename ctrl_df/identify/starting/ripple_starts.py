@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ..thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_STEP
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import RippleSpectrum, Wave
+from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_STEP
 
 
 def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:

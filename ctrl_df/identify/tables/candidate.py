@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from ..estimation.scales import Scales
-from ..thresholds import TABLE_STEPS, VARIANCE_LEAST, WORK_LOW, WORK_MEDIUM
 from .errors import log_density, outlying
 from .fit import FittedTable, fit_table
 from .simulated import relative_error, simulate_table
 from .starts import best_starts
+from .thresholds import TABLE_STEPS, VARIANCE_LEAST, WORK_LOW, WORK_MEDIUM
 
 
 def try_effect(job) -> tuple[str, FittedTable, int] | None:

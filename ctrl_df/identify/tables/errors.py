@@ -6,15 +6,8 @@ import math
 
 import numpy as np
 
-from ..thresholds import (
-    EXPONENT,
-    GROSS,
-    MIXTURE_ROUNDS,
-    NOTHING,
-    OUTLYING_LEAST,
-    OUTLYING_POINT,
-    OUTLYING_SHARE,
-)
+from ..thresholds import EXPONENT, NOTHING
+from .thresholds import GROSS, MIXTURE_ROUNDS, OUTLYING_LEAST, OUTLYING_POINT, OUTLYING_SHARE
 
 
 def rms(error) -> float:

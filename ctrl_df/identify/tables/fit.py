@@ -12,10 +12,10 @@ from scipy.optimize import least_squares
 from ..estimation.scales import Scales
 from ..estimation.variables import Variable
 from ..prediction.simulator import feasible
-from ..thresholds import TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
 from .errors import rms
 from .points import Points
 from .simulated import relative_error, simulate_table
+from .thresholds import TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
 
 
 @dataclass(frozen=True, eq=False)

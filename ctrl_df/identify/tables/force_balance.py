@@ -16,7 +16,9 @@ from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
 from ..estimation.scales import Scales
 from ..prediction.simulator import feasible
-from ..thresholds import (
+from ..thresholds import NEARLY_NOTHING
+from .points import Points
+from .thresholds import (
     BALANCE_GAIN,
     BALANCE_LOWEST,
     BALANCE_NUDGE,
@@ -25,9 +27,7 @@ from ..thresholds import (
     BALANCE_ROUNDS,
     BALANCE_RTOL,
     BALANCE_SAMPLES,
-    NEARLY_NOTHING,
 )
-from .points import Points
 
 
 def can_be_imposed(block) -> bool:

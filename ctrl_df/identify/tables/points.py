@@ -15,7 +15,8 @@ import numpy as np
 
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..estimation.scales import Scales
-from ..thresholds import NEARLY_NOTHING, SCALE_LEAST
+from ..thresholds import NEARLY_NOTHING
+from .thresholds import SCALE_LEAST
 
 
 @dataclass(frozen=True, eq=False)

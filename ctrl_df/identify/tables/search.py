@@ -16,7 +16,15 @@ from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
 from ..starting.extend import applicable
-from ..thresholds import (
+from ..thresholds import TOLD_APART
+from .candidate import fit_either, try_effect
+from .compare import comparison_of_tables, plane_regions, scatter
+from .errors import log_density, outlying, rms
+from .fit import FittedTable, fit_table, slopes_of
+from .points import Points, counted, points_of, table_scales
+from .simulated import relative_error, simulate_table
+from .starts import balanced
+from .thresholds import (
     CONFIRMED_ON_TABLE,
     HOPELESS_ON_TABLE,
     POINTS,
@@ -27,18 +35,10 @@ from ..thresholds import (
     TABLE_BUDGET,
     TABLE_ITERATIONS,
     TABLE_STEPS,
-    TOLD_APART,
     TOP_FREQUENCIES,
     UNEXPLAINED,
     WORK_MEDIUM,
 )
-from .candidate import fit_either, try_effect
-from .compare import comparison_of_tables, plane_regions, scatter
-from .errors import log_density, outlying, rms
-from .fit import FittedTable, fit_table, slopes_of
-from .points import Points, counted, points_of, table_scales
-from .simulated import relative_error, simulate_table
-from .starts import balanced
 from .uncertainty import uncertainty
 
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...blocks.core import level
-from ..thresholds import NOTHING, RESONANT, RIGID, WORK_HIGH
+from ..thresholds import NOTHING
 from .points import Points
+from .thresholds import RESONANT, RIGID, WORK_HIGH
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:

@@ -20,21 +20,21 @@ from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
 from ..estimation.scales import Scales
 from ..starting.extend import extended
-from ..thresholds import (
+from ..thresholds import NEARLY_NOTHING
+from .force_balance import ForceBalance, can_be_imposed
+from .points import Points
+from .simulated import relative_error, simulate_table
+from .thresholds import (
     BALANCED_STARTS,
     DELAYS,
     DRY_SHARES,
     HOPELESS_START,
-    NEARLY_NOTHING,
     START_COMMON,
     START_SAME,
     TABLE_SIZES,
     UNKNOWN_SIZES,
     WORK_MEDIUM,
 )
-from .force_balance import ForceBalance, can_be_imposed
-from .points import Points
-from .simulated import relative_error, simulate_table
 
 
 @dataclass(frozen=True)

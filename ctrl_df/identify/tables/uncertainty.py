@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR, NOTHING, TAKES_PART
+from ..thresholds import NOTHING
 from .fit import FittedTable
+from .thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR, TAKES_PART
 
 
 def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[str, str]]:

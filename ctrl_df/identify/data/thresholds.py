@@ -1,0 +1,55 @@
+"""Reading, checking and differentiating records: tuned numbers, each with what it follows from."""
+
+from __future__ import annotations
+
+# --- reading and checking ---------------------------------------------------------------------------
+
+MINIMUM = 10
+"""Samples of a record at least: fewer have no derivatives."""
+
+BESIDE, LEAP, FAST = 5, 20.0, 5.0
+"""Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
+
+USUAL_STEPS = (0.05, 0.95)
+"""Quantiles between which steps of time lie that are usual."""
+
+REGULAR = 0.01
+"""Difference of steps of time, over their median, that is jitter."""
+
+MOST_COLUMNS = 99
+"""Of a matrix: more is a row of samples."""
+
+BLOCK, SAMPLE_ROWS = 100_000, 2000
+"""Rows converted at once, so that memory stays near the size of the file; rows that the decimal mark is read
+off."""
+
+BINARY, BINARY_LOOK = 0.002, 100_000
+"""Share of control characters from which a file is no text; characters that are looked at."""
+
+NANOSECONDS = 1e9
+"""In a second: times of day are kept as whole ones."""
+
+# --- signals ----------------------------------------------------------------------------------------
+
+FEW_VALUES, ON_STEP, ON_STEPS = 0.9, 0.05, 0.9
+"""Share of different values, over the samples, up to which a signal may be rounded; distance from a multiple
+of the step, over it, and share of the samples within it."""
+
+SPECTRUM_LENGTH = 16
+"""Samples of a segment of a spectrum at least."""
+
+WHITE_BAND = 0.95
+"""Share of the Nyquist frequency up to which noise is white: beyond, filters of instruments act."""
+
+FLOOR_LEAST = 1e-14
+"""Noise floor, over the largest power, that rounding makes."""
+
+CUTOFF_LOWEST, CUTOFF_HIGHEST = 0.1, 0.4
+"""Cutoff of a signal that is all noise, over the Nyquist frequency; the highest, over the sampling rate."""
+
+PADDING = 30
+"""Samples by which a signal is continued at its ends, at least, before it is filtered."""
+
+THINNED_BAND, THINNED_RIPPLE = 0.7, 5e-4
+"""Band that thinning keeps, over the new Nyquist frequency, and its ripple [dB]: flat within 1e-4, 49 dB down
+at that frequency."""

@@ -1,0 +1,107 @@
+"""Fits: tuned numbers, each with what it follows from or what chose it (`../thresholds.py`)."""
+
+from __future__ import annotations
+
+# --- ratios of errors -------------------------------------------------------------------------------
+
+BETTER = 0.99
+"""Error over the one before that counts as a better minimum."""
+
+SAME = 1.001
+"""Error over the least that counts as the same: well below the spread of an rms, 1/sqrt(2 n), which is 0.007
+for 10,000 samples."""
+
+OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
+"""Error of a segment over the good quarter's, and over the noise, from which its start is sought anew."""
+
+GOOD = 0.25
+"""Share of the segments that are taken to be right when others are compared with them."""
+
+# --- what a record shows ----------------------------------------------------------------------------
+
+PARAMETER_RANGE = 12.0
+"""Factor by which the model's own parameters may be off: beyond, a fit bends them to what they are not."""
+
+SIZE_PRIOR = 3.0
+"""Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
+and a half lies `PARAMETER_RANGE`."""
+
+# --- lengths of segments, samples -------------------------------------------------------------------
+
+SEGMENT_LEAST = 50
+"""Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
+
+SHORTEST = 16
+"""How many times as many the shortest segments of a diagnosis are as the longest: of two to-and-fro motions
+and a half, a sixth of one remains, over which every effect is all but linear."""
+
+LEVELS = (SHORTEST, 4, 1)
+"""How many times as many as the longest segments are, of the three lengths that are looked at."""
+
+BRIEF = 4 * SHORTEST
+"""How many times as many they are for the parameters of a machine with disturbance forces."""
+
+FILTERED = 40
+"""Values of the force that the shortest segments show where disturbance forces outweigh the noise."""
+
+HOLDOUT_PARTS = 9
+"""Parts of a record of which every third is held out where no record is."""
+
+SCREEN_SAMPLES = 2500
+"""Steps of the input to which a record is thinned while candidates are screened: a quarter of those
+of the rigs' records."""
+
+RTOL_COARSE, RTOL_OVER_NOISE = 1e-5, 1e-3
+"""Relative tolerance of simulations while candidates are screened: at most, and as a share of the sensors'
+noise over the motion. Derivatives are differences over which the output moves by 0.3 times the noise: errors
+of a thousandth of it change them by less than a hundredth."""
+
+ANGLE_WORTH = 50.0
+"""Log likelihood ratio, for white noise, that a record's own angle must bring: coloured residuals make tens
+of it by chance (rigs with ripples)."""
+
+ANGLES = 6
+"""Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
+
+# --- where fits begin again -------------------------------------------------------------------------
+
+RESTART_FACTORS = (0.6, 0.8, 1.25, 1.6)
+"""Of a parameter over which the cost has many minima."""
+
+STATIC_FACTORS = (0.8, 0.95, 0.985, 0.995, 1.005, 1.015, 1.05, 1.25)
+"""Of a static level: single samples pass it."""
+
+RESTARTED_AGAIN, RESTARTS_KEPT = 2, 3
+"""Times that a parameter that found a better minimum is moved once more; restarts that go on."""
+
+DAMPED = 4
+"""Times that a refused step of an initial state is damped tenfold: from 1e-3 to a step a tenth as long."""
+
+OPEN_RANGE = (0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+"""How far about a static level the segments are tried for the range that they leave open."""
+
+UNFOLLOWED = 0.7
+"""Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
+
+RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
+"""Speeds to begin a segment with, over how far the estimate may be off."""
+
+BEGINNINGS = (16, 8, 4, 2)
+"""Shares of a segment over which the state that it begins in is found first, each twice the last."""
+
+# --- noise ------------------------------------------------------------------------------------------
+
+MANY_SEGMENTS = 50
+"""Segments of a record from which on they tell how their errors go on from one to the next."""
+
+NOISE_PASSES = 300
+"""Multiplicative steps to the likeliest spectrum of the noise: ten times as many move most of it by a
+hundredth, none by more than a fifth (measured on white, first-order and pink noise), a tenth of an error."""
+
+NOISE_SHARE = 0.1
+"""Share of a frequency's power from which on what a fit takes away there is worked out exactly: below it the
+rest is off by the square of it, a hundredth."""
+
+NOISE_KNOWN = 2.0
+"""Natural logarithm of the factor, 7, within which the size of each part of the noise is known: a random
+walk, the steepest noise of a sensor, falls by 4 from one octave, and so from one part, to the next."""

@@ -1,0 +1,30 @@
+"""Inputs and sines that are planned: tuned numbers, each with what it follows from."""
+
+from __future__ import annotations
+
+PLAN_SIZES = (1.0, 0.8, 0.6, 0.45, 0.35, 0.25, 0.15, 0.08, 0.04)
+"""Of inputs, over the largest that the limits allow."""
+
+PLAN_MARGIN = 0.9
+"""Share of the stroke that candidates may use: the drive itself is like them, not one of them."""
+
+SETTLE, COUNTED, SINES = 12, 8, 6
+"""Periods before and while a point is measured, and points of a plan."""
+
+PLAN_SLACK = 1.0001
+"""Over a limit, that is rounding."""
+
+PLAN_MOVES = 0.2
+"""Least swing of the candidates' outputs, over the largest: below, one of them does not move."""
+
+PLAN_BAND, PLAN_SINES = (0.3, 8.0, 10.0), 20
+"""Frequencies over that of the motion: lowest, highest of a multisine, of a chirp; sines of the former."""
+
+PLAN_STEPS, PLAN_STEP_RATE, PLAN_STEP_SIZES = 400, 0.5, (0.4, 0.6)
+"""Random steps, their rate over that of the motion, and their sizes: at least, and how much more at most."""
+
+PLAN_TRIANGLE = 0.4
+"""Rate of a triangle, over that of the motion."""
+
+SIGMA_LEAST = 1e-6
+"""Relative noise of a table that plans count with at least."""

@@ -1,0 +1,65 @@
+"""Tests, regions, missing forces, horizons: tuned numbers, each with what it follows from."""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+
+HORIZONS = 8
+"""Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
+shortest."""
+
+SHORTEST_HORIZON = 0.25
+"""The shortest, in to-and-fro motions: over less the fitted position and speed follow nearly anything."""
+
+TEST_FORCE = 3e-3
+"""Amplitude of a test force over the rms of the force: linear still, and far above rounding."""
+
+FINER = 3
+"""How many times finer the second grid of test forces is."""
+
+REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
+"""Travel after a reversal [typical positions] over which a force may build up."""
+
+FAINT = 1e-30
+"""Power, over all of it, that is none."""
+
+SMALLEST_SAID = 1e-6
+"""Probability below which that is all that is said."""
+
+TWO_SIDED = round(NormalDist().inv_cdf(0.975), 2)
+"""Standard deviations of a 95 % band."""
+
+WHITENESS_LAGS = 25
+"""Lags of a test of whiteness at most."""
+
+INPUT_LAGS = 3000
+"""Lags of a test for traces of the input at most; a tenth of the samples."""
+
+DECORRELATED = round(math.exp(-1), 2)
+"""Correlation at which a first-order signal has forgotten: 1/e."""
+
+BANDWIDTH, AT_ROOT = 1.1447, 1e-6
+"""Andrews' (1991) factor of the bandwidth of Bartlett's kernel; distance of a correlation from one, at
+least."""
+
+FASTEST, LOW_SPEED, MEDIUM_SPEED = 0.95, 0.1, 0.6
+"""Quantile of the speeds that is fast, and shares of it below which a motion is slow, and of medium speed."""
+
+AFTER_REVERSAL = 0.15
+"""Share of the time between two reversals that is just after one."""
+
+REGION_SAMPLES = 60
+"""Independent samples of a region at least."""
+
+FREE_ORDER = 12
+"""Order of the noise model of a residual, while free forces are fitted to it."""
+
+FREE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
+"""Range of a quantity left out at either end, as a quantile, and steps of a free force over it."""
+
+HUM_WINDOW = 161
+"""Frequencies whose median is the power beside a hum."""
+
+HORIZON_TOLERANCE = 1e-2
+"""Relative gain at which initial states of a stretch are found."""

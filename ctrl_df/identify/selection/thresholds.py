@@ -1,0 +1,114 @@
+"""Diagnosis and ladder: tuned numbers, each with what it follows from or chose it (`../thresholds.py`)."""
+
+from __future__ import annotations
+
+import math
+
+from ..thresholds import BY_CHANCE, NOISE_FREE, RULED_OUT, SIGNIFICANT
+
+# --- evidence [nats] --------------------------------------------------------------------------------
+
+SIGNIFICANT_HELD = RULED_OUT
+"""Evidence an effect needs on held-out records alone: odds of 150 to 1, for data that choose nothing.
+
+To these are fitted initial states, and what the others leave open: a threshold within a range, the phase of
+a ripple.
+"""
+
+REFUTED = SIGNIFICANT
+"""Evidence of held-out data against a candidate that puts it last."""
+
+STOPPED_EARLY = 3 * SIGNIFICANT
+"""Evidence by which candidates may differ because their fits stopped early: thrice what makes an effect,
+which fits gained on the rigs when brought to their end. More costs time, less the right one now and then."""
+
+PROMISING = 0.2
+"""Share of the best one's evidence, at the first look, from which a candidate is confirmed: there records are
+thinned fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
+
+FORCE_ALIKE = 0.98
+"""Share of the best one's evidence that another kind of force must bring to be named beside it, but for what
+makes an effect: of large evidence two hundredths are a matter of the noise model."""
+
+# --- ratios of errors -------------------------------------------------------------------------------
+
+PROMISES = 0.25
+"""Share of the squared error the best candidate explains that an effect has to explain for one that contains
+it to be tried: the special case of a right law is right over a part of the motion."""
+
+FLOOR = round(1 + 1 / math.sqrt(2 * 500), 2)
+"""Error over the least that the shortest segments leave up to which a fit has nothing to gain: the spread of
+an rms over 500 effective samples, 1.03."""
+
+EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
+"""Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
+
+STRUCTURE_LEAST = 0.1
+"""Power of the baseline's error beyond noise, over that of the noise, below which there is hardly any: of 200
+effective samples noise has that spread."""
+
+LEFT = 0.2
+"""Share of the structure (rms) that the best candidate may leave: 4 % of its power. Rigs with something
+unknown hidden leave more to whatever stands in for it, those of the library less."""
+
+SIZE_KNOWN = 0.5
+"""Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
+
+NOISIER = round(math.exp(BY_CHANCE / math.sqrt(80)), 1)
+"""Error on held-out segments over that on fitted ones that may be chance for 80 effective samples, 1.4."""
+
+GROWN = 2.0
+"""Error over the least that the shortest segments leave, up to which it may be noise: slow noise of thrice
+the power of the fast one, the only one that short segments do not absorb (rigs with coloured noise)."""
+
+ANOTHER_START = (1.5, 0.02)
+"""Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
+(rigs). Only work depends on it."""
+
+COARSE = 0.4
+"""rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
+
+FINEST = 0.02
+"""Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
+
+STRAY = 1e-3
+"""Share of rounded samples that may lie on any line."""
+
+EXACT = 10 * NOISE_FREE
+"""Error over the spread of the output that is no error."""
+
+PASSED, BUMP_LEFT = 2.15e-3, 0.01
+"""Speed, over the typical one, at which a bump of friction is gone that only breaking away shows, and the
+share of it that is left then: a Gaussian one of a thousandth of the typical speed, sqrt(log 100) of its width
+away."""
+
+# --- work -------------------------------------------------------------------------------------------
+
+CONFIRMED, CONFIRMED_FORCED = 6, 10
+"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best;
+where disturbance forces let it tell little."""
+
+OUTLASTING = 2
+"""Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
+comparison at eight lengths."""
+
+RIVALS = 2
+"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
+
+BRANCHES = 3
+"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
+hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
+
+EFFORT_TRIED, EFFORT_BENT, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
+"""Steps of the fit of an effect at most, and the relative gain of its cost that is none: one whose minimum
+may be long and bent takes more; from segments to others less (rigs)."""
+
+EFFORT_CONFIRMED, EFFORT_ENDED = (3, 1e-3), (8, 1e-6)
+"""The same at the full rate, and of near equals: a gain of a millionth is 0.005 nats of 10,000 samples."""
+
+BEGUN, KEPT, JOINTS = 2, 2, 3
+"""Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load
+that begin."""
+
+LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
+"""Of the mass behind the joints that are tried."""
