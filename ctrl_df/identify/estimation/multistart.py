@@ -22,6 +22,7 @@ from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
 from .thresholds import (
     BETTER,
+    MOTOR_LEAST,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
@@ -188,7 +189,7 @@ def _moved(model, name, value):
     if shared is not None and effect is not None and effect.role == "friction" and effect.side == "load":
         # the sum of both shows best: what the load gains the motor loses
         motor, more = table[shared].value, value - table[name].value
-        values[shared] = max(motor - more, 0.05 * motor)
+        values[shared] = max(motor - more, MOTOR_LEAST * motor)
     return model.with_parameters(feasible(model, values))
 
 
