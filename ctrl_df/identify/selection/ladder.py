@@ -26,7 +26,7 @@ from .revision import Revision, revised
 from .search import Search
 from .structure import Structure, plainness
 from .thresholds import BRANCHES, CONFIRMED, SHOWS_HARDLY
-from .verdict import diagnosed, worth
+from .verdict import Diagnosed, diagnosed, worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +142,13 @@ class Climb:
                 errors = last.nrmse, last.nrmse_holdout
             return _step(found, found.model, errors, how)
 
-        def so_far(found: Diagnosis) -> Study:
-            return self.best or self._study((*steps, told(found)), search, UNDER_WAY)
+        def so_far(known: Diagnosed) -> Study:
+            return self.best or self._study((*steps, told(known.diagnosis)), known.search, UNDER_WAY)
 
         room = len(structure.added) < self.max_effects
-        found = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
-        rung = Rung(structure.at(found.model), search, found, (*steps, told(found)))
+        known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
+        found = known.diagnosis
+        rung = Rung(structure.at(found.model), known.search, found, (*steps, told(found)))
         self.rungs[structure.key] = rung
         return rung
 
