@@ -73,8 +73,8 @@ class Problem:
     @property
     def nonsmooth(self) -> bool:
         """Whether events of the model come and go as its parameters move."""
-        effects = getattr(self.block, "effects", ())
-        return bool(self.names) and self.error_filter is None and any(e.nonsmooth for e in effects)
+        events = getattr(self.block, "nonsmooth", False)
+        return bool(self.names) and self.error_filter is None and events
 
     @property
     def unit(self) -> float:

@@ -13,6 +13,7 @@ from ...simulate.crew import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE
 from .attempts import itself
@@ -111,7 +112,22 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     if at.data.disturbed:
         return [short], floor
     near = over(middle, fits, short, floor)
-    return [short, near, over(longest, near, near, floor)], floor
+    pairs = zip(near, over(longest, near, near, floor), strict=True)
+    near, far = zip(*side_by_side(lambda pair: _both_ways(middle, longest, *pair), pairs), strict=True)
+    return [short, list(near), list(far)], floor
+
+
+def _both_ways(shorter: SegmentedData, longer: SegmentedData, near: FitResult | None, far: FitResult | None):
+    """Return the fits of a model in shorter and in longer segments, each begun again where the other ended.
+
+    Of laws with events the cost has many minima, other ones over other segments: what one fit has missed the
+    other may have come near to. Where long segments show no more error than short ones both are right.
+    """
+    if near is None or far is None or not far.model.nonsmooth or far.rmse <= FLOOR * near.rmse:
+        return near, far
+    back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
+    there = longer.moved(back, hopeless=far.rmse)
+    return min(near, back, key=lambda f: f.rmse), min(far, there, key=lambda f: f.rmse)
 
 
 def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | None]:
@@ -174,7 +190,7 @@ def _to_the_end(at: Standing, chosen: list[CandidateFit]) -> list[CandidateFit]:
     least = min(t.train.rmse for t in chosen)
     close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
     close = [t for t in close if t.train.rmse < HOPELESS * least]
-    ended = side_by_side(lambda t: _ended(at, t, t in near and len(near) > 1, least), close)
+    ended = side_by_side(lambda t: _ended(at, t, t in near, least), close)
     if any(a is not b for a, b in zip(ended, close, strict=True)):
         chosen = _again(at, [*ended, *(t for t in chosen if t not in close)], ended)
     return chosen
