@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import queue
 import subprocess
 import sys
+import tempfile
+import threading
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -36,15 +42,13 @@ def warm_up(progress: bool | None = None) -> None:
     if progress is not None:
         flag("warm_up", "progress", progress)
     told = sys.stderr.isatty() if progress is None else progress
-    began, done, total = time.perf_counter(), 0, sum(map(len, STAGES))
-    for stage in STAGES:
-        for name in _side_by_side(stage):
-            done += 1
-            if told:
-                spent = time.perf_counter() - began
-                print(
-                    f"ctrl-df warm-up: {done} of {total}, {name}, {spent:.0f} s", file=sys.stderr, flush=True
-                )
+    began = time.perf_counter()
+    for done, name in enumerate(_side_by_side(), 1):
+        if told:
+            spent = time.perf_counter() - began
+            print(
+                f"ctrl-df warm-up: {done} of {len(STEPS)}, {name}, {spent:.0f} s", file=sys.stderr, flush=True
+            )
 
 
 def is_warm() -> bool:
@@ -55,63 +59,100 @@ def is_warm() -> bool:
     return kept is None or kept.known
 
 
-def step(name: str) -> None:
-    """Compile one step (a name in `STAGES`) in this process."""
-    next(stage[name] for stage in STAGES if name in stage)()
+def work() -> None:
+    """Compile steps whose names come line by line on stdin, and say the name of each that is done."""
+    for name in map(str.strip, sys.stdin):
+        STEPS[name].compile()
+        print(name, flush=True)
 
 
-def _side_by_side(names):
-    """Run steps in processes of their own, as many at once as there are processors; yield those done."""
-    from .simulate.runs import processors
+def _side_by_side():
+    """Yield the steps as they are done, by as many processes as there are processors.
 
-    waiting, running = list(names), {}
+    Each goes on with step after step: what functions have in common it types and lowers once.
+    """
+    from .simulate.crew import processors
+
+    waiting, done, workers, free = list(STEPS), set(), [], []
+    told: queue.Queue = queue.Queue()
     try:
-        while waiting or running:
-            while waiting and len(running) < processors():
-                name = waiting.pop(0)
-                running[name] = _start(name)
-            for name, process in list(running.items()):
-                if process.poll() is None:
-                    continue
-                del running[name]
-                said = process.communicate()[1].decode(errors="replace").strip().splitlines()
-                if process.returncode != 0:
-                    raise RuntimeError(f"compiling {name} failed: {said[-1] if said else process.returncode}")
-                yield name
-            time.sleep(0.05)
+        while len(done) < len(STEPS):
+            while name := next((name for name in waiting if STEPS[name].after in done | {None}), None):
+                if not free and len(workers) < processors():
+                    workers.append(_Worker(told))
+                    free.append(workers[-1])
+                if not free:
+                    break
+                waiting.remove(name)
+                free.pop(0).begin(name)
+            worker, name = told.get()
+            if not name:
+                raise RuntimeError(f"compiling {worker.name} failed: {worker.last_words()}")
+            free.append(worker)
+            done.add(name)
+            yield name
     finally:
-        for process in running.values():
-            process.kill()
-            process.communicate()
+        for worker in workers:
+            worker.end()
 
 
-def _start(name):
-    """Begin a step in a process that imports this very package, whatever folder it is started in."""
-    code = f"from ctrl_df.warm import step; step({name!r})"
-    paths = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
-    return subprocess.Popen(
-        [sys.executable, "-P", "-c", code],
-        env={**os.environ, "PYTHONPATH": paths},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-    )
+class _Worker:
+    """A process that compiles steps of this very package, whatever folder it is started in."""
+
+    def __init__(self, told: queue.Queue):
+        paths = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
+        self.name, self._told, self._errors = "", told, tempfile.TemporaryFile()
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", "from ctrl_df.warm import work; work()"],
+            env={**os.environ, "PYTHONPATH": paths},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._errors,
+            text=True,
+        )
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
+
+    def begin(self, name: str):
+        """Let it compile a step."""
+        self.name = name
+        with contextlib.suppress(OSError):  # it has died: `_listen` tells
+            print(name, file=self._process.stdin, flush=True)
+
+    def _listen(self):
+        for line in self._process.stdout or ():
+            self._told.put((self, line.strip()))
+        self._told.put((self, ""))
+
+    def last_words(self) -> str:
+        """Return the last line of what it wrote before it died."""
+        code = self._process.wait()
+        self._errors.seek(0)
+        said = self._errors.read().decode(errors="replace").strip().splitlines()
+        return said[-1] if said else f"exit code {code}"
+
+    def end(self):
+        """End the process, whatever it is doing."""
+        self._process.kill()
+        self._process.wait()
+        self._listener.join()
+        for stream in (self._process.stdin, self._process.stdout, self._errors):
+            with contextlib.suppress(OSError):  # what nobody reads any more
+                stream.close()  # type: ignore[union-attr]
 
 
-def _simulation():
+def _engine():
     from .blocks.mechanism import friction_mass
     from .simulate.response import event_response
 
-    event_response(friction_mass(1, 1, 1), np.linspace(0, 1, 9), 2.0)
+    event_response(friction_mass(1, 1, 1), [0.0, 1.0], 2.0)
 
 
-def _curved_laws():
-    from .blocks.effects import Coulomb, CubicSpring
-    from .blocks.mechanism import Mass
-    from .simulate.response import event_response
+def _paces():
+    from .simulate.kernel import pace
 
-    event_response(
-        Mass(1.0).with_effect(Coulomb(1.0)).with_effect(CubicSpring(1.0)), np.linspace(0, 1, 9), 2.0
-    )
+    for curved in (False, True):
+        pace.address(curved)
 
 
 def _laws():
@@ -134,10 +175,15 @@ def _friction_family():
     _family(friction_mass(9, 5, 0.5))
 
 
-def _backlash_family():
+def _backlash():
     from .blocks.mechanism import backlash_masses
+    from .df.closed_form.backlash_branches import backlash_branches
 
-    _family(backlash_masses(1, 8, 0.018, 0.2))
+    block = backlash_masses(1, 8, 0.018, 0.8)
+    _family(block)
+    force, omega = np.array([10.0]), np.array([125.0])
+    for branch in backlash_branches(block, force, omega, force, omega):
+        branch.motions(branch.grid, np.full(branch.grid.size, 125.0), 1)
 
 
 def _general_family():
@@ -171,6 +217,13 @@ def _many_runs():
     batch_response(friction_mass(1, 1, 1), np.linspace(0, 1, 9), 2.0)
 
 
+def _smoother():
+    from .identify.smoothing.kalman import smoothed
+
+    one, rows, more = np.ones((1, 1, 1)), np.ones((1, 1)), np.ones((2, 1, 1))
+    smoothed(one, rows, one, more, np.ones((2, 1)), np.ones(1), rows)
+
+
 def _imposed_motion():
     from .blocks.effects import Coulomb
     from .blocks.massless import Massless
@@ -179,10 +232,19 @@ def _imposed_motion():
     imposed_response(Massless().with_effect(Coulomb(5.0)), np.linspace(0, 1, 9), np.linspace(0, 1, 9) ** 2)
 
 
-# the engine is compiled in the first stage, once; what calls it in the second
-STAGES = (
-    {"simulation": _simulation, "backlash family": _backlash_family, "laws": _laws,
-     "friction family": _friction_family},
-    {"curved laws": _curved_laws, "general family": _general_family, "exact orbits": _orbit,
-     "many runs": _many_runs, "imposed motion": _imposed_motion},
-)  # fmt: skip
+@dataclass(frozen=True)
+class Step:
+    """What compiles a part of the package, and the step that must be done before it, if any."""
+
+    compile: Callable[[], None]
+    after: str | None = None
+
+
+# the long ones first
+STEPS = {
+    "engine": Step(_engine), "paces": Step(_paces), "backlash": Step(_backlash),
+    "exact orbits": Step(_orbit, after="engine"), "general family": Step(_general_family, after="engine"),
+    "friction family": Step(_friction_family), "smoother": Step(_smoother),
+    "imposed motion": Step(_imposed_motion), "many runs": Step(_many_runs, after="engine"),
+    "laws": Step(_laws),
+}  # fmt: skip

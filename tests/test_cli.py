@@ -2,6 +2,7 @@
 
 import functools
 import json
+import queue
 import struct
 
 import numpy as np
@@ -166,5 +167,15 @@ def test_what_is_compiled_ahead_is_this_package(tmp_path, monkeypatch):
     (tmp_path / "ctrl_df").mkdir()
     (tmp_path / "ctrl_df" / "__init__.py").write_text("raise ImportError('another one')")
     monkeypatch.chdir(tmp_path)
-    process = warm._start("laws")
-    assert process.communicate()[1].decode() == "" and process.returncode == 0
+    told = queue.Queue()
+    worker = warm._Worker(told)
+    worker.begin("laws")
+    assert told.get(timeout=60) == (worker, "laws"), worker.last_words()
+    worker.end()
+
+
+def test_what_stops_compiling_ahead_is_said(monkeypatch):
+    """By the last line of the process that died, at once."""
+    monkeypatch.setattr(warm, "STEPS", {"nothing": warm.Step(print)})
+    with pytest.raises(RuntimeError, match="compiling nothing failed: KeyError: 'nothing'"):
+        warm.warm_up()

@@ -95,8 +95,8 @@ class Variable:
     def clip(self, q: float) -> float:
         """Return the scaled value within the bounds nearest to `q`."""
         if self.log:
-            low = self.q(self.lower) if self.lower > 0 else q
-            return min(max(q, low), self.q(self.upper) if self.upper < math.inf else q)
+            low = self.q(self.lower) if self.lower > 0 else -math.inf
+            return min(max(q, low), self.q(self.upper) if self.upper < math.inf else math.inf)
         return min(max(q, self.lower / self.scale), self.upper / self.scale)
 
     def slope(self, q: float) -> float:

@@ -28,6 +28,7 @@ from numba.core import ccallback, config, event, sigutils
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
+from .garbage import FewerCollections
 from .notice import Notice
 from .parts import LeanCompiler, PartCompiler
 
@@ -241,4 +242,9 @@ def _say_once():
     )
 
 
-event.register("numba:compile", Notice(lambda made: isinstance(getattr(made, "_cache", None), KeptCode)))
+def _ours(dispatcher) -> bool:
+    return isinstance(getattr(dispatcher, "_cache", None), KeptCode)
+
+
+event.register("numba:compile", Notice(_ours))
+event.register("numba:compile", FewerCollections(_ours))

@@ -18,12 +18,12 @@ from .space import Space, space_at, workspace
 def keep_pace(program: Program, space: Space) -> None:
     """Let runs in a space take steps at a regular pace, where the laws of the program allow them."""
     if program.ints[H_AFFINE] and not space.paced[0]:
-        space.paced[0] = _address(program.ints[H_AFFINE] == 2)
+        space.paced[0] = address(program.ints[H_AFFINE] == 2)
 
 
 @functools.cache
-def _address(curved: bool) -> int:
-    """Return the address of the steps, compiled now if need be."""
+def address(curved: bool) -> int:
+    """Return the address of the steps, `curved_pace` or `affine_pace`, compiled now if need be."""
     none, rows, counts = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
     program = Program(np.zeros((0, 13), np.int64), np.zeros(H_HISTORY + 1, np.int64), none)
     drive = Drive(none, rows, 0, np.zeros((0, 0), complex), 0.0, 0)
