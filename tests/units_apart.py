@@ -20,7 +20,7 @@ EXACT_SCALES = [(1.0, 2.0**20), (2.0**-20, 2.0**10), (2.0**20, 2.0**-20)]
 """The same in powers of two, by which nothing rounds otherwise: of laws with events.
 
 Their cost has many minima side by side, and which of them a fit comes to the last digits decide: by powers of
-ten a stiction changes its evidence by 8e-7, a gap by 1e-6 to 1e-1.
+ten a stiction changes its evidence by 6e-6, a gap by 1e-6 to 3e-1.
 """
 
 SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow

@@ -190,7 +190,7 @@ def _to_the_end(at: Standing, chosen: list[CandidateFit]) -> list[CandidateFit]:
     least = min(t.train.rmse for t in chosen)
     close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
     close = [t for t in close if t.train.rmse < HOPELESS * least]
-    ended = side_by_side(lambda t: _ended(at, t, t in near, least), close)
+    ended = side_by_side(lambda t: _ended(at, t, t in near and len(near) > 1, least), close)
     if any(a is not b for a, b in zip(ended, close, strict=True)):
         chosen = _again(at, [*ended, *(t for t in chosen if t not in close)], ended)
     return chosen
