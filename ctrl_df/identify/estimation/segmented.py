@@ -312,12 +312,11 @@ class SegmentedData:
             )
             model = near.model
         starts = same_begins(near, view.segments)
-        near = rough.fit(model, (), view=getattr(rough, name), starts=starts, iterations=3)
-        found = self.fit(model, (), view=view, starts=near.starts, iterations=1)
-        if not model.nonsmooth:
-            return found
         # single segments may have begun in a wrong minimum: each goes on by itself
-        return self.fit(model, (), view=view, starts=found.starts, iterations=1, followed=RESTARTS_KEPT)
+        near = rough.fit(
+            model, (), view=getattr(rough, name), starts=starts, iterations=8, followed=RESTARTS_KEPT
+        )
+        return self.fit(model, (), view=view, starts=near.starts, iterations=4, followed=RESTARTS_KEPT)
 
 
 def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
