@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import control as ct
@@ -103,12 +104,12 @@ class Simulator:
             pull += forces[0] - forces[1]
         return pull > RESTORING * self.facts.force
 
-    @property
+    @cached_property
     def nuisances(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per segment."""
         return initial_states.fitted_names(self.block.core, self.begins) if self.mechanism else ()
 
-    @property
+    @cached_property
     def continued(self) -> bool:
         """Whether some of the initial states go on from one segment into the next."""
         return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
