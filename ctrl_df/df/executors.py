@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor
 from typing import Any
 
 from .thresholds import PARTS_AHEAD
@@ -13,6 +13,8 @@ from .thresholds import PARTS_AHEAD
 
 def check_picklable(executor, example) -> None:
     """Refuse a process pool for work that cannot be sent to one (TypeError), before it begins."""
+    from concurrent.futures import ProcessPoolExecutor  # whoever has no pool need not wait for its import
+
     if isinstance(executor, ProcessPoolExecutor):
         try:
             pickle.dumps(example)

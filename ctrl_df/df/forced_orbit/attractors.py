@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.runs import processors
+from ...simulate.crew import processors
 from ..threads import on_threads
 from .orbits import solver_for
 
