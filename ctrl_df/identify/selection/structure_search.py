@@ -13,7 +13,15 @@ from ...blocks.effect import static_levels
 from ...simulate.crew import side_by_side
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
-from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
+from ..estimation.multistart import (
+    all_restarted,
+    begun_as,
+    beyond,
+    cross_started,
+    own,
+    restarted,
+    thresholds_refined,
+)
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..prediction.segments import facts
@@ -236,21 +244,21 @@ class StructureSearch(Search):
                 lambda f: short.moved(f) if f is not None and short.carries(f.model) else f, stages[0]
             )
             at = _longest_coherent(stages)
-        if found and rounds(found[0]) and not self.data.disturbed:
-            # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
+        # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
+        averaged = bool(found) and rounds(found[0]) and not self.data.disturbed
+        if averaged:
             at = len(stages) - 1
-        self.data = levels[at]
-        fine = self.data.fine
         self.course.stage("the best refitted at the full rate, and tried on what is held out")
-        pairs = [(t, f) for t, f in zip((self.base, *found), stages[at], strict=True) if f is not None]
-        best = side_by_side(
-            lambda pair: fine.validate(
-                replace(pair[0], train=fine.moved(pair[1], *EFFORT_CONFIRMED), confirmed=True)
-            ),
-            pairs,
-        )
-        self.base = best[0]
-        chosen, self.noise = ranked(self.base, best[1:])
+        tried = (self.base, *found)
+        best = _validated(levels[at], tried, stages[at])
+        while at and not averaged and _held_out_by_luck(best, levels[at - 1], stages[at - 1]):
+            at -= 1
+            best = _validated(levels[at], tried, stages[at])
+        self.data = levels[at]
+        base, *others = [t for t in best if t is not None]
+        # what contains the baseline never errs more where both are fitted as well
+        self.base = begun_as(base, min([base, *others], key=lambda t: t.size), self.data.fine)
+        chosen, self.noise = ranked(self.base, others)
         if not chosen:
             return []
         self.course.known(chosen)
@@ -454,6 +462,35 @@ def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
     close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
     likely = found[:2] + [t for t in found[2:most] if t.evidence > share * found[0].evidence]
     return likely + [t for t in close if not any(t is o for o in likely)]
+
+
+def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
+    """Return models at the full rate, from their fits in some segments, and run on what is held out.
+
+    None stands for those that have no fit there.
+    """
+    fine = data.fine
+
+    def at_full_rate(pair):
+        t, fit = pair
+        train = fit and fine.moved(fit, *EFFORT_CONFIRMED)
+        return train and fine.validate(replace(t, train=train, confirmed=True))
+
+    return side_by_side(at_full_rate, zip(tried, fits, strict=True))
+
+
+def _held_out_by_luck(best, shorter: SegmentedData, fits) -> bool:
+    """Whether the nearest model's error grows from shorter segments where they are held out, but not fitted.
+
+    Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
+    it is luck whether a model does, and no merit.
+
+    `best`: models in these segments; `shorter`, `fits`: the next shorter ones, and the fits there.
+    """
+    i = min((i for i, t in enumerate(best) if t is not None), key=lambda i: best[i].train.rmse)
+    there = shorter.fine.validate(best[i]).validation_rmse
+    fitted = max(best[i].train.rmse / fits[i].rmse, 1.0)
+    return best[i].validation_rmse > GROWTH * fitted * there
 
 
 def _longest_coherent(stages) -> int:
