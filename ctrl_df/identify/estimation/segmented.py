@@ -22,7 +22,7 @@ from .fit import FitResult, fit_segments
 from .noise_model import NoiseModel, acceleration_filter
 from .scales import Scales, scales_of
 from .segmented_records import SegmentedRecords
-from .starts import same_begins
+from .starts import carried, same_begins
 from .thresholds import (
     BRIEF,
     EFFORT_STATES,
@@ -295,6 +295,13 @@ class SegmentedData:
     def validate(self, tried: CandidateFit) -> CandidateFit:
         """Run a fitted model over the segments to validate on, from initial states of their own."""
         return replace(tried, validation=self._ran(tried.block, "validation"))
+
+    def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
+        """Return where segments of records begin for a model as they do for another."""
+        return [
+            carried(self.simulator(block, r), w, self.simulator(other.model, r), starts)
+            for r, w, starts in zip(records, other.segments, other.starts, strict=True)
+        ]
 
     def errors(self, model) -> tuple[float, float]:
         """Return nrmse of a model as it is, over the segments fitted and those held out."""

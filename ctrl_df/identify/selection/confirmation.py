@@ -11,7 +11,15 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from ..estimation.fit import FitResult
-from ..estimation.multistart import all_restarted, beyond, cross_started, own, restarted, thresholds_refined
+from ..estimation.multistart import (
+    all_restarted,
+    begun_as,
+    beyond,
+    cross_started,
+    own,
+    restarted,
+    thresholds_refined,
+)
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -54,16 +62,11 @@ def confirmed(
     # Disturbance forces let the first look tell little.
     found = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
     fits, floor = staged(at, [at.base.train, *(t.train for t in found)])
-    data, fits = _judging(at, fits, bool(found) and rounds(found[0]))
     stage("the best refitted at the full rate, and tried on what is held out")
-    fine = data.fine
-    pairs = [(t, f) for t, f in zip((at.base, *found), fits, strict=True) if f is not None]
-    base, *others = side_by_side(
-        lambda pair: fine.validate(
-            replace(pair[0], train=fine.moved(pair[1], *EFFORT_CONFIRMED), confirmed=True)
-        ),
-        pairs,
-    )
+    data, judged = _judged(at, (at.base, *found), fits)
+    base, *others = [t for t in judged if t is not None]
+    # what contains the baseline never errs more where both are fitted as well
+    base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
     chosen, noise = ranked(base, others)
     at = replace(at, data=data, base=base, noise=noise, floor=floor)
     if not chosen:
@@ -76,10 +79,12 @@ def confirmed(
     return replace(at, noise=noise), chosen
 
 
-def _judging(at: Standing, stages: Stages, rounded: bool) -> tuple[SegmentedData, list[FitResult | None]]:
-    """Return the data in segments of the length that suits them, and the fits there.
+def _judged(
+    at: Standing, tried: Sequence[CandidateFit], stages: Stages
+) -> tuple[SegmentedData, list[CandidateFit | None]]:
+    """Return the data in segments of the length that suits them, and the models validated there.
 
-    `rounded`: whether the best candidate is a sensor that rounds.
+    `tried`: the baseline and the candidates, best first.
     """
     levels, best = list(at.segmentations), _longest_coherent(stages)
     if best == 0 and not at.data.disturbed:
@@ -91,10 +96,44 @@ def _judging(at: Standing, stages: Stages, rounded: bool) -> tuple[SegmentedData
         )
         levels, stages = [short, *levels[1:]], [again, *stages[1:]]
         best = _longest_coherent(stages)
-    if rounded and not at.data.disturbed:
-        # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
+    # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
+    averaged = len(tried) > 1 and rounds(tried[1]) and not at.data.disturbed
+    if averaged:
         best = len(stages) - 1
-    return levels[best], stages[best]
+    judged = _validated(levels[best], tried, stages[best])
+    while best and not averaged and _held_out_by_luck(judged, levels[best - 1], stages[best - 1]):
+        best -= 1
+        judged = _validated(levels[best], tried, stages[best])
+    return levels[best], judged
+
+
+def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
+    """Return models at the full rate, from their fits in some segments, and run on what is held out.
+
+    None stands for those that have no fit there.
+    """
+    fine = data.fine
+
+    def at_full_rate(pair):
+        t, fit = pair
+        train = fit and fine.moved(fit, *EFFORT_CONFIRMED)
+        return train and fine.validate(replace(t, train=train, confirmed=True))
+
+    return side_by_side(at_full_rate, zip(tried, fits, strict=True))
+
+
+def _held_out_by_luck(judged, shorter: SegmentedData, fits) -> bool:
+    """Whether the nearest model's error grows from shorter segments where they are held out, but not fitted.
+
+    Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
+    it is luck whether a model does, and no merit.
+
+    `judged`: models in these segments; `shorter`, `fits`: the next shorter ones, and the fits there.
+    """
+    i = min((i for i, t in enumerate(judged) if t is not None), key=lambda i: judged[i].train.rmse)
+    there = shorter.fine.validate(judged[i]).validation_rmse
+    fitted = max(judged[i].train.rmse / fits[i].rmse, 1.0)
+    return judged[i].validation_rmse > GROWTH * fitted * there
 
 
 # --- segments of every length -------------------------------------------------------------------------
