@@ -24,7 +24,7 @@ if "--jobs" in sys.argv:
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import rigs
-from units_apart import alike, diagnosed, scales_of
+from units_apart import OTHER, alike, candidate, diagnosed, scales_of
 from user_copies import copied
 
 import ctrl_df as cdf
@@ -44,10 +44,10 @@ def found_by(rig, candidates):
 def in_units(name) -> Row:
     """Return a line of `row` for an effect in other systems of units."""
     began, differs = time.process_time(), []
-    before = diagnosed(name, [name])
+    before = diagnosed(name, [candidate(name)])
     for force, length in scales_of(name):
         try:
-            alike(before, diagnosed(name, [name], force, length), (force, length))
+            alike(before, diagnosed(name, [candidate(name)], force, length), (force, length))
         except AssertionError as error:
             differs.append(f"in units {force:g}, {length:g}: {error}".splitlines()[0])
     named = before.best.id if before.best else "-"
@@ -84,7 +84,7 @@ def main() -> int:
     how.add_argument("--whole", action="store_true")
     how.add_argument("--units", action="store_true")
     args = parser.parse_args()
-    names = [n for n in rigs.ORDER if args.only in n]
+    names = [n for n in (*rigs.ORDER, *(OTHER if args.units else ())) if args.only in n]
     jobs = [(n, args.whole) for n in names]
     if args.units:
         jobs = names

@@ -7,8 +7,11 @@ from ctrl_df.units import size
 
 
 def sizes(force, length):
-    """Return the factors of dimensions where forces and lengths have so many times the number."""
-    return {"N": force, "m": length, "kg": force / length}
+    """Return the factors of dimensions where forces and lengths have so many times the number.
+
+    Times and currents stay as they are: what a voltage does in a second is as much work.
+    """
+    return {"N": force, "m": length, "kg": force / length, "V": force * length}
 
 
 def block(model, force, length):
@@ -25,9 +28,10 @@ def block(model, force, length):
 
 def record(data, force, length):
     """Return a record likewise."""
+    given, seen = (size(unit, sizes(force, length)) for unit in (data.input_unit, data.output_unit))
     velocity = None if data.velocity is None else data.velocity * length
     return cdf.Measurement(
-        data.t, data.u * force, data.y * length, name=data.name, velocity=velocity,
+        data.t, data.u * given, data.y * seen, name=data.name, velocity=velocity,
         input_unit=data.input_unit, output_unit=data.output_unit,
     )  # fmt: skip
 

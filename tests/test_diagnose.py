@@ -115,7 +115,7 @@ def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
 
 @pytest.mark.parametrize("hidden", [None, cdf.Backlash(0.005, 0.3, 0.4)])
 def test_simulated_records_without_noise(hidden):
-    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(2400)
+    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(2000)
     tones, phases = rng.uniform(0.3, 4, 8), rng.uniform(0, 6, 8)
     u = sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
     true = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0)])

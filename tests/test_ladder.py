@@ -50,19 +50,21 @@ class Given(Search):
         self.base = self.fitted(block, free, 0)
         data.asked.append(data.added(block))
 
+    base: Any = None
     records = ((), ())
 
     def fitted(self, block, names, iterations):
         return Fit(block, self.data.level(block), block.newest if block.effects else "", len(names))
 
-    def candidates(self, classes, executor=None):
+    def candidates(self, classes, executor=None, course=None):
         made = [self.data.made(c.id, self.block) for c in classes if applicable(c, self.block)]
         blocks = [extended(self.block, effect) for effect in made]
         found = [self.fitted(b, (), 0) for b in blocks if b is not None]
-        return self.ranked(self.base, [replace(t, extra=1) for t in found])
+        ranked = self.ranked(self.base, [replace(t, extra=1) for t in found])
+        return self.after(first_look=ranked), ranked
 
-    def confirm(self, found):
-        return [replace(t, confirmed=True) for t in found]
+    def confirm(self, found, course=None):
+        return self, [replace(t, confirmed=True) for t in found]
 
     def ranked(self, base, judged):
         found = [replace(t, evidence=t.level - base.level - 3.0 * t.extra) for t in judged]

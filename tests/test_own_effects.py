@@ -5,7 +5,7 @@ import dataclasses
 from pathlib import Path
 
 import pytest
-from units_apart import SCALES, alike, diagnosed
+from units_apart import alike, diagnosed, scales_of
 from user_copies import copied
 
 import ctrl_df as cdf
@@ -61,8 +61,8 @@ def test_no_id_of_an_effect_stands_as_a_string():
 @pytest.mark.parametrize(
     ("hidden", "scale"),
     [
-        *(pytest.param(e, SCALES[0], marks=pytest.mark.quick) for e in FAST),
-        *(pytest.param(e, SCALES[i % 3], marks=pytest.mark.slow) for i, e in enumerate(SLOW)),
+        *(pytest.param(e, scales_of(e)[0], marks=pytest.mark.quick) for e in FAST),
+        *(pytest.param(e, scales_of(e)[i % 3], marks=pytest.mark.slow) for i, e in enumerate(SLOW)),
     ],
 )
 def test_a_copy_in_other_units_is_found_as_the_original_is(hidden, scale, tmp_path):

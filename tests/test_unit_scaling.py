@@ -8,7 +8,7 @@ import functools
 import pytest
 import rigs
 import test_own_effects as copies
-from units_apart import SCALES, alike, diagnosed, scales_of
+from units_apart import OTHER, SCALES, alike, candidate, diagnosed, scales_of
 
 RIVALS = ("quadratic_drag", "asymmetric_coulomb")
 # a threshold, a damping, a stiffness of another power, a channel's level, a time
@@ -17,7 +17,7 @@ KINDS = [e for e in rigs.ORDER if e not in (*copies.FAST, *copies.SLOW)][2::3]
 
 @functools.cache
 def first(hidden, *rivals):
-    return diagnosed(hidden, (hidden, *rivals))
+    return diagnosed(hidden, (candidate(hidden), *rivals))
 
 
 @pytest.mark.parametrize("scale", SCALES)
@@ -29,6 +29,10 @@ def test_rivals_are_ranked_alike(scale):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hidden", "scale"), [(e, scales_of(e)[i % 3]) for i, e in enumerate(KINDS)])
+@pytest.mark.parametrize(
+    ("hidden", "scale"), [(e, scales_of(e)[i % 3]) for i, e in enumerate((*KINDS, *OTHER))]
+)
 def test_other_units_alter_nothing(hidden, scale):
-    alike(first(hidden), diagnosed(hidden, (hidden,), *scale), scale)
+    found = first(hidden)
+    assert found.verdict == "effect" and found.best.id == candidate(hidden)
+    alike(found, diagnosed(hidden, (candidate(hidden),), *scale), scale)

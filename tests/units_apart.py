@@ -2,37 +2,78 @@
 
 import functools
 
+import numpy as np
 import pytest
 import rigs
 import scaled
+from test_imposed import BASE, GUESS
+from test_imposed import record as imposed
 
 import ctrl_df as cdf
 
 CLOSE = 1e-6
 
-SCALES = [(1.0, 2.0**20), (2.0**-20, 2.0**10), (2.0**20, 2.0**-20)]
-"""Factors of forces and of lengths from 1e-6 to 1e6: powers of two, so that nothing rounds otherwise.
+SCALES = [(1.0, 1e6), (1e-6, 1e3), (1e6, 1e-6)]
+"""Factors of forces and of lengths."""
 
-By powers of ten the last digits differ. That is seen in fits of laws with events alone, whose cost has many
-minima side by side: of all effects by a stiction (6e-6 of the evidence) and a gap (9e-4, 6e-3 of its
-restitution).
+EXACT_SCALES = [(1.0, 2.0**20), (2.0**-20, 2.0**10), (2.0**20, 2.0**-20)]
+"""The same in powers of two, by which nothing rounds otherwise: of laws with events.
+
+Their cost has many minima side by side, and which of them a fit comes to the last digits decide: by powers of
+ten a stiction changes its evidence by 6e-6, a gap by 1e-6 to 3e-1.
 """
 
 SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow
 LENGTHS = {"hard_stop": 5000, "backlash": 1600}  # samples until stop and gap have been met often enough
 
+PULLED = {"loose_linkage": cdf.LooseLinkage(5e4, 0.004), "maxwell_slip": cdf.MaxwellSlip(1e5, 30.0)}
+"""Dampers on a test machine that imposes the motion."""
+
+MOTOR = cdf.Mass(2.0, [cdf.TorqueConstant(20.0, 4.0), cdf.Coulomb(3.0), cdf.Viscous(5.0)])
+"""What is driven by voltage: a spring is hidden behind it."""
+
+OTHER = (*PULLED, "torque_constant")
+"""Effects that `rigs` do not hide."""
+
 
 def scales_of(hidden):
     """Return the factors: the sine of an angle knows no other unit of it."""
-    return [(force, 1.0 if cdf.effect_library()[hidden].turns else length) for force, length in SCALES]
+    effect = cdf.effect_library()[hidden]
+    scales = EXACT_SCALES if effect.nonsmooth else SCALES
+    return [(force, 1.0 if effect.turns else length) for force, length in scales]
 
 
 @functools.cache
 def rig_of(hidden):
+    """Return the user's model, a record to fit and one held out, and the parameters that are refitted."""
+    if hidden in PULLED:
+        truth = BASE.with_effect(PULLED[hidden])
+        return GUESS, imposed(truth, 1), imposed(truth, 2), None
+    if hidden == "torque_constant":
+        records = [driven(seed) for seed in (1, 2)]
+        return (
+            MOTOR.with_parameters({"coulomb.level": 2.5}),
+            *records,
+            ["coulomb.level", "viscous.coefficient"],
+        )
     seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 1200)
     rig = rigs.draw(hidden, seed, excitation="multisine", snr_db=60, n=n)
     free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
     return rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free
+
+
+def driven(seed):
+    """Return a record of voltage and motion of a motor against a spring."""
+    rng, t = np.random.default_rng(seed), 2e-3 * np.arange(1500)
+    volts = 3.0 * np.sin(4.0 * t + seed) + 2.0 * np.sin(11.0 * t) + np.sin(23.0 * t)
+    x, _ = np.asarray(cdf.event_response(MOTOR.with_effect(cdf.LinearSpring(40.0)), t, volts).outputs)
+    noise = 1e-3 * np.std(x) * rng.standard_normal(t.size)
+    return cdf.Measurement(t, volts, x + noise, input_unit="V", output_unit="m")
+
+
+def candidate(hidden):
+    """Return the id of what a rig of an effect is to show: what goes into a motor is no candidate."""
+    return "linear_spring" if hidden == "torque_constant" else hidden
 
 
 def diagnosed(hidden, candidates, force=1.0, length=1.0):

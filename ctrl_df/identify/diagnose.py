@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 from ..checks import executor as checked_executor
 from ..checks import unknown_keywords
 from .arguments import check_limits, check_quantities, effect_classes, free_parameters, mechanism_of
@@ -97,6 +99,7 @@ def diagnose(
 
     def work():
         course.stage("the model refitted")
-        return diagnosed(dataset.search(block, names), classes, executor, course, limits)
+        part = course.within(attrgetter("diagnosis"))
+        return diagnosed(dataset.search(block, names), classes, executor, part, limits).diagnosis
 
     return course.run(work)

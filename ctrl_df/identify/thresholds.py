@@ -91,6 +91,9 @@ LEVEL = 0.01
 RECORD_SAMPLES = 50
 """Samples of a record at least for regions of its error."""
 
+TAKES_PART = 0.1
+"""Component of a direction that data do not determine from which a parameter takes part in it."""
+
 # --- rounding ---------------------------------------------------------------------------------------
 
 NOTHING, NEARLY_NOTHING = 1e-300, 1e-12

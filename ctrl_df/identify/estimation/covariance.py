@@ -7,10 +7,11 @@ import math
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
+from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOTHING
 from .multiple_shooting import Solution, Stage
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
-from .thresholds import MANY_SEGMENTS
+from .thresholds import FREEDOM_MOST, MANY_SEGMENTS, NOISE_LEAST, UNDETERMINED
 
 
 def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity):
@@ -36,16 +37,16 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     problem, residual = stage.problem, found.residual
     ones = [np.ones(len(r)) for r in residual]
     h, _, _ = stage.normal(*found.slopes, residual, ones, found.states)
-    size = np.sqrt(np.maximum(np.diag(h), 1e-300))
-    size[size <= 1e-9 * max(float(size.max()), 1e-300)] = 1.0
+    size = np.sqrt(np.maximum(np.diag(h), NOTHING))
+    size[size <= DEPENDENT * max(float(size.max()), NOTHING)] = 1.0
     eigen, vectors = np.linalg.eigh(h / np.outer(size, size))
-    top = max(float(eigen[-1]), 1e-300)
+    top = max(float(eigen[-1]), NOTHING)
     null = [
-        (math.sqrt(max(e, 0.0) / top), v / size / max(float(np.max(np.abs(v / size))), 1e-300))
+        (math.sqrt(max(e, 0.0) / top), v / size / max(float(np.max(np.abs(v / size))), NOTHING))
         for e, v in zip(eigen, vectors.T, strict=True)
-        if e < 1e-7 * top
+        if e < UNDETERMINED * top
     ]
-    root = vectors / np.sqrt(np.maximum(eigen, 1e-12 * top)) / size[:, None]
+    root = vectors / np.sqrt(np.maximum(eigen, NEARLY_NOTHING * top)) / size[:, None]
     inverse = root @ root.T
     middle, variances = np.zeros_like(h), [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):
@@ -54,7 +55,7 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
             scores = np.array([columns[w].T @ e[w] for w in segments.places])
             middle += _long_run(scores)
             continue
-        floor = 1e-6 * (problem.noise**2 if problem.error_filter is None else float(np.mean(e * e)))
+        floor = NOISE_LEAST * (problem.noise**2 if problem.error_filter is None else float(np.mean(e * e)))
         absorbed = np.column_stack((columns @ root, sensitivity.absorbed_by_starts(k)))
         for block in segments.blocks if problem.error_filter is None else [slice(0, len(e))]:
             noise = noise_spectrum(e[block], absorbed[block], floor)
@@ -69,8 +70,8 @@ def _widening(variances, errors) -> np.ndarray:
 
     `errors`: variances of what the variances are estimated to be.
     """
-    freedom = 2 * variances**2 / np.maximum(errors, 1e-300)
-    return np.where(errors > 0, stdtrit(np.clip(freedom, 1.0, 1e6), ndtr(2.0)) / 2, 1.0)
+    freedom = 2 * variances**2 / np.maximum(errors, NOTHING)
+    return np.where(errors > 0, stdtrit(np.clip(freedom, 1.0, FREEDOM_MOST), ndtr(2.0)) / 2, 1.0)
 
 
 def _long_run(scores) -> np.ndarray:

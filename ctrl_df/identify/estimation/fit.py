@@ -21,7 +21,7 @@ from .multiple_shooting import Solution, Stage
 from .noise_model import NoiseModel
 from .problem import Problem
 from .sensitivity import OutputSensitivity
-from .thresholds import RESTARTS_KEPT
+from .thresholds import AT_BOUND, EFFORT_SHORT, ON_BOUND, RESTARTS_KEPT
 from .variables import default_free, step_of_sensor
 
 
@@ -93,7 +93,7 @@ class FitResult:
 
     def __getstate__(self):
         # what works it out stays behind with the simulations of the fit
-        return {**self.__dict__, "tangent": self.__dict__.get("tangent"), "linear": None}
+        return {**self.__dict__, "linear": None}
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
@@ -210,7 +210,7 @@ def fit_records(
     if coarse and names and not first.closed:
         for short in _short_segments(first, records, lengths):
             stage = Stage(problem, _cut(records, short), thin)
-            theta = stage.solve(theta, iterations=6, tolerance=0.02, robust=False).theta
+            theta = stage.solve(theta, *EFFORT_SHORT, robust=False).theta
     stage = Stage(problem, _cut(records, lengths), thin if polish else max(thin, 1), starts)
     found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
     if polish and thin > 1:
@@ -354,9 +354,9 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         converged=found.converged,
         at_bound=tuple(
             bool(
-                v.clip(q + 1e-6) == q
-                or v.clip(q - 1e-6) == q
-                or abs(values[v.name] - v.p(q)) > 1e-9 * v.scale
+                v.clip(q + AT_BOUND) == q
+                or v.clip(q - AT_BOUND) == q
+                or abs(values[v.name] - v.p(q)) > ON_BOUND * v.scale
             )
             for v, q in zip(problem.variables, theta, strict=True)
         ),

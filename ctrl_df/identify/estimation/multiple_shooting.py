@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
-from ..thresholds import QUARTILE
+from ..thresholds import NEARLY_NOTHING, NOTHING, QUARTILE
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
 from .restarts import restarted_segments, scanned_gap_states
 from .states import descend, find_states
-from .thresholds import GOOD
+from .thresholds import DAMPING, DAMPING_LEAST, DAMPING_MOST, EFFORT_FOLLOWED, GOOD, ON_BOUND
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Stage(SegmentOutputs):
     def _followed_states(self, theta, states) -> tuple[States, Signals]:
         """Return the initial states after a few steps, and what is left of the outputs."""
         alone = self.alone(theta, states.values)
-        found = alone.solve(np.zeros(0), 2, 1e-2, False, restarts=False)
+        found = alone.solve(np.zeros(0), *EFFORT_FOLLOWED, False, restarts=False)
         self.problem.nfev += alone.problem.nfev
         return states.at(found.states.values), found.residual
 
@@ -143,7 +143,7 @@ class Stage(SegmentOutputs):
             return descend(self, found, iterations, tolerance)
         if not problem.names and not any(a.size for a in states.values):
             iterations = 0
-        damping, before = 1e-3, 0.0
+        damping, before = DAMPING, 0.0
         for iteration in range(iterations):
             if problem.nfev >= problem.budget:
                 break
@@ -166,10 +166,10 @@ class Stage(SegmentOutputs):
                 )  # fmt: skip
                 if trial_cost < cost:
                     gain, found = 1 - trial_cost / cost, trial
-                    damping = max(damping / 10, 1e-7)
+                    damping = max(damping / 10, DAMPING_LEAST)
                     break
                 damping *= 10
-                if problem.nfev >= problem.budget or damping > 1e4:
+                if problem.nfev >= problem.budget or damping > DAMPING_MOST:
                     break
             ended = found is start or gain < tolerance
             found = replace(found, slopes=(jp, js), converged=ended)
@@ -205,7 +205,7 @@ class Stage(SegmentOutputs):
             return [np.ones(len(r)) for r in residual]
         everything = np.concatenate(residual)
         sigma = max(float(np.median(np.abs(everything))) / QUARTILE, self.problem.noise)
-        return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), 1e-300)) for r in residual]
+        return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), NOTHING)) for r in residual]
 
     def _step(self, h, g, theta, damping):
         """Solve the damped equations; parameters held by a bound stay there."""
@@ -213,7 +213,7 @@ class Stage(SegmentOutputs):
         if p == 0:
             return np.zeros(0)
         size = np.diag(h).copy()
-        size = np.maximum(size, 1e-12 * max(float(size.max()), 1e-300))
+        size = np.maximum(size, NEARLY_NOTHING * max(float(size.max()), NOTHING))
         held = np.zeros(p, bool)
         step = np.zeros(p)
         for _ in range(p):
@@ -223,11 +223,12 @@ class Stage(SegmentOutputs):
                 break
             matrix = h[np.ix_(free, free)] + np.diag(damping * size[free])
             root = np.sqrt(size[free])
-            step[free] = np.linalg.lstsq(matrix / np.outer(root, root), g[free] / root, rcond=1e-12)[0] / root
+            scaled = matrix / np.outer(root, root)
+            step[free] = np.linalg.lstsq(scaled, g[free] / root, rcond=NEARLY_NOTHING)[0] / root
             blocked = [
                 i
                 for i in np.flatnonzero(free)
-                if variables[i].clip(theta[i] + np.sign(step[i]) * 1e-9) == theta[i] and step[i] != 0
+                if variables[i].clip(theta[i] + np.sign(step[i]) * ON_BOUND) == theta[i] and step[i] != 0
             ]
             if not blocked:
                 break

@@ -22,6 +22,7 @@ from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
 from .thresholds import (
     BETTER,
+    MOTOR_LEAST,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
@@ -144,6 +145,26 @@ def cross_started(tried: CandidateFit, best: CandidateFit, data: SegmentedData) 
     return thresholds_refined(data.validate(replace(tried, train=fitted)), data)
 
 
+def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> CandidateFit:
+    """Fit a model again with what it has in common with one that comes nearer; return the better fit.
+
+    Parameters of the machine and where segments begin hardly hang on the effect that is added to a model: it
+    may not fall behind for having begun elsewhere.
+    """
+    if tried is nearer:
+        return tried
+    known = nearer.train.parameters
+    shared = {name: known[name] for name in tried.train.names if name in known}
+    block = tried.block.with_parameters(feasible(tried.block, shared))
+    starts = data.starts_as(block, data.train.records, nearer.train)
+    near = data.fit(block, (), starts=starts, iterations=4, hopeless=tried.train.rmse)
+    if near.rmse < tried.train.rmse:
+        fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
+        if fitted.rmse < tried.train.rmse:
+            return data.validate(replace(tried, train=fitted))
+    return tried
+
+
 def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
     """Choose thresholds by the segments to validate on, within what the segments fitted leave open."""
     table = tried.block.parameters
@@ -188,7 +209,7 @@ def _moved(model, name, value):
     if shared is not None and effect is not None and effect.role == "friction" and effect.side == "load":
         # the sum of both shows best: what the load gains the motor loses
         motor, more = table[shared].value, value - table[name].value
-        values[shared] = max(motor - more, 0.05 * motor)
+        values[shared] = max(motor - more, MOTOR_LEAST * motor)
     return model.with_parameters(feasible(model, values))
 
 

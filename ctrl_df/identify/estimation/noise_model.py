@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..thresholds import NOTHING
+from .thresholds import IMPULSE_GONE, NOISE_ORDER
+
 Pieces = Sequence[np.ndarray]
 
 
@@ -80,7 +83,7 @@ class NoiseModel:
         n, b = 4096, [1.0]
         while True:
             h = np.asarray(lfilter(b, np.concatenate(([1.0], -self.a)), np.r_[1.0, np.zeros(n - 1)]))
-            if n >= 1 << 18 or np.max(np.abs(h[-n // 8 :])) < 1e-6 * np.max(np.abs(h)):
+            if n >= 1 << 18 or np.max(np.abs(h[-n // 8 :])) < IMPULSE_GONE * np.max(np.abs(h)):
                 return h
             n *= 4
 
@@ -107,7 +110,7 @@ class OutputNoise(NoiseModel):
     def weighed(self, x, piece: int) -> np.ndarray:
         """Return what counts of one piece of several."""
         model = self.of(piece)
-        return model.filtered(x, [slice(0, len(x))]) * (self.sigma / max(model.sigma, 1e-300))
+        return model.filtered(x, [slice(0, len(x))]) * (self.sigma / max(model.sigma, NOTHING))
 
 
 def noise_of_outputs(pieces: Pieces, outputs: int, max_order: int = 30) -> NoiseModel:
@@ -189,7 +192,7 @@ def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None, out
     """
     if plain is None:
         longest = int(np.argmax([len(r) for r in pieces])) // outputs * outputs
-        return noise_of_outputs(pieces[longest : longest + outputs], outputs, max_order=12)
+        return noise_of_outputs(pieces[longest : longest + outputs], outputs, max_order=NOISE_ORDER)
     left = noise_model([plain.filtered(r, [slice(0, len(r))]) for r in pieces], max_order=4)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
     return NoiseModel(-both[1:], left.sigma, plain.step)

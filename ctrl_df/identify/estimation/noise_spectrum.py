@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..thresholds import NOTHING
 from .noise_model import noise_model
-from .thresholds import NOISE_KNOWN, NOISE_PASSES, NOISE_SHARE
+from .thresholds import NOISE_KNOWN, NOISE_LEFT, NOISE_PASSES, NOISE_SHARE
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def noise_spectrum(residual, absorbed, floor: float = 0.0) -> NoiseSpectrum:
     seen, expected = mean(periodogram), mean(_expected(densities, transform, taken, n))
     weights = width / bins
     sizes = _sizes(seen, expected, weights)
-    left = sizes[:, None] * expected / np.maximum(sizes @ expected, 1e-300)
+    left = sizes[:, None] * expected / np.maximum(sizes @ expected, NOTHING)
     # Fisher's information of the logarithms of the sizes; each is known within a factor beforehand
     errors = np.linalg.inv((left * weights) @ left.T + np.eye(len(left)) / NOISE_KNOWN**2)
     return NoiseSpectrum(sizes[:, None] * densities + floor / len(densities), errors)
@@ -99,13 +100,13 @@ def _expected(densities, transform, taken, n) -> np.ndarray:
 
     Of ``(1 - Q Q') Omega (1 - Q Q')``: what other frequencies hand over is counted where much is taken.
     """
-    left = densities * np.maximum(1 - taken, 1e-3)
+    left = densities * np.maximum(1 - taken, NOISE_LEFT)
     much = np.flatnonzero(taken > NOISE_SHARE)
     there, weights = transform[much], _integral(np.ones(len(taken)))[much]
     for row, density in zip(left, densities[:, much], strict=True):
         inner = np.real((there.conj() * (density * weights)[:, None]).T @ there)
         handed = np.real(np.sum((there.conj() @ inner) * there, axis=1)) / n
-        row[much] = np.maximum(density * (1 - 2 * taken[much]) + handed, 1e-3 * density)
+        row[much] = np.maximum(density * (1 - 2 * taken[much]) + handed, NOISE_LEFT * density)
     return left
 
 

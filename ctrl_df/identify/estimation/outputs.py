@@ -16,6 +16,15 @@ from ..thresholds import RTOL
 from .elimination import products_of, states_for
 from .noise_model import power
 from .problem import Problem
+from .thresholds import (
+    HIDDEN_NUDGE,
+    NUDGE_FALLS,
+    NUDGE_LEAST,
+    NUDGE_MOST,
+    OUTPUT_MOVES,
+    SLACK_TURNED,
+    STATE_NUDGE,
+)
 
 Signals = list[np.ndarray]
 
@@ -186,9 +195,8 @@ class SegmentOutputs:
         """Return the derivatives by variable `i`, and choose its next step."""
         variable, h = self.problem.variables[i], self.problem.steps[i]
         change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
-        # Next time the output shall move by a third of the noise.
-        wanted = abs(h) * 0.3 * self.problem.noise / change if change > 0 else 10 * abs(h)
-        self.problem.steps[i] = min(max(wanted, 1e-6, 0.05 * abs(h)), 0.02 if variable.log else 0.05)
+        wanted = abs(h) * OUTPUT_MOVES * self.problem.noise / change if change > 0 else 10 * abs(h)
+        self.problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * abs(h)), NUDGE_MOST[variable.log])
         return [(a - b) / width for a, b in zip(moved, other, strict=True)]
 
     def state_products(self, k, which, seen, starts, reach, residual) -> np.ndarray:
@@ -215,11 +223,12 @@ class SegmentOutputs:
                 moved.append(None)
                 widths.append(None)
                 continue
-            size = {"x": 1.0, "v": 1.0}.get(name, 0.1) * np.minimum(
-                reach[:, j], {"x": 0.003 * known.position, "v": 0.003 * known.speed}.get(name, np.inf)
-            )
+            typical = {"x": known.position, "v": known.speed}.get(name)
+            size = HIDDEN_NUDGE * reach[:, j]
+            if typical is not None:
+                size = np.minimum(reach[:, j], STATE_NUDGE * typical)
             trial = starts.copy()
-            sign = np.where(trial[:, j] > 0.8, -1.0, 1.0) if name == "slack" else np.ones(len(size))
+            sign = np.where(trial[:, j] > SLACK_TURNED, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             trial[:, j] += sign * size
             moved.append(trial)
             widths.append(segments.spread(sign * size))

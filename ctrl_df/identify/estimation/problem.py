@@ -10,6 +10,7 @@ from ..prediction.initial_states import FREE
 from ..prediction.segments import facts_of
 from ..prediction.simulator import feasible
 from ..prediction.simulators import simulator_of
+from .thresholds import NUDGE_FIRST
 from .variables import beforehand, variables_of
 
 
@@ -42,7 +43,7 @@ class Problem:
         self.known = [facts_of(self.block, r) for r in records]
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
         self.about, self.precision = beforehand(self.variables, about or {})
-        self.steps = np.full(len(names), 1e-3)
+        self.steps = np.full(len(names), NUDGE_FIRST)
         self.nfev = 0.0
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
 
@@ -72,8 +73,8 @@ class Problem:
     @property
     def nonsmooth(self) -> bool:
         """Whether events of the model come and go as its parameters move."""
-        effects = getattr(self.block, "effects", ())
-        return bool(self.names) and self.error_filter is None and any(e.nonsmooth for e in effects)
+        events = getattr(self.block, "nonsmooth", False)
+        return bool(self.names) and self.error_filter is None and events
 
     @property
     def unit(self) -> float:

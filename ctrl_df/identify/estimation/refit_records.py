@@ -14,11 +14,11 @@ from ..data.derivatives import step_of
 from ..data.measurement import Measurement
 from ..prediction.segments import facts
 from ..prediction.simulators import simulator_of
-from ..thresholds import PROCESS_NOISE
+from ..thresholds import PROCESS_NOISE, TAKES_PART
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .segmented import prepare
-from .thresholds import HOLDOUT_PARTS, SEGMENT_LEAST
+from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, SEGMENT_LEAST
 from .variables import step_of_sensor
 
 
@@ -40,12 +40,13 @@ def refit_records(
     mode, window, robust, budget
         As for `ctrl_df.refit`.
     """
+    steps, tolerance = EFFORT_REFIT
     settings: dict[str, Any] = dict(
-        budget=budget, mode=mode, window=window, robust=robust, tolerance=1e-4, central=True, polish=6
+        budget=budget, mode=mode, window=window, robust=robust, tolerance=tolerance, central=True, polish=6
     )
     # short segments lead from far off; from nearby they may lead away, into another minimum
     ways = [True, False] if start is None and _many_minima(model, records) else [start is None]
-    fits = [fit_records(model, records, start, names, coarse=w, iterations=40, **settings) for w in ways]
+    fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
     found = min(fits, key=lambda f: f.rmse)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
@@ -54,7 +55,7 @@ def refit_records(
             shown = settings | {"coarse": False, "starts": found.starts}
             settings["window"] = brief
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
-            found = fit_records(model, records, start, names, coarse=False, iterations=40, **settings)
+            found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     if nonsmooth_names(found):
         better = restarted(found, _Beside(records, found.segments), nonsmooth_names(found))
         if better is not found:
@@ -76,7 +77,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
         return None
     data = prepare(model, records, records)
     near, disturbed = (
-        data.segmentations[0].fit(model, (), iterations=4, tolerance=2e-2),
+        data.segmentations[0].states_of(model),
         data.with_process_noise,
     )
     if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
@@ -121,7 +122,7 @@ def blurred(found: FitResult) -> set[str]:
     """Return the parameters in a null direction, or uncertain by more than themselves."""
     names = set()
     for _, direction in found.null:
-        names |= {k for k, d in zip(found.names, direction, strict=True) if abs(d) > 0.1}
+        names |= {k for k, d in zip(found.names, direction, strict=True) if abs(d) > TAKES_PART}
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0)) if len(found.names) else np.zeros(0)
     for k, value, error, scale in zip(found.names, found.values, errors, found.scale, strict=True):
         if not math.isfinite(error) or error > max(abs(value), scale):
@@ -133,7 +134,7 @@ def doubts(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every direction the data do not determine."""
     lines, named = [], set()
     for _, direction in found.null:
-        parts = [(k, d) for k, d in zip(found.names, direction, strict=True) if abs(d) > 0.1]
+        parts = [(k, d) for k, d in zip(found.names, direction, strict=True) if abs(d) > TAKES_PART]
         parts.sort(key=lambda p: -abs(p[1]))
         named |= {k for k, _ in parts}
         if len(parts) == 1:

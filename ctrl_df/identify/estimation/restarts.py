@@ -11,7 +11,17 @@ import numpy as np
 
 from ..prediction.sensed import sensed
 from .outputs import States
-from .thresholds import BETTER, GOOD, OUTLYING_NOISE, OUTLYING_SEGMENT, RESTART_SPEEDS, UNFOLLOWED
+from .thresholds import (
+    BETTER,
+    EFFORT_BEGUN,
+    GAP_PLACES,
+    GAP_RATES,
+    GOOD,
+    OUTLYING_NOISE,
+    OUTLYING_SEGMENT,
+    RESTART_SPEEDS,
+    UNFOLLOWED,
+)
 
 
 def restarted_segments(stage, found):
@@ -84,7 +94,7 @@ def _ends(stage, theta, k, some, trials, powers):
         return
     alone = stage.alone(theta, None, slice(k, k + 1))
     for start in begun:
-        ended = alone.over([some], [start]).solve(np.zeros(0), 5, 1e-2, False, restarts=False)
+        ended = alone.over([some], [start]).solve(np.zeros(0), *EFFORT_BEGUN, False, restarts=False)
         yield ended.states.values[0], some.means(ended.residual[0] ** 2)
     problem.count(alone.problem.nfev)
 
@@ -127,5 +137,4 @@ def _shift(held, segments, e, placed=False) -> tuple[np.ndarray, np.ndarray]:
 def _slacks(stage, k) -> list[tuple[float, float]]:
     """Return places in a gap (0 to 1), and rates [m/s] of crossing it, to begin a segment with."""
     speed = stage.problem.known[k].speed
-    rates = [f * speed for f in (0.0, -0.2, 0.2, -0.7, 0.7)]
-    return [(p, r) for p in (0.02, 0.25, 0.5, 0.75, 0.98) for r in rates]
+    return [(p, f * speed) for p in GAP_PLACES for f in GAP_RATES]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...units import size
 from ..prediction.segments import facts, load_of
+from ..thresholds import NOTHING
 from .variables import typical_mass
 
 
@@ -30,7 +31,7 @@ class Scales:
 def scales_of(block, records) -> Scales:
     """Return the typical sizes in records of a machine."""
     known = [facts(r) for r in records]
-    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), 1e-300)
-    position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), 1e-300)
-    speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), 1e-300)
+    force = max(math.sqrt(np.mean([np.mean(load_of(block, r) ** 2) for r in records])), NOTHING)
+    position = max(math.sqrt(np.mean([np.var(k.place) for k in known])), NOTHING)
+    speed = max(math.sqrt(np.mean([np.mean(k.velocity**2) for k in known])), NOTHING)
     return Scales(force, position, speed, typical_mass(block, force, position, speed))

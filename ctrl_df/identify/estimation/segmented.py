@@ -16,15 +16,16 @@ from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
-from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, RTOL
+from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
 from .noise_model import NoiseModel, acceleration_filter
 from .scales import Scales, scales_of
 from .segmented_records import SegmentedRecords
-from .starts import same_begins
+from .starts import carried, same_begins
 from .thresholds import (
     BRIEF,
+    EFFORT_STATES,
     FILTERED,
     HOLDOUT_PARTS,
     LEVELS,
@@ -33,6 +34,9 @@ from .thresholds import (
     RTOL_COARSE,
     RTOL_OVER_NOISE,
     SCREEN_SAMPLES,
+    SEGMENT_MOTIONS,
+    SEGMENT_USUAL,
+    SEGMENTS,
     SHORTEST,
 )
 from .variables import RecordScales
@@ -120,7 +124,7 @@ class SegmentedData:
     def noise_free(self) -> bool:
         """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
         outputs = [y for r in self.train.records for y in sensed(r).values]
-        return all(derivatives.grain(y) < NOISE_FREE * max(float(np.std(y)), 1e-300) for y in outputs)
+        return all(derivatives.grain(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
 
     @property
     def disturbed(self) -> bool:
@@ -245,6 +249,13 @@ class SegmentedData:
             robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
+    def states_of(self, block, *, view=None, starts=None, hopeless=math.inf) -> FitResult:
+        """Fit the initial states alone, well enough for a fit that goes on from them."""
+        iterations, tolerance = EFFORT_STATES
+        return self.fit(
+            block, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance, hopeless=hopeless
+        )
+
     def rtol_of(self, block) -> float:
         """Return the tolerance of a model's simulations: events that come and go want the finest."""
         return RTOL if block.nonsmooth else self.rtol
@@ -262,7 +273,7 @@ class SegmentedData:
         starts = same_begins(found, self.train.segments)
         if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
             # The initial states of new segments first: parameters would bend to make up for them.
-            states = self.fit(found.model, (), starts=starts, iterations=4, tolerance=2e-2, hopeless=hopeless)
+            states = self.states_of(found.model, starts=starts, hopeless=hopeless)
             starts = states.starts
         return self.fit(
             found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance,
@@ -285,6 +296,13 @@ class SegmentedData:
         """Run a fitted model over the segments to validate on, from initial states of their own."""
         return replace(tried, validation=self._ran(tried.block, "validation"))
 
+    def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
+        """Return where segments of records begin for a model as they do for another."""
+        return [
+            carried(self.simulator(block, r), w, self.simulator(other.model, r), starts)
+            for r, w, starts in zip(records, other.segments, other.starts, strict=True)
+        ]
+
     def errors(self, model) -> tuple[float, float]:
         """Return nrmse of a model as it is, over the segments fitted and those held out."""
         return self._ran(model, "train").nrmse, self._ran(model, "validation").nrmse
@@ -294,7 +312,7 @@ class SegmentedData:
         thin = self.step or self.thin
         rough, view = self.coarse(thin, thin), getattr(self, name)
         short = getattr(rough.level(SHORTEST), name)
-        near = rough.fit(model, (), view=short, iterations=4, tolerance=2e-2)
+        near = rough.states_of(model, view=short)
         if name == "validation" and view.records is not self.train.records:
             near = reestimated_per_record(
                 near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
@@ -349,4 +367,6 @@ def _within(own, shown) -> tuple[float, float]:
 def _count(record) -> int:
     """Return the number of segments: two to-and-fro motions and a half each, 60 samples at least."""
     known, n = facts(record), len(record)
-    return int(min(max(round(record.duration / max(2.5 * known.swing, 60 * record.duration / n)), 4), 40))
+    fewest, most = SEGMENTS
+    length = max(SEGMENT_MOTIONS * known.swing, SEGMENT_USUAL * record.duration / n)
+    return int(min(max(round(record.duration / length), fewest), most))

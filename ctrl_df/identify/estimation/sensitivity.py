@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..thresholds import NEARLY_NOTHING
 from .elimination import products_of, states_for
 
 
@@ -56,7 +57,7 @@ class OutputSensitivity:
         products[:, i, i] += self.ridge[k]
         size = np.sqrt(products[:, i, i])[:, :, None]
         eigen, vectors = np.linalg.eigh(products / (size * size.transpose(0, 2, 1)))
-        root = vectors / np.sqrt(np.maximum(eigen, 1e-12))[:, None, :] / size
+        root = vectors / np.sqrt(np.maximum(eigen, NEARLY_NOTHING))[:, None, :] / size
         found = np.zeros((len(states), len(segments), ns))
         for w, where in enumerate(segments.places):
             found[where, w] = states[where] @ root[w]

@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..prediction.segments import split
+from ..thresholds import NOTHING
 from .elimination import states_for
 from .noise_model import power
-from .thresholds import BEGINNINGS, DAMPED, SEGMENT_LEAST
+from .thresholds import BEGINNINGS, DAMPED, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN, SEGMENT_LEAST
 
 
 def find_states(stage) -> list[np.ndarray]:
@@ -23,14 +24,14 @@ def find_states(stage) -> list[np.ndarray]:
     hardly has any. Each way can end in a wrong one: the better counts.
     """
     none = np.zeros(0)
-    found = [stage.solve(none, iterations=8, tolerance=1e-4, robust=False)]
+    found = [stage.solve(none, *EFFORT_ALONE, robust=False)]
     starts = None
     for first in _beginnings(stage):
-        begun = stage.over(first, starts).solve(none, iterations=5, tolerance=1e-2, robust=False)
+        begun = stage.over(first, starts).solve(none, *EFFORT_BEGUN, robust=False)
         starts = begun.states.values
     if starts is not None:
         again = stage.over(stage.segments, starts)
-        found.append(again.solve(none, iterations=8, tolerance=1e-4, robust=False))
+        found.append(again.solve(none, *EFFORT_ALONE, robust=False))
     return min(found, key=lambda f: power(f.residual)).states.values
 
 
@@ -62,7 +63,7 @@ def descend(stage, begun, iterations: int, tolerance: float):
         before = power(residual)
         for r in records:
             r.step(tolerance)
-        pace = power(residual) / max(before, 1e-300)
+        pace = power(residual) / max(before, NOTHING)
         if stage.too_far(residual, pace, iterations - i - 1 + problem.outlook):
             break
     states = begun.states.at([r.starts for r in records])
@@ -80,7 +81,7 @@ class _Record:
         self.reach, self.means = begun.states.reach[k], stage.means()[k]
         self.precision = stage.precision(begun.states)[k]
         self.cost = self._cost(self.segments, self.residual, self.starts, slice(None))
-        self.damping = np.full(len(self.segments), 1e-3)
+        self.damping = np.full(len(self.segments), DAMPING)
         self.open = np.full(len(self.segments), self.starts.shape[1] > 0)
 
     def _cost(self, segments, residual, starts, rows):
@@ -116,7 +117,7 @@ class _Record:
             self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
             self.cost[gained], self.starts[gained] = cost[better], trial[better]
             self.residual[self._signal(gained)[1]] = residual[some.spread(better)]
-            self.damping[gained] = np.maximum(self.damping[gained] / 10, 1e-7)
+            self.damping[gained] = np.maximum(self.damping[gained] / 10, DAMPING_LEAST)
             rows, products = rows[~better], products[~better]
             self.damping[rows] *= 10
             if not rows.size:

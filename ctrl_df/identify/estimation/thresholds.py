@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ..thresholds import RTOL
+
 # --- ratios of errors -------------------------------------------------------------------------------
 
 BETTER = 0.99
@@ -30,6 +32,10 @@ and a half lies `PARAMETER_RANGE`."""
 
 SEGMENT_LEAST = 50
 """Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
+
+SEGMENT_MOTIONS, SEGMENT_USUAL, SEGMENTS = 2.5, 60, (4, 40)
+"""The longest segments of a diagnosis: to-and-fro motions in each, samples at least; how many of a record, at
+least and at most."""
 
 SHORTEST = 16
 """How many times as many the shortest segments of a diagnosis are as the longest: of two to-and-fro motions
@@ -62,6 +68,55 @@ of it by chance (rigs with ripples)."""
 
 ANGLES = 6
 """Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
+
+# --- descents ---------------------------------------------------------------------------------------
+
+DAMPING, DAMPING_LEAST, DAMPING_MOST = 1e-3, 1e-7, 1e4
+"""Of Levenberg and Marquardt, over the curvature: at the begin; at least, where steps are those of Gauss and
+Newton; at most, where a refused step is too short to gain."""
+
+NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL, (0.05, 0.02), 0.05
+"""Steps of scaled parameters that derivatives are differences over: the first; at least, a hundred times what
+simulations err by; at most, on a linear and on a logarithmic scale; next one over the last, at least."""
+
+OUTPUT_MOVES = 0.3
+"""Of the noise: what the output is to move by over such a step, seen well and linear still."""
+
+STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 0.1
+"""The same of initial states: of place and speed over the typical ones, of what is hidden over its reach."""
+
+SLACK_TURNED = 0.8
+"""Share of a gap from which its state is moved back."""
+
+AT_BOUND, ON_BOUND = 1e-6, 1e-9
+"""Distance of a scaled parameter from a bound that leaves no room; difference that rounding makes."""
+
+OPEN_BOUND = 1e-3
+"""Distance from a bound that a share must not reach."""
+
+LOG_MOST = 40.0
+"""Logarithm of a factor by which a parameter may be off its scale: 17 decades are any number."""
+
+NATURAL = 0.1
+"""Size of a parameter that matters, over what the scales of a record make of its unit; but of a mass."""
+
+MOTOR_LEAST = 0.05
+"""Share of its dry friction that the motor keeps where the load gains some."""
+
+GAP_PLACES, GAP_RATES = (0.02, 0.25, 0.5, 0.75, 0.98), (0.0, -0.2, 0.2, -0.7, 0.7)
+"""Where in a gap segments may begin, and how fast they cross it, over the typical speed."""
+
+# --- how long fits go on: steps at most, relative gain of the cost that is none -----------------------
+
+EFFORT_SHORT, EFFORT_REFIT = (6, 2e-2), (40, 1e-4)
+"""Of a refit: over short segments, whose minimum is not the last one's; at its end."""
+
+EFFORT_STATES = (4, 2e-2)
+"""Of initial states from which a fit goes on that moves them anyway."""
+
+EFFORT_ALONE, EFFORT_BEGUN, EFFORT_FOLLOWED = (8, 1e-4), (5, 1e-2), (2, 1e-2)
+"""Of initial states alone: to their end; over beginnings of segments, and where tries of them lead; behind
+one step of the parameters."""
 
 # --- where fits begin again -------------------------------------------------------------------------
 
@@ -105,3 +160,20 @@ rest is off by the square of it, a hundredth."""
 NOISE_KNOWN = 2.0
 """Natural logarithm of the factor, 7, within which the size of each part of the noise is known: a random
 walk, the steepest noise of a sensor, falls by 4 from one octave, and so from one part, to the next."""
+
+NOISE_ORDER = 12
+"""Largest order of the noise model of a residual that others are judged by."""
+
+NOISE_LEFT, NOISE_LEAST = 1e-3, 1e-6
+"""Share of its density that a fit leaves of a noise at least; power of a noise, over that of the sensors',
+that is rounding."""
+
+IMPULSE_GONE = 1e-6
+"""Over its peak, an impulse response that has died out."""
+
+UNDETERMINED = 1e-7
+"""Curvature of the cost, over the largest, along a direction that data do not determine: to change the output
+as much a step there has to be 3000 times as long."""
+
+FREEDOM_MOST = 1e6
+"""Degrees of freedom of a normal distribution."""

@@ -13,7 +13,7 @@ from ...blocks.primitives import Ramp
 from ...units import dimension, size
 from ..prediction.segments import Facts, facts
 from ..prediction.sensed import POSITION, sensed
-from .thresholds import SIZE_PRIOR
+from .thresholds import LOG_MOST, NATURAL, OPEN_BOUND, SIZE_PRIOR
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Variable:
         self.scale = abs(parameter.value) if parameter.value != 0 else natural
         self.natural = natural
         if parameter.strict and not self.log:
-            self.lower = parameter.lower + 1e-3
+            self.lower = parameter.lower + OPEN_BOUND
         if limits is not None:
             self.lower, self.upper = max(self.lower, limits[0]), min(self.upper, limits[1])
 
@@ -89,7 +89,7 @@ class Variable:
     def p(self, q: float) -> float:
         """Return the physical value of a scaled one."""
         if self.log:
-            return self.scale * math.exp(min(max(q, -40.0), 40.0))
+            return self.scale * math.exp(min(max(q, -LOG_MOST), LOG_MOST))
         return min(max(q * self.scale, self.lower), self.upper)
 
     def clip(self, q: float) -> float:
@@ -156,4 +156,4 @@ def natural_scale(unit: str, known: Facts) -> float:
     time = known.position / known.speed
     mass = known.force * time**2 / known.position
     whole = size(unit, {"N": known.force, "m": known.position, "s": time, "kg": mass})
-    return whole if powers == {"kg": 1} else 0.1 * whole
+    return whole if powers == {"kg": 1} else NATURAL * whole

@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+from ..data.thresholds import REGULAR
+from .thresholds import ROUGH
+
 
 def thinned(t, u, factor):
     """Return times and values of a held input in fewer steps, and how to join them: "zoh" or "linear".
@@ -57,7 +60,7 @@ def _rough(record, factor: int) -> bool:
     u, t = record.u, record.t
     off = np.abs(u - np.interp(t, t[::factor], u[::factor]))
     # single jumps (steps of the force) are no harm: what counts is what most samples do
-    return float(np.quantile(off, 0.75)) > 0.05 * float(np.std(u))
+    return float(np.quantile(off, 0.75)) > ROUGH * float(np.std(u))
 
 
 def lagged(t, u, time_constant):
@@ -65,7 +68,7 @@ def lagged(t, u, time_constant):
     from scipy.signal import lfilter
 
     steps = np.diff(t)
-    if np.ptp(steps) <= 0.02 * np.mean(steps):
+    if np.ptp(steps) <= 2 * REGULAR * np.mean(steps):
         a = math.exp(-float(np.mean(steps)) / time_constant)
         rest, _ = lfilter([1 - a], [1.0, -a], u[:-1], zi=np.array([a * u[0]]))
         return np.concatenate(([u[0]], rest))

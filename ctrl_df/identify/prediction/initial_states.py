@@ -15,6 +15,8 @@ import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, level
 from ...blocks.effect import Effect
+from ..thresholds import NOTHING
+from .thresholds import BEND_REACH, PLACE_REACH, RATE_REACH, SPEED_REACH
 
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
@@ -59,17 +61,20 @@ def reach(which, core, known, segments) -> np.ndarray:
     `known`: `windows.facts` of the record.
     """
     one = np.ones(len(segments))
+    errors, typical = PLACE_REACH
+    x = errors * segments.x_error + typical * known.position
+    errors, typical = SPEED_REACH
     table = {
-        "x": 5 * segments.x_error + 0.02 * known.position,
-        "v": 2 * segments.v_error + 0.01 * known.speed,
+        "x": x,
+        "v": errors * segments.v_error + typical * known.speed,
         "slack": one,
-        "slack_rate": 0.7 * known.speed * one,
+        "slack_rate": RATE_REACH * known.speed * one,
     } | {name: 0.5 * one for name, _, _ in _inner(core)}
     if core.joint == ELASTIC:
-        bend = known.force / max(core.stiffness, 1e-300)
+        bend = known.force / max(core.stiffness, NOTHING)
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
-        table["stretch"] = 0.6 * bend * one
-        table["stretch_rate"] = 0.6 * bend * math.sqrt(core.stiffness / mass) * one
+        table["stretch"] = BEND_REACH * bend * one
+        table["stretch_rate"] = BEND_REACH * bend * math.sqrt(core.stiffness / mass) * one
     return np.column_stack([table[name] for name in which])
 
 

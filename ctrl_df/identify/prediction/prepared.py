@@ -16,6 +16,7 @@ from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ...simulate.engine import Engine
 from ..data.measurement import Measurement
 from .decimated import lagged, thinned
+from .thresholds import LONG_BEFORE
 
 _DRIVES: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
 REFERENCE = ("reference", "r")
@@ -128,4 +129,4 @@ def _lags(core, record, signal):
 
 def _before(record, t, u):
     """Let the first value hold for all time before the record."""
-    return np.concatenate(([t[0] - 1e3 * record.duration - 1.0], t)), np.concatenate(([u[0]], u))
+    return np.concatenate(([t[0] - LONG_BEFORE * record.duration - 1.0], t)), np.concatenate(([u[0]], u))

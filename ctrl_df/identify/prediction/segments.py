@@ -12,7 +12,7 @@ import numpy as np
 from ..data import derivatives
 from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
-from ..thresholds import NOISE_FREE, UNPLACED
+from ..thresholds import NOISE_FREE, NOTHING, UNPLACED
 from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
 
 
@@ -53,12 +53,12 @@ def facts(record: Measurement) -> Facts:
         held = sensed(record)
         velocity = derivatives.derivative(record.t, record.y, 1 - held.columns[0], cutoff)
         place = np.asarray(record.y) if held.columns[0] == POSITION else _integral(record.t, record.y)
-        speed = max(float(np.sqrt(np.mean(velocity**2))), 1e-300)
+        speed = max(float(np.sqrt(np.mean(velocity**2))), NOTHING)
         swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
         half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
         known = Facts(
-            dt, max(float(np.std(record.y)), 1e-300), speed, max(float(np.std(record.u)), 1e-300),
-            held.noise, swing, half, velocity, max(float(np.std(place)), 1e-300), place, record.u,
+            dt, max(float(np.std(record.y)), NOTHING), speed, max(float(np.std(record.u)), NOTHING),
+            held.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
             (place_unit(record), record.input_unit),
         )  # fmt: skip
         _FACTS[record] = known
@@ -85,15 +85,15 @@ def _of_imposed(record: Measurement) -> Facts:
     """Return the scales of a record of a motion that was imposed, and of the force that it took."""
     motion = imposed_motion(record)
     dt, _, values = derivatives.uniform(record.t, motion.x)
-    force = max(float(np.std(record.y)), 1e-300)
+    force = max(float(np.std(record.y)), NOTHING)
     # dry friction makes steps of the force, whose spectrum has no floor
     noise = min(record.noise_floor(), max(derivatives.usual_noise(record.y), derivatives.grain(record.y)))
     return Facts(
-        dt, force, max(float(np.sqrt(np.mean(motion.v**2))), 1e-300), force,
+        dt, force, max(float(np.sqrt(np.mean(motion.v**2))), NOTHING), force,
         max(noise, NOISE_FREE * force),
         min(2 * record.duration / max(_turns(values), 1), record.duration),
         int(np.clip(0.25 / (motion.cutoff * dt), 4, max(len(record) // 8, 4))), motion.v,
-        max(float(np.std(motion.x)), 1e-300), motion.x, record.y, (record.input_unit, record.output_unit),
+        max(float(np.std(motion.x)), NOTHING), motion.x, record.y, (record.input_unit, record.output_unit),
         imposed=True,
     )  # fmt: skip
 
@@ -274,7 +274,7 @@ def _local(record, i, known) -> tuple[float, float, float, float, float]:
 
 def _parabola(s, y, noise) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return value, slope and curvature of y at s = 0, and how far each may be off."""
-    reach = max(float(np.max(np.abs(s))), 1e-300)
+    reach = max(float(np.max(np.abs(s))), NOTHING)
     basis = np.vander(s / reach, 3, increasing=True)
     solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
     rest = y - basis @ solution

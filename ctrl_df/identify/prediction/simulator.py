@@ -23,6 +23,7 @@ from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
+from .thresholds import RESTORING
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
@@ -101,7 +102,7 @@ class Simulator:
             centre = float(np.mean(self.facts.place))
             forces = [float(law(0.0, centre + d, 0.0, z, p, z.copy())) for d in (-s, s)]  # type: ignore[misc]
             pull += forces[0] - forces[1]
-        return pull > 0.1 * self.facts.force
+        return pull > RESTORING * self.facts.force
 
     @cached_property
     def nuisances(self) -> tuple[str, ...]:

@@ -5,3 +5,21 @@ from __future__ import annotations
 HIDDEN_RTOL = 1e-4
 """Tolerance of hidden states under an imposed motion: of steps no longer than a sample it leaves errors of
 some 1e-6 of the force, and is twice as fast as 1e-6 (records)."""
+
+ROUGH = 0.05
+"""Distance of samples of an input from its thinned form, over its rms, beyond which it is not thinned, if a
+quarter of them lie farther off: the model would break away elsewhere (rigs)."""
+
+PLACE_REACH, SPEED_REACH = (5, 0.02), (2, 0.01)
+"""How far place and speed at the begin of a segment may be off: multiples of their error, and of the typical
+ones beside it, as what events do is smoothed (rigs)."""
+
+RATE_REACH, BEND_REACH = 0.7, 0.6
+"""The same of what is hidden: the rate of a gap over the typical speed; the bend of a joint, and its rate,
+over those that the typical force makes."""
+
+LONG_BEFORE = 1e3
+"""Durations of a record before it from which its first value has held: any lag has settled."""
+
+RESTORING = 0.1
+"""Force between two rms positions to either side, over the typical one, with which free runs do not drift."""

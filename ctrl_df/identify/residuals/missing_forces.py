@@ -16,10 +16,11 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.thresholds import NOISE_ORDER
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
 from ..thresholds import DEPENDENT, NOTHING, SLOWLY
-from .thresholds import FINER, FREE_ORDER, FREE_STEPS, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
+from .thresholds import FINER, FREE_STEPS, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,13 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     units = dict(zip("xf", facts(record).units, strict=True))
     if data.disturbed:
         # the residual is of forces here, as the fits see it
-        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=FREE_ORDER)
+        noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
     found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
-        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=FREE_ORDER)
+        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER)
         found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):

@@ -52,9 +52,6 @@ AFTER_REVERSAL = 0.15
 REGION_SAMPLES = 60
 """Independent samples of a region at least."""
 
-FREE_ORDER = 12
-"""Order of the noise model of a residual, while free forces are fitted to it."""
-
 FREE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
 """Range of a quantity left out at either end, as a quantile, and steps of a free force over it."""
 

@@ -8,7 +8,7 @@ results are the same however many run at once.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -136,35 +136,63 @@ def tried(
     resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in begun for a in found]
-    course = _Course(run, screen, span, 1 if known else KEPT, HOPELESS * reached)
+    rounds = _Rounds(run, screen, span, 1 if known else KEPT, HOPELESS * reached)
     later = {c.id: c.generalizes for c in kinds if c.generalizes in kinds}
-    course.fit([a for a in attempts if a.key not in later], min(screen.base.rmse, reached))
-    again = [a for a in attempts if a.key in later and course.promises(later[a.key].id)]
-    course.fit(again, course.least)
-    return [course.best[c.id] for c in kinds if c.id in course.best]
+    best = rounds.fitted(
+        [a for a in attempts if a.key not in later], _Best({}, min(screen.base.rmse, reached))
+    )
+    again = [a for a in attempts if a.key in later and best.promises(later[a.key].id, screen.base.rmse)]
+    best = rounds.fitted(again, best)
+    return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
 
-class _Course:
-    """Fits of many effects against each other: `best` of each, the `least` error of all."""
+@dataclass(frozen=True, eq=False)
+class _Best:
+    """The best fit of every effect so far, and the least error of any model."""
 
-    def __init__(self, run, screen: Screen, span: float, kept: int, near: float):
-        self.run, self.screen, self.span, self.kept, self.near = run, screen, span, kept, near
-        self.best: dict[str, CandidateFit] = {}
-        self.least = math.inf
+    fits: Mapping[str, CandidateFit]
+    least: float
 
-    def promises(self, key: str) -> bool:
-        """Whether an effect has come so near that one which contains it may be the right one."""
-        if key not in self.best:
+    def promises(self, key: str, base: float) -> bool:
+        """Whether an effect has come so near that one which contains it may be the right one.
+
+        `base`: error of the model without it.
+        """
+        if key not in self.fits:
             return False
-        error, base = self.best[key].train.rmse, self.screen.base.rmse
+        error = self.fits[key].train.rmse
         explained, most = base**2 - error**2, base**2 - self.least**2
         return error < HOPELESS * self.least and explained > PROMISES * most
 
-    def fit(self, attempts: list[Attempt], least: float) -> None:
-        """Bring the attempts that have a chance against an error of `least` to their end."""
+
+@dataclass(frozen=True, eq=False)
+class _Rounds:
+    """How fits of many effects go against each other.
+
+    Attributes
+    ----------
+    run : callable
+        Runs jobs side by side.
+    screen : Screen
+    span : float
+        Stroke of the records [m].
+    kept : int
+        Fits of an effect that go on after the first steps.
+    near : float
+        Error that a fit must be able to come below.
+    """
+
+    run: Callable
+    screen: Screen
+    span: float
+    kept: int
+    near: float
+
+    def fitted(self, attempts: list[Attempt], best: _Best) -> _Best:
+        """Bring the attempts that have a chance against the best to their end; return the best then."""
         # those of few steps first: what they come to tells of the others which need no long look
         begun = self.run(_first, [(a, self.near) for a in attempts if not a.multimodal])
-        least = min([least, *(a.error for a in begun)])
+        least = min([best.least, *(a.error for a in begun)])
         begun += self.run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
         begun = [a for a in begun if itself(a.trial, self.span)]
         kept = _best(begun, self.kept)
@@ -176,11 +204,12 @@ class _Course:
         least = min([least, *(t.train.rmse for t in found)])
         rest = [a for a in begun if not any(a is o for o in ahead)]
         found += self.run(_finish, [(a, self.screen.data, HOPELESS * least) for a in rest])
+        fits = dict(best.fits)
         for t in found:
-            known = self.best.get(t.key)
+            known = fits.get(t.key)
             if itself(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
-                self.best[t.key] = t
-        self.least = min([least, *(t.train.rmse for t in found)])
+                fits[t.key] = t
+        return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
 
 def _screened(begun, screen: Screen) -> list[CandidateFit]:

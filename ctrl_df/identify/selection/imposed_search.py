@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from ...blocks.massless import without_answer
+from .confirmation import over
 from .structure_search import StructureSearch
 from .thresholds import FLOOR
 
@@ -18,24 +19,24 @@ class ImposedSearch(StructureSearch):
     count, nothing begins anew in them, and their length makes no difference.
     """
 
-    def _look_at(self, data, which):
-        super()._look_at(replace(data, robust=True), 1)
-        self.segmentations = 3 * [self.data]
+    def segmentations(self, data):
+        """Return the data in segments of one length; errors far beyond the usual one count linearly only."""
+        return 3 * [replace(data, robust=True).segmentations[1]]
 
     def disturbs(self, error, data):
         """Whether disturbance forces make an error of the output that hides all else: none does here."""
         return False
 
-    def candidates(self, classes, executor=None):
+    def candidates(self, classes, executor=None, course=None):
         """Return every effect that answers a motion with a force, fitted, that of most evidence first."""
-        return super().candidates([c for c in classes if without_answer([c]) is None], executor)
+        return super().candidates([c for c in classes if without_answer([c]) is None], executor, course)
 
     @property
     def measure(self) -> str:
         """What errors are of."""
         return "force"
 
-    def _stages(self, fits):
+    def stages(self, at, fits):
         """Return the fits over all segments, once."""
-        there = self._stage(self.data, fits, fits, math.inf)
+        there = over(at.data, fits, fits, math.inf)
         return [there], FLOOR * min(f.rmse for f in there if f is not None)

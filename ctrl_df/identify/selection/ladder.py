@@ -25,8 +25,8 @@ from .neighbours import Around, Look
 from .revision import Revision, revised
 from .search import Search
 from .structure import Structure, plainness
-from .thresholds import BRANCHES, CONFIRMED, SHOWS_HARDLY
-from .verdict import diagnosed, worth
+from .thresholds import BRANCHES, CONFIRMED, FLOOR, SHOWS_HARDLY
+from .verdict import Diagnosed, diagnosed, worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +40,16 @@ class Rung:
     search : Search
     found : Diagnosis
     steps : tuple of Step
-        How it was come to; the last one is its own.
+        How it was come to, errors over the data that judge it; the last one is its own.
+    before : Rung or None
+        From which it was come to.
     """
 
     structure: Structure
     search: Search
     found: Diagnosis
     steps: tuple[Step, ...]
+    before: Rung | None = None
 
     @property
     def next(self) -> CandidateEffect | None:
@@ -55,6 +58,19 @@ class Rung:
         if not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
             return None
         return plainest(ranking)
+
+    @property
+    def way(self) -> list[Rung]:
+        """The rungs that led to it, itself the last."""
+        return [*(self.before.way if self.before else ()), self]
+
+    def without_next(self, doubt: str) -> Rung:
+        """Return the same where what was to be added next is not, and why."""
+        found = replace(
+            self.found, verdict=UNKNOWN, doubts=(*self.found.doubts, doubt),
+            explanation=f"{self.found.explanation} {doubt}",
+        )  # fmt: skip
+        return replace(self, found=found, steps=(*self.steps[:-1], replace(self.steps[-1], diagnosis=found)))
 
 
 def plainest(ranking) -> CandidateEffect:
@@ -93,7 +109,7 @@ class Climb:
 
     def to_the_end(self) -> Study:
         """Return the end of the ladder and its neighbours."""
-        end, around = self._settled(self._up(self.start, ()))
+        end, around = self._settled(self._up(self.start, None))
         for rung, effect in islice(self._rivals(end), BRANCHES):
             if end.found.verdict != UNKNOWN:
                 break
@@ -102,21 +118,13 @@ class Climb:
             self.best = None
             if other is not None:
                 end, around = self._settled(self._on(other))
-        self.course.stage("all models over the same data")
-        steps = list(end.steps)
-        again = end.search.final([s.model for s in steps], self.free)
-        if again is not None:
-            steps = [
-                replace(s, model=m, nrmse=e, nrmse_holdout=h, parameters=_values(m))
-                for s, (m, e, h) in zip(steps, again, strict=True)
-            ]
-        return self._study(steps, end.search, COMPLETE, around)
+        return self._study(end.steps, end.search, COMPLETE, around)
 
     # --- up -------------------------------------------------------------------------------------------
 
-    def _up(self, structure: Structure, steps, how: dict | None = None) -> Rung:
+    def _up(self, structure: Structure, before: Rung | None, how: dict | None = None) -> Rung:
         """Climb from a structure until nothing more is found."""
-        return self._on(self._rung(structure, steps, how or {}))
+        return self._on(self._rung(structure, before, how or {}))
 
     def _on(self, rung: Rung) -> Rung:
         while (best := rung.next) is not None:
@@ -127,11 +135,17 @@ class Climb:
             if revision.structure.key in self.rungs:
                 break
             how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
-            rung = self._rung(revision.structure, rung.steps, how)
+            ahead = self._rung(revision.structure, rung, how)
+            if not self._beats(_reached(ahead), rung.structure.block, ahead.search):
+                rung = rung.without_next(_lost(best, ahead))
+                self.rungs[rung.structure.key] = rung
+                break
+            rung = ahead
         return rung
 
-    def _rung(self, structure: Structure, steps, how: dict) -> Rung:
+    def _rung(self, structure: Structure, before: Rung | None, how: dict) -> Rung:
         """Ask of a structure what it misses."""
+        steps = before.steps if before else ()
         self.course.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
         last = steps[-1] if steps else None
@@ -142,14 +156,26 @@ class Climb:
                 errors = last.nrmse, last.nrmse_holdout
             return _step(found, found.model, errors, how)
 
-        def so_far(found: Diagnosis) -> Study:
-            return self.best or self._study((*steps, told(found)), search, UNDER_WAY)
+        def so_far(known: Diagnosed) -> Study:
+            return self.best or self._study((*steps, told(known.diagnosis)), known.search, UNDER_WAY)
 
         room = len(structure.added) < self.max_effects
-        found = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
-        rung = Rung(structure.at(found.model), search, found, (*steps, told(found)))
+        known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
+        found = known.diagnosis
+        steps = self._judged((*steps, told(found)), known.search)
+        rung = Rung(structure.at(found.model), known.search, found, steps, before)
         self.rungs[structure.key] = rung
         return rung
+
+    def _judged(self, steps: tuple[Step, ...], search: Search) -> tuple[Step, ...]:
+        """Return steps with the errors of their models over the data that judge the last one."""
+        again = search.final([s.model for s in steps], self.free)
+        if again is None:
+            return steps
+        return tuple(
+            replace(s, model=m, nrmse=e, nrmse_holdout=h, parameters=_values(m))
+            for s, (m, e, h) in zip(steps, again, strict=True)
+        )
 
     def _beside(self, rung: Rung, effect: CandidateEffect) -> Revision:
         """Add an effect, and look again at those before it."""
@@ -169,7 +195,7 @@ class Climb:
             structure, how = better
             if structure.key == end.structure.key:
                 refound.add(structure.key)
-            end = self._up(structure, end.steps, _exchanged(how))
+            end = self._up(structure, end, _exchanged(how))
         return end, self._around(end)[1]
 
     def _around(self, end: Rung) -> tuple[Around, Neighbours]:
@@ -204,16 +230,12 @@ class Climb:
     def _seen(self, end: Rung) -> list[Effect]:
         """Return effects that left less error at an earlier step, with the values of the last such one."""
         found: dict[str, Effect] = {}
-        for rung in reversed([r for r in self._way(end) if r is not end]):
+        for rung in reversed(end.way[:-1]):
             ranking = sorted(rung.found.ranking, key=lambda c: c.nrmse)
             for c in ranking:
                 if c.confirmed and c.nrmse < rung.found.nrmse:
                     found.setdefault(c.id, c.effect)
         return list(found.values())[:CONFIRMED]
-
-    def _way(self, end: Rung) -> list[Rung]:
-        """Return the rungs that led to an end, it included."""
-        return [r for r in self.rungs.values() if any(r.steps[-1] is s for s in end.steps)]
 
     # --- again from below -----------------------------------------------------------------------------
 
@@ -223,7 +245,7 @@ class Climb:
         Within a step by the error left: of several effects that are missing none need show by itself.
         """
         found = []
-        for rung in self._way(end):
+        for rung in end.way:
             followed = rung.next
             named = {followed.id, *followed.equivalents} if followed is not None else set()
             ranking = sorted((c for c in rung.found.ranking if c.confirmed), key=lambda c: c.nrmse)
@@ -250,16 +272,15 @@ class Climb:
             "instead": tuple(e for e in new if e not in gone),
             "evidence": effect.evidence - max(rung.found.ranking[0].evidence, 0.0),
         }
-        other = self._rung(structure, end.steps, how)
-        following = other.next
-        ahead = other.structure.block if following is None else following.model
-        return other if self._beats(ahead, end.structure.block, other.search) else None
+        other = self._rung(structure, end, how)
+        return other if self._beats(_reached(other), end.structure.block, other.search) else None
 
     def _beats(self, block, end, search: Search) -> bool:
-        """Whether a model does better than the end of the ladder, on the data of a search."""
+        """Whether a model does better than another on the data of a search, held out too."""
         fits = [search.fitted(b, self.free(b), 6) for b in (end, block)]
         judged = search.ranked(fits[0], [replace(fits[1], extra=fits[1].extra - fits[0].extra)])[0]
-        return judged.evidence > search.significant
+        held = [search.errors(f)[1] for f in fits]
+        return judged.evidence > search.significant and not held[1] > FLOOR * held[0]
 
     # --- what is known --------------------------------------------------------------------------------
 
@@ -287,6 +308,20 @@ def _step(found: Diagnosis, model, errors, how: dict) -> Step:
 
 def _values(model) -> dict[str, float]:
     return {k: p.value for k, p in model.parameters.items()}
+
+
+def _reached(rung: Rung):
+    """Return the model of a rung with what is to be added next: over long segments one may need the other."""
+    return rung.structure.block if rung.next is None else rung.next.model
+
+
+def _lost(best: CandidateEffect, ahead: Rung) -> str:
+    """Return why an effect was not added that did better over other parts of the data."""
+    name, errors = best.id.replace("_", " "), [s.nrmse_holdout for s in ahead.steps[-2:]]
+    return (
+        f"With {name} the model did better over the parts that judged it, but not over those that it bears "
+        f"itself: held out it errs by {errors[1]:.2%} there, without it by {errors[0]:.2%}."
+    )
 
 
 def _added(effect: CandidateEffect) -> dict:

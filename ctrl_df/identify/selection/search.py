@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from ..course import Course
 from ..results.diagnosis import Diagnosis
@@ -68,14 +69,14 @@ class Words:
 
 
 class Search(ABC):
-    """The fits of one diagnosis.
+    """The fits of one diagnosis, as far as they have come: a value that `candidates` and `confirm` make anew.
 
     Attributes
     ----------
     block : Mechanism
         The model as it stands.
     base : Judged
-        The model refitted; it may improve as the search goes on.
+        The model refitted.
     free : tuple of str
         Parameters of the model that are refitted.
     significant, significant_held : float
@@ -85,22 +86,29 @@ class Search(ABC):
     words : Words
     kind : type
         Class of the answer.
-    course : Course
-        Hears of the candidates as they stand, best first.
     first_look : sequence of Judged
         The candidates as they were before any was confirmed.
     """
 
     block: Any
-    base: Any
     free: tuple[str, ...]
     significant: float
     significant_validation: float
     measure: str
     words: Words
     kind: type[Diagnosis] = Diagnosis
-    course: Course = Course()
     first_look: Sequence[Judged] = ()
+
+    def after(self, **found) -> Self:
+        """Return the search as it stands after this was found; it itself stays what it is."""
+        other = copy.copy(self)
+        vars(other).update(found)
+        return other
+
+    @property
+    @abstractmethod
+    def base(self) -> Any:
+        """The model refitted."""
 
     @property
     @abstractmethod
@@ -108,8 +116,16 @@ class Search(ABC):
         """The data to fit, and those held out."""
 
     @abstractmethod
-    def candidates(self, classes, executor=None) -> list[Any]:
-        """Return every effect that can be added, fitted, that of most evidence first."""
+    def candidates(self, classes, executor=None, course: Course | None = None) -> tuple[Self, list[Any]]:
+        """Return the search that knows them, and every effect fitted that can be added, best evidence first.
+
+        Parameters
+        ----------
+        classes : sequence of effect classes
+        executor : concurrent.futures.Executor or None
+        course : Course or None
+            Hears of the same as it stands on the way.
+        """
 
     def rivals(self, model, names, classes, executor=None) -> list[Any]:
         """Return effects that may do what a model of one effect more does, with evidence over it, best first.
@@ -124,13 +140,16 @@ class Search(ABC):
         classes : sequence of effect classes
         executor : concurrent.futures.Executor or None
         """
-        found = self.candidates(classes, executor)  # first: it decides what errors are of
-        known, more = self.fitted(model, names, 2), len(names) - len(self.free)
-        return self.ranked(known, [replace(t, extra=t.extra - more) for t in found])
+        search, found = self.candidates(classes, executor)
+        known, more = search.fitted(model, names, 2), len(names) - len(self.free)
+        return search.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
-    def confirm(self, found) -> list[Any]:
-        """Refit baseline and best candidates with all care; return these, best first."""
+    def confirm(self, found, course: Course | None = None) -> tuple[Self, list[Any]]:
+        """Refit baseline and best candidates with all care; return the search that knows them, and these.
+
+        `found`, what is returned: candidates, best first; `course`: see `candidates`.
+        """
 
     @abstractmethod
     def errors(self, judged) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,15 @@ from .search import Remainder, Search
 from .thresholds import FLOOR
 
 
-def diagnosed(search: Search, classes, executor=None, course: Course | None = None, limits=None) -> Diagnosis:
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """What a search came to, and the search as it then stands."""
+
+    diagnosis: Diagnosis
+    search: Search
+
+
+def diagnosed(search: Search, classes, executor=None, course: Course | None = None, limits=None) -> Diagnosed:
     """Try effects, confirm the best candidates, and say what they amount to.
 
     Parameters
@@ -37,17 +45,20 @@ def diagnosed(search: Search, classes, executor=None, course: Course | None = No
     executor : concurrent.futures.Executor or None
         Runs candidates side by side; None: threads of this process do.
     course : Course or None
-        Hears of the diagnosis as it stands.
+        Hears of the same as it stands.
     limits : mapping or None
         What the next experiment may do to the machine.
     """
-    asked = _Asked(search, time.perf_counter(), dict(limits or {}))
-    if course is not None:
-        search.course = course.within(asked.so_far)
-    search.first_look = found = search.candidates(classes, executor)
-    chosen = search.confirm(found)
-    search.course.stage("verdict")
-    return asked.answer(chosen, found)
+    began, limits = time.perf_counter(), dict(limits or {})
+
+    def so_far(known) -> Diagnosed:
+        return _Asked(known[0], began, limits).so_far(known[1])
+
+    course = (course or Course()).within(so_far)
+    search, found = search.candidates(classes, executor, course)
+    search, chosen = search.confirm(found, course)
+    course.stage("verdict")
+    return _Asked(search, began, limits).answer(chosen, found, course)
 
 
 class _Asked:
@@ -56,7 +67,7 @@ class _Asked:
     def __init__(self, search: Search, began: float, limits):
         self.search, self.began, self.limits = search, began, limits
 
-    def so_far(self, found: Sequence) -> Diagnosis:
+    def so_far(self, found: Sequence) -> Diagnosed:
         """Return the diagnosis as it stands with these candidates, best first; it names no effect."""
         search = self.search
         chosen = [t for t in found if t.confirmed]
@@ -66,9 +77,9 @@ class _Asked:
         verdict = NONE if search.exact() else AMBIGUOUS if told else UNKNOWN
         best = chosen[0] if chosen else search.base
         result, _ = self._made(verdict, ranking, search.so_far(best), best, self._base(), UNDER_WAY)
-        return replace(result, explanation=explain_so_far(result, search.words))
+        return Diagnosed(replace(result, explanation=explain_so_far(result, search.words)), search)
 
-    def answer(self, chosen: Sequence, found: Sequence) -> Diagnosis:
+    def answer(self, chosen: Sequence, found: Sequence, course: Course) -> Diagnosed:
         """Return what confirmed candidates amount to, `found` beside them."""
         search = self.search
         best = chosen[0] if chosen else search.base
@@ -91,10 +102,10 @@ class _Asked:
             verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
         base, doubts = self._base(), ()
         if verdict == EFFECT:
-            search.course.stage("free prediction over long stretches")
+            course.stage("free prediction over long stretches")
             verdict, ranking, doubts = doubted(ranking, base, search.significant)
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
-        return replace(result, explanation=explain(result, search.words) + note)
+        return Diagnosed(replace(result, explanation=explain(result, search.words) + note), search)
 
     def _base(self) -> Baseline:
         search = self.search

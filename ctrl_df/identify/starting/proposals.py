@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import itertools
 
+from .thresholds import PROPORTIONAL_SIZES, SIZES
+
 
 def proposals(cls, screen) -> list:
     """Return effects of one class to begin with: those it suggests to a `Screen`, or sizes of all kinds."""
@@ -28,7 +30,7 @@ def _generic(cls, screen):
         return
     name, spec = main
     usual = screen.scales.of(spec["unit"])
-    sizes = (0.02, 0.1, 0.4) if cls.proportional else (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+    sizes = PROPORTIONAL_SIZES if cls.proportional else SIZES
     signs = (1.0, -1.0) if spec["lower"] < 0 and not cls.proportional else (1.0,)
     for size, sign in itertools.product(sizes, signs):
         try:

@@ -18,7 +18,7 @@ from ..estimation.scales import Scales
 from ..prediction.segments import facts, load_of
 from .extend import extended
 from .own_laws import Columns, allowed, own_columns
-from .thresholds import STRONG
+from .thresholds import DRY_LEAST, MOVING, STRONG, VISCOUS_LEAST
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,8 @@ def own_values(block, weights, scales: Scales) -> dict[str, float] | None:
     if mass <= 0 and heavy(block):
         return None
     names = (inertia(block), dry_level(block), viscous_slope(block))
-    sizes = (mass, max(kinetic, 0.01 * scales.force), max(slope, 1e-3 * scales.force / scales.speed))
+    dry, viscous = DRY_LEAST * scales.force, VISCOUS_LEAST * scales.force / scales.speed
+    sizes = (mass, max(kinetic, dry), max(slope, viscous))
     return {k: float(v) for k, v in zip(names, sizes, strict=True) if k is not None}
 
 
@@ -156,7 +157,7 @@ def force_regression(motion: Motion, scales: Scales, block, extra=()):
     left : float
         Mean squared force that remains [N^2].
     """
-    moving = np.abs(motion.v) > 0.03 * scales.speed
+    moving = np.abs(motion.v) > MOVING * scales.speed
     v, force = motion.v[moving], motion.u[moving]
     matrix = np.column_stack([
         motion.a[moving] * heavy(block),

@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..estimation.fit import FitResult
 from .extend import extended
 from .screen import Screen
-from .thresholds import JOINT_DAMPING, JOINTS_TRIED, RESONANCES
+from .thresholds import JOINT_DAMPING, JOINT_GAIN, JOINTS_TRIED, RESONANCES
 
 
 def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]:
@@ -25,7 +25,7 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
         stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
         block = extended(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
         if block is not None:
-            found.append(screen.data.fit(block, (), iterations=1, tolerance=3e-2))
+            found.append(screen.data.fit(block, (), iterations=1))
     near = sorted(found, key=lambda f: f.rmse)[:JOINTS_TRIED]
-    again = [screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=3e-2) for f in near]
+    again = [screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=JOINT_GAIN) for f in near]
     return sorted(again, key=lambda f: f.rmse)[:count]

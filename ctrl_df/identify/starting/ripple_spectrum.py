@@ -22,7 +22,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..prediction.segments import facts
-from .thresholds import RIPPLE_COARSEST, RIPPLE_STEP, RIPPLE_TURNS, SPECTRUM_SAMPLES
+from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING
+from .thresholds import (
+    RIPPLE_COARSEST,
+    RIPPLE_LONGEST,
+    RIPPLE_STEP,
+    RIPPLE_TURNS,
+    RUN_LEAST,
+    SPECTRUM_SAMPLES,
+)
 
 _PLAIN = ("dry", "linear", "constant")
 
@@ -88,7 +96,7 @@ class RippleSpectrum:
         if not self.span > 0 or not self._power > 0:
             return []
         finest = self.span / (RIPPLE_COARSEST * max(_blur(r) for r in self.records))
-        turns = np.arange(0.6, max(min(finest, RIPPLE_TURNS), 2.0), RIPPLE_STEP)
+        turns = np.arange(RIPPLE_LONGEST, max(min(finest, RIPPLE_TURNS), 2.0), RIPPLE_STEP)
         gains = self._scan(turns)
         found: list[Wave] = []
         while len(found) < count and np.max(gains) > 0:
@@ -137,14 +145,14 @@ class RippleSpectrum:
         columns = [self._white([np.real(p) for p in pair]), self._white([np.imag(p) for p in pair])]
         a = self._without(np.array(columns).T).T
         g, h = a @ self._left, a @ a.T
-        h[np.diag_indices(2)] += 1e-9 * np.trace(h) + 1e-300
+        h[np.diag_indices(2)] += DEPENDENT * np.trace(h) + NOTHING
         share = float(g @ np.linalg.solve(h, g)) / self._power
-        return -0.5 * len(self._left) * math.log(max(1 - share, 1e-12))
+        return -0.5 * len(self._left) * math.log(max(1 - share, NEARLY_NOTHING))
 
     def _regressed(self, columns) -> np.ndarray:
         matrix = np.array([self._white(c) for c in columns]).T
-        size = np.linalg.norm(matrix, axis=0) + 1e-300
-        return np.linalg.lstsq(matrix / size, self._white(self._y), rcond=1e-12)[0] / size
+        size = np.linalg.norm(matrix, axis=0) + NOTHING
+        return np.linalg.lstsq(matrix / size, self._white(self._y), rcond=NEARLY_NOTHING)[0] / size
 
     def _without(self, x) -> np.ndarray:
         return x - self._basis @ (self._basis.T @ x)
@@ -203,7 +211,7 @@ def _smoothed(record) -> np.ndarray:
 def _blur(record) -> float:
     """Return the error of the smoothed position [m]."""
     known = facts(record)
-    return max(known.noise / math.sqrt(2 * known.half), 1e-9 * known.position)
+    return max(known.noise / math.sqrt(2 * known.half), NOISE_FREE * known.position)
 
 
 def _runs(segments, size) -> list[tuple[int, int]]:
@@ -214,7 +222,7 @@ def _runs(segments, size) -> list[tuple[int, int]]:
             runs[-1][1] = int(j)
         else:
             runs.append([int(i), int(j)])
-    return [(i, i + (j - i) // size * size) for i, j in runs if (j - i) // size > 12]
+    return [(i, i + (j - i) // size * size) for i, j in runs if (j - i) // size > RUN_LEAST]
 
 
 def _length(signal) -> int:
@@ -230,5 +238,5 @@ def _weights(left) -> np.ndarray:
     n = len(power)
     middles = np.unique(np.geomspace(2, n - 1, 40).astype(int))
     level = [np.median(power[max(int(m / 1.4) - 2, 1) : int(m * 1.4) + 3]) / math.log(2) for m in middles]
-    logs = np.interp(np.log(np.arange(1, n)), np.log(middles), np.log(np.array(level) + 1e-300))
+    logs = np.interp(np.log(np.arange(1, n)), np.log(middles), np.log(np.array(level) + NOTHING))
     return np.append(0.0, np.exp(-0.5 * logs))

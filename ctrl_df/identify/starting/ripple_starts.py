@@ -10,7 +10,7 @@ import numpy as np
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import RippleSpectrum, Wave
-from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_STEP
+from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, WAVE_TRIED
 
 
 def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
@@ -26,7 +26,7 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
         ``make(amplitude, wavelength, phase)``, the effect.
     """
     span = float(np.ptp(screen.motion.x))
-    turns = np.arange(0.6, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP)
+    turns = np.arange(RIPPLE_LONGEST, LONG_WAVE_TURNS[screen.bodies - 1], RIPPLE_STEP)
     tried = ((turn, long_wave(screen, make, span / turn)) for turn in turns)
     found = {turn: wave for turn, wave in tried if wave is not None}
     best = []
@@ -42,7 +42,7 @@ def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, 
 
     None where it cannot be simulated.
     """
-    size, pair = 0.01 * screen.scales.force, []
+    size, pair = WAVE_TRIED * screen.scales.force, []
     for phase in (0.0, math.pi / 2):
         block = extended(screen.block, make(size, wavelength, phase))
         change = None if block is None else screen.change(block)

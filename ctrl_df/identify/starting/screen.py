@@ -17,11 +17,13 @@ from ..estimation.fit import FitResult
 from ..estimation.scales import Scales
 from ..estimation.segmented import SegmentedData
 from ..estimation.starts import carried
+from ..thresholds import NOTHING
 from .extend import extended
 from .proposals import proposals
 from .regression import ForceFit, Start, force_fit, motion_of, regressed
 from .ripple_spectrum import Wave
 from .ripple_starts import long_wave, long_waves, waves
+from .thresholds import AS_IT_IS, FACTOR_MOST
 from .value_grid import value_grid
 
 
@@ -146,7 +148,7 @@ def _judged(effect, screen, total) -> Iterator[Start]:
         # For a small effect the change is proportional to it: scale it to the residual.
         factor = float(change @ screen.residual) / power
         scaled = _scaled(effect, factor)
-        if scaled is not None and not 0.8 < factor < 1.25:
+        if scaled is not None and not 1 / AS_IT_IS < factor < AS_IT_IS:
             again = extended(screen.block, scaled)
             moved = None if again is None else screen.change(again)
             if again is not None and moved is not None:
@@ -156,7 +158,7 @@ def _judged(effect, screen, total) -> Iterator[Start]:
 
 def _scaled(effect, factor):
     name, p = next(iter(effect.parameters.items()))
-    value = p.value * min(max(factor, -300.0), 300.0)
+    value = p.value * min(max(factor, -FACTOR_MOST), FACTOR_MOST)
     if value < p.lower or value > p.upper or (p.strict and value <= p.lower) or value == 0:
         return None
     return effect.replace(**{name: value})
@@ -164,5 +166,5 @@ def _scaled(effect, factor):
 
 def _apart(a, b):
     return any(
-        abs(x - y) > 0.25 * max(abs(x), abs(y), 1e-300) for x, y in zip(a.values, b.values, strict=True)
+        abs(x - y) > 0.25 * max(abs(x), abs(y), NOTHING) for x, y in zip(a.values, b.values, strict=True)
     )

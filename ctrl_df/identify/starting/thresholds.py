@@ -25,3 +25,32 @@ are sought there, of one body and of two (200 runs of the segments then, a secon
 RIPPLE_TURNS, RIPPLE_STEP, RIPPLE_COARSEST = 400.0, 0.3, 6.0
 """Ripples tried: wavelengths to the stroke at most; between two of them (one turn apart they are orthogonal);
 shortest wavelength over the error of the smoothed position."""
+
+PROPORTIONAL_SIZES, SIZES = (0.02, 0.1, 0.4), (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+"""Sizes of an effect of which nothing is known, over the natural one: where the change of the output is
+proportional to them, and what is left scaled; of any other, half a decade apart."""
+
+AS_IT_IS, FACTOR_MOST = 1.25, 300.0
+"""Factor up to which such a start is not scaled; by which it is at most: beyond nothing is proportional."""
+
+MOVING = 0.03
+"""Speed, over the typical one, from which a sample tells of forces: below, friction may be anything."""
+
+DRY_LEAST, VISCOUS_LEAST = 0.01, 1e-3
+"""Regressed dry and viscous friction at least, over the typical force: fits move them by factors."""
+
+JOINT_GAIN = 3e-2
+"""Relative gain of the cost at which the initial states of a joint are found well enough to compare it."""
+
+RIPPLE_LONGEST = 0.6
+"""Wavelengths to the stroke at least: of a longer wave a stroke shows no more than of a spring."""
+
+WAVE_TRIED = 0.01
+"""Amplitude of a ripple whose change of the output is simulated, over the typical force: linear still."""
+
+RUN_LEAST = 12
+"""Samples of a part of a record without holes that is asked for ripples, at least."""
+
+GRID_RANGE, GRID_STEPS, GRID_CONTRAST = (0.3, 3.0), (10, 4000), 0.9
+"""Steps of a sensor that rounds: about the one whose error is the one seen, by half a decade; how many are
+tried (and samples asked), at least and at most; contrast over the largest from which a grid stands out."""

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from .thresholds import GRID_CONTRAST, GRID_RANGE, GRID_STEPS
+
 
 def value_grid(y, noise: float) -> float:
     """Return the step of the grid: where the mean of exp(2 pi j y / step) has modulus near one.
@@ -22,15 +24,16 @@ def value_grid(y, noise: float) -> float:
         return 0.0
     # An error of the size seen belongs to a step of sqrt(12) times it; look half a decade to both sides.
     guess = math.sqrt(12) * noise
-    low, high = 0.3 * guess, min(3.0 * guess, 2 * span)
-    count = int(min(max((1 / low - 1 / high) * span * 6, 10), 4000))
+    low, high = GRID_RANGE[0] * guess, min(GRID_RANGE[1] * guess, 2 * span)
+    fewest, most = GRID_STEPS
+    count = int(min(max((1 / low - 1 / high) * span * 6, fewest), most))
     inverse = np.linspace(1 / high, 1 / low, count)
-    some = y[:: max(1, len(y) // 4000)]
+    some = y[:: max(1, len(y) // most)]
     contrast = _contrast(some, inverse)
     # Finer grids that hold this one fit as well: of all that stand out, the coarsest.
     inner = contrast[1:-1]
     tops = 1 + np.flatnonzero(
-        (inner >= contrast[:-2]) & (inner >= contrast[2:]) & (inner > 0.9 * contrast.max())
+        (inner >= contrast[:-2]) & (inner >= contrast[2:]) & (inner > GRID_CONTRAST * contrast.max())
     )
     at = int(tops[0]) if len(tops) else int(np.argmax(contrast))
     fine = np.linspace(inverse[max(at - 1, 0)], inverse[min(at + 1, count - 1)], 201)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..course import Course
 from ..estimation.common_friction import inertia
 from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
@@ -97,7 +98,12 @@ class TableSearch(Search):
             )
         self.inside = self.points.take(self.train)
         self.scales = table_scales(block, self.points)
-        self.base = self._trial("", self._fit_base(), 0)
+        self._base = self._trial("", self._fit_base(), 0)
+
+    @property
+    def base(self):
+        """The model refitted."""
+        return self._base
 
     @property
     def records(self):
@@ -134,10 +140,11 @@ class TableSearch(Search):
 
     # --- every effect ---------------------------------------------------------------------------------
 
-    def candidates(self, classes, executor=None):
+    def candidates(self, classes, executor=None, course=None):
         """Return every effect that can be added, fitted roughly to some points, the best first."""
         if not classes:
-            return []
+            return self, []
+        course = course or Course()
         size = np.abs(self.inside.weight * self.base.error[self.train])
         few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
@@ -150,22 +157,26 @@ class TableSearch(Search):
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         found = []
-        self.course.stage(f"{len(jobs)} effects tried on some points")
+        course.stage(f"{len(jobs)} effects tried on some points")
         for r in run(try_effect, jobs):
-            self.course.done()
+            course.done()
             if r is not None:
                 found.append(self._trial(*r, work=WORK_MEDIUM))
-                self.course.known(self.ranked(self.base, found))
-        return self.ranked(self.base, found)
+                course.known((self, self.ranked(self.base, found)))
+        ranked = self.ranked(self.base, found)
+        return self.after(first_look=ranked), ranked
 
-    def confirm(self, found):
+    def confirm(self, found, course=None):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
-        self.course.stage("the best fitted to all points")
-        best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
+        (course or Course()).stage("the best fitted to all points")
+        base, best = (
+            self.base,
+            [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE],
+        )
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
             try:
-                begin = self.base.block.with_parameters(values)
+                begin = base.block.with_parameters(values)
             except ValueError:
                 continue
             again = self._trial(
@@ -173,9 +184,9 @@ class TableSearch(Search):
                 fit_table(begin, self.inside, self.free, self.scales, iterations=TABLE_ITERATIONS["rebase"]),
                 0,
             )
-            if again.cost < self.base.cost:
-                self.base = again
-        return self.ranked(self.base, best)
+            if again.cost < base.cost:
+                base = again
+        return self.after(_base=base), self.ranked(base, best)
 
     def _confirmed(self, tried: TableTrial) -> TableTrial:
         kind = tried.block.effects[-1]

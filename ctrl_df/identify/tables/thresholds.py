@@ -107,6 +107,3 @@ multiples of the usual size of a parameter that has no default."""
 FLAT_SINGULAR, FLAT_COLUMN, FLAT_INVERSE = 1e-5, 1e-6, 1e-8
 """Singular value, over the largest, of a direction that a table does not determine; slope, over the largest,
 of a parameter that it does not; singular value that an inverse takes at least."""
-
-TAKES_PART = 0.1
-"""Component of such a direction from which a parameter takes part in it."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import NOTHING
+from ..thresholds import NOTHING, TAKES_PART
 from .fit import FittedTable
-from .thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR, TAKES_PART
+from .thresholds import FLAT_COLUMN, FLAT_INVERSE, FLAT_SINGULAR
 
 
 def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[str, str]]:

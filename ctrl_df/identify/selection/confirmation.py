@@ -1,0 +1,268 @@
+"""The best candidates refitted with all care: at the full rate, over the longest segments that they bear."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...simulate.crew import side_by_side
+from ..estimation.fit import FitResult
+from ..estimation.multistart import (
+    all_restarted,
+    begun_as,
+    beyond,
+    cross_started,
+    own,
+    restarted,
+    thresholds_refined,
+)
+from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.thresholds import RESTARTS_KEPT
+from ..prediction.segments import facts
+from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE
+from .attempts import itself
+from .evidence import ranked, rounds
+from .standing import Standing
+from .thresholds import (
+    CONFIRMED,
+    CONFIRMED_FORCED,
+    EFFORT_CONFIRMED,
+    EFFORT_ENDED,
+    EXPLAINS_LITTLE,
+    FLOOR,
+    PROMISING,
+    STOPPED_EARLY,
+    STRUCTURE_LEAST,
+)
+
+Stages = list[list[FitResult | None]]
+"""Fits in segments of every length, short ones first: the baseline's, then of candidates; None: hopeless."""
+
+
+def confirmed(
+    at: Standing, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+) -> tuple[Standing, list[CandidateFit]]:
+    """Refit baseline and best candidates at the full rate; return these, best first, and what judges them.
+
+    Parameters
+    ----------
+    at : Standing
+    found : sequence of CandidateFit
+        Of the first look, best first.
+    staged : callable
+        ``staged(standing, fits)``, such as `stages`.
+    told, stage : callable
+        See `FirstLook.of`.
+    """
+    stage("the best refitted over segments of every length")
+    # Disturbance forces let the first look tell little.
+    found = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
+    fits, floor = staged(at, [at.base.train, *(t.train for t in found)])
+    stage("the best refitted at the full rate, and tried on what is held out")
+    data, judged = _judged(at, (at.base, *found), fits)
+    base, *others = [t for t in judged if t is not None]
+    # what contains the baseline never errs more where both are fitted as well
+    base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
+    chosen, noise = ranked(base, others)
+    at = replace(at, data=data, base=base, noise=noise, floor=floor)
+    if not chosen:
+        return at, []
+    told(at, chosen)
+    stage("near ones begun again where the best one ended")
+    chosen = _to_the_end(at, chosen)
+    span = max(float(np.ptp(facts(r).place)) for r in data.train.records)
+    chosen, noise = ranked(base, [t for t in chosen if itself(t, span)])
+    return replace(at, noise=noise), chosen
+
+
+def _judged(
+    at: Standing, tried: Sequence[CandidateFit], stages: Stages
+) -> tuple[SegmentedData, list[CandidateFit | None]]:
+    """Return the data in segments of the length that suits them, and the models validated there.
+
+    `tried`: the baseline and the candidates, best first.
+    """
+    levels, best = list(at.segmentations), _longest_coherent(stages)
+    if best == 0 and not at.data.disturbed:
+        # Longer segments show what no candidate explains: hidden states, fitted anew in many short ones,
+        # would pass for it.
+        short = levels[0].continued
+        again = side_by_side(
+            lambda f: short.moved(f) if f is not None and short.carries(f.model) else f, stages[0]
+        )
+        levels, stages = [short, *levels[1:]], [again, *stages[1:]]
+        best = _longest_coherent(stages)
+    # An error of whole steps of the sensor is averaged out by long segments, followed by short ones.
+    averaged = len(tried) > 1 and rounds(tried[1]) and not at.data.disturbed
+    if averaged:
+        best = len(stages) - 1
+    judged = _validated(levels[best], tried, stages[best])
+    while best and not averaged and _held_out_by_luck(judged, levels[best - 1], stages[best - 1]):
+        best -= 1
+        judged = _validated(levels[best], tried, stages[best])
+    return levels[best], judged
+
+
+def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
+    """Return models at the full rate, from their fits in some segments, and run on what is held out.
+
+    None stands for those that have no fit there.
+    """
+    fine = data.fine
+
+    def at_full_rate(pair):
+        t, fit = pair
+        train = fit and fine.moved(fit, *EFFORT_CONFIRMED)
+        return train and fine.validate(replace(t, train=train, confirmed=True))
+
+    return side_by_side(at_full_rate, zip(tried, fits, strict=True))
+
+
+def _held_out_by_luck(judged, shorter: SegmentedData, fits) -> bool:
+    """Whether the nearest model's error grows from shorter segments where they are held out, but not fitted.
+
+    Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
+    it is luck whether a model does, and no merit.
+
+    `judged`: models in these segments; `shorter`, `fits`: the next shorter ones, and the fits there.
+    """
+    i = min((i for i, t in enumerate(judged) if t is not None), key=lambda i: judged[i].train.rmse)
+    there = shorter.fine.validate(judged[i]).validation_rmse
+    fitted = max(judged[i].train.rmse / fits[i].rmse, 1.0)
+    return judged[i].validation_rmse > GROWTH * fitted * there
+
+
+# --- segments of every length -------------------------------------------------------------------------
+
+
+def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
+    """Return the fits in segments of every length that may judge, and their floor.
+
+    The floor is the error that a fit can come down to at best: over short segments nearly every model
+    follows. Where disturbance forces prevail the shortest segments alone may judge.
+    """
+    shortest, middle, longest = at.segmentations
+    short = side_by_side(shortest.moved, fits)
+    floor = FLOOR * min(f.rmse for f in short)
+    if at.data.disturbed:
+        return [short], floor
+    near = over(middle, fits, short, floor)
+    pairs = zip(near, over(longest, near, near, floor), strict=True)
+    near, far = zip(*side_by_side(lambda pair: _both_ways(middle, longest, *pair), pairs), strict=True)
+    return [short, list(near), list(far)], floor
+
+
+def _both_ways(shorter: SegmentedData, longer: SegmentedData, near: FitResult | None, far: FitResult | None):
+    """Return the fits of a model in shorter and in longer segments, each begun again where the other ended.
+
+    Of laws with events the cost has many minima, other ones over other segments: what one fit has missed the
+    other may have come near to. Where long segments show no more error than short ones both are right.
+    """
+    if near is None or far is None or not far.model.nonsmooth or far.rmse <= FLOOR * near.rmse:
+        return near, far
+    back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
+    there = longer.moved(back, hopeless=far.rmse)
+    return min(near, back, key=lambda f: f.rmse), min(far, there, key=lambda f: f.rmse)
+
+
+def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | None]:
+    """Move the baseline and the best candidate to other segments, then those with a chance against them.
+
+    `before`: the fits in segments that these are made of: no fit over longer ones can err less than that
+    over the parts of them.
+    """
+    errors = [math.inf if f is None else f.rmse for f in before]
+    ahead = [0, *([1 + int(np.argmin(errors[1:]))] if len(errors) > 1 else [])]
+    found: list[Any] = [None] * len(fits)
+    for i, f in zip(ahead, side_by_side(data.reached, [fits[i] for i in ahead]), strict=True):
+        found[i] = f
+    hopeless = HOPELESS * min(found[i].rmse for i in ahead)
+    others = [i for i, e in enumerate(errors) if i not in ahead and e < hopeless]
+    moved = side_by_side(lambda i: data.moved(fits[i], hopeless=hopeless), others)
+    for i, f in zip(others, moved, strict=True):
+        found[i] = f
+    there = [i for i, f in enumerate(found) if f is not None]
+    for i, f in zip(there, all_restarted([found[i] for i in there], data, floor), strict=True):
+        found[i] = f
+    return found
+
+
+def _longest_coherent(stages: Stages) -> int:
+    """Return the level to judge at: the longest segments over which the best model's error does not grow.
+
+    Where the best grows with the length (motion that is sensitive to its start, force noise in a real
+    machine, an effect outside the library) short segments are clearer, provided that they show what is
+    missing as well as long ones do.
+    """
+    errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]
+    base, best = [e[0] for e in errors], [min(e) for e in errors]
+    at = 0
+    while at + 1 < len(errors) and best[at + 1] <= GROWTH * best[at]:
+        at += 1
+    if (
+        at + 1 < len(errors)
+        and best[at] > EXPLAINS_LITTLE * base[at]
+        and _left(base, best, at) > _left(base, best, -1)
+    ):
+        return len(errors) - 1
+    return at
+
+
+def _left(base, best, at) -> float:
+    """Return the share of the baseline's error beyond noise that the best leaves; 1 where hardly any is."""
+    noise = best[0] ** 2
+    there = base[at] ** 2 - noise
+    return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > STRUCTURE_LEAST * noise else 1.0
+
+
+# --- to the end ---------------------------------------------------------------------------------------
+
+
+def _to_the_end(at: Standing, chosen: list[CandidateFit]) -> list[CandidateFit]:
+    """Tell near equals apart by fits that have come to an end, and in the right minimum."""
+    chosen = _again(at, chosen, chosen[:1])
+    near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
+    least = min(t.train.rmse for t in chosen)
+    close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
+    close = [t for t in close if t.train.rmse < HOPELESS * least]
+    ended = side_by_side(lambda t: _ended(at, t, t in near and len(near) > 1, least), close)
+    if any(a is not b for a, b in zip(ended, close, strict=True)):
+        chosen = _again(at, [*ended, *(t for t in chosen if t not in close)], ended)
+    return chosen
+
+
+def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
+    """Return a candidate in its best minimum, unless nothing better is possible.
+
+    `exactly`: iterated to the end first. `least`: error of the best of all.
+    """
+    fine, fit = at.data.fine, tried.train
+    if exactly:
+        fit = fine.moved(fit, *EFFORT_ENDED)
+    if own(fit) and fit.rmse > at.floor and least > at.floor and not fine.disturbed:
+        fit = restarted(fit, fine.fit, own(fit), beyond(fit, least))
+    return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)
+
+
+def _again(at: Standing, chosen, those) -> list[CandidateFit]:
+    """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
+    fine = at.data.fine
+    pairs = [(t, best) for best in those for t in chosen if t is not best]
+    begun = side_by_side(lambda pair: cross_started(pair[0], pair[1], fine), pairs)
+    judged, _ = ranked(at.base, [*chosen, *(t for t in begun if t is not None)])
+    return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
+
+
+def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:
+    """Return the candidates to confirm: the first two, and all near the best by evidence or by error.
+
+    `most`: of them by evidence, `share` of the best one's that is near.
+    """
+    close = sorted(found, key=lambda t: t.train.rmse)[:3]
+    close = [t for t in close if t.train.rmse < STILL_POSSIBLE * close[0].train.rmse]
+    likely = [*found[:2], *(t for t in found[2:most] if t.evidence > share * found[0].evidence)]
+    return likely + [t for t in close if not any(t is o for o in likely)]

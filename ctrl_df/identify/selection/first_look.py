@@ -1,0 +1,144 @@
+"""Every effect tried coarsely: over short segments, by accelerations or over long segments where need be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ...simulate.crew import side_by_side
+from ..estimation.fit import FitResult
+from ..estimation.segmented import CandidateFit, SegmentedData
+from ..starting.screen import Screen
+from ..thresholds import BY_CHANCE, GROWTH
+from .attempts import tried
+from .evidence import ranked
+from .standing import Standing
+from .thresholds import CONFIRMED, EFFORT_MOVED, EXPLAINS_LITTLE, LEFT, SHOWS_HARDLY
+
+
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """How every effect is tried.
+
+    Attributes
+    ----------
+    classes : sequence of effect classes
+    free : tuple of str
+        Parameters of the model that are refitted.
+    nominal : mapping
+        Values of the model as the user has them.
+    disturbs : callable
+        ``disturbs(error, data)``: whether an error over the shortest segments is one that disturbance forces
+        make.
+    executor : concurrent.futures.Executor or None
+    """
+
+    classes: list
+    free: tuple[str, ...]
+    nominal: dict[str, float]
+    disturbs: Callable[[float, SegmentedData], bool]
+    executor: object = None
+
+    def of(self, at: Standing, told: Callable, stage: Callable) -> tuple[Standing, list[CandidateFit]]:
+        """Return every effect that can be added, fitted, the one with most evidence first, and by what.
+
+        Parameters
+        ----------
+        at : Standing
+            On which the search begins.
+        told : callable
+            ``told(standing, found)`` hears of what is known on the way.
+        stage : callable
+            Hears in words what is done.
+        """
+        stage(f"{len(self.classes)} effects tried over short segments")
+        begun = at
+        base, found = self._over(at, at.data.sampled, lambda screened: told(begun, screened))
+        told(at, found)
+        if self._disturbed(at, found):
+            at = at.by_accelerations(self.free)
+            stage("the same by accelerations: disturbance forces outweigh the noise")
+            base, found = self._over(at, at.data.sampled)
+            told(at, found)
+        longest = at.segmentations[-1]
+        there = base if at.data.disturbed else longest.reached(base)
+        if there.rmse > GROWTH * base.rmse:
+            # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
+            stage("the same over long segments")
+            far = replace(at, base=CandidateFit("", there))
+            moved = _over_long_segments(far, base.rmse, found)
+            if moved is not None:
+                base, again = self._over(far, longest)
+                found = _best_of(base, [*moved, *again])
+                told(far, found)
+            # what it is compared with from here on errs over these segments
+            back = CandidateFit("", at.data.moved(there))
+            at = replace(at, base=min(at.base, back, key=lambda t: t.train.rmse))
+        return (at.rebased(found, self.free) if found else at), found
+
+    def rivals(self, at: Standing, model, names) -> list[CandidateFit]:
+        """Return effects that may do what the model of one effect more does, with evidence over it."""
+        data = at.data.sampled
+        known = data.fit(model, names, iterations=4)
+        _, found = self._tried(at, data, reached=known.rmse)
+        more = len(names) - len(self.free)
+        return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
+
+    def _over(self, at: Standing, data: SegmentedData, screened: Callable | None = None):
+        """Fit every effect over one set of segments; return baseline and effects there, best first.
+
+        `screened` takes the effects before they are fitted.
+        """
+        base, found = self._tried(at, data, screened)
+        return base, ranked(CandidateFit("", base), found)[0]
+
+    def _tried(
+        self, at: Standing, data: SegmentedData, screened: Callable | None = None, reached: float = math.inf
+    ) -> tuple[FitResult, list[CandidateFit]]:
+        base = data.moved(at.base.train, 3)
+        if not self.classes:
+            return base, []
+        screen = Screen(base, data)
+        nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
+        # where short segments show noise alone (its rms, but for chance) no minimum is right
+        most = (1 + BY_CHANCE / math.sqrt(2 * at.nearest.count)) * at.data.noise
+        shows = at.nearest.rmse > most or at.data.disturbed
+        short = at.segmentations[0].sampled if shows else data
+        return base, tried(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
+
+    def _disturbed(self, at: Standing, found) -> bool:
+        """Whether forces disturb the machine that no effect accounts for.
+
+        The baseline then errs over the shortest segments by far more than the sensor's noise, and so does the
+        best candidate; an effect that is missing would take most of that away.
+        """
+        least, shortest = at.nearest.rmse, at.segmentations[0]
+        if not self.disturbs(least, at.data):
+            return False
+        best = sorted(found, key=lambda t: t.train.rmse)[:2]
+        moved = side_by_side(lambda t: shortest.moved(t.train, hopeless=least), best)
+        return all(self.disturbs(f.rmse, at.data) and f.rmse > LEFT * least for f in moved)
+
+
+def _over_long_segments(at: Standing, here: float, found) -> list[CandidateFit] | None:
+    """Return the best by error moved to the longest segments; None where they explain enough there.
+
+    `here`: error of the baseline where the trials were fitted; that of `at` is over the longest segments.
+    """
+    if found and found[0].train.rmse <= EXPLAINS_LITTLE * here:
+        return None
+    longest = at.segmentations[-1]
+    best = sorted(found, key=lambda t: t.train.rmse)[:CONFIRMED]
+    moved = side_by_side(lambda t: replace(t, train=longest.moved(t.train, *EFFORT_MOVED)), best)
+    shows = found and found[0].train.rmse <= SHOWS_HARDLY * here
+    return None if shows and min(t.train.rmse for t in moved) <= 0.5 * at.base.train.rmse else moved
+
+
+def _best_of(base: FitResult, trials) -> list[CandidateFit]:
+    """Return every effect's best fit, best first."""
+    best: dict[str, CandidateFit] = {}
+    for t in trials:
+        if t.key not in best or t.train.rmse < best[t.key].train.rmse:
+            best[t.key] = t
+    return ranked(CandidateFit("", base), best.values())[0]

@@ -1,0 +1,79 @@
+"""What a search over records stands on: the data that judge, the model refitted there, the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..estimation.common_friction import dry_level, inertia, viscous_slope
+from ..estimation.fit import FitResult
+from ..estimation.noise_model import NoiseModel
+from ..estimation.segmented import CandidateFit, SegmentedData
+from ..prediction.simulator import feasible
+from ..starting.regression import force_regression, motion_of
+from .evidence import ranked
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What models are judged by at one time of a search.
+
+    Attributes
+    ----------
+    segmentations : sequence of SegmentedData
+        The data in segments of three lengths, the shortest first.
+    data : SegmentedData
+        Those that judge.
+    base : CandidateFit
+        The model refitted.
+    nearest : FitResult
+        The model over the shortest segments, which nearly every model follows, unless forces disturb it.
+    noise : NoiseModel
+        Of the best model's residual.
+    floor : float
+        Error that a fit can come down to at best; 0 where it is not known yet.
+    """
+
+    segmentations: Sequence[SegmentedData]
+    data: SegmentedData
+    base: CandidateFit
+    nearest: FitResult
+    noise: NoiseModel
+    floor: float = 0.0
+
+    def by_accelerations(self, free: tuple[str, ...]) -> Standing:
+        """Return the same where disturbance forces drown all else over longer segments.
+
+        `free`: parameters of the model that are refitted.
+        """
+        segmentations = self.segmentations[0].with_process_noise.segmentations
+        data = segmentations[0]
+        base = CandidateFit("", data.fit(self.nearest.model, free))
+        return replace(self, segmentations=segmentations, data=data, base=base, noise=ranked(base, ())[1])
+
+    def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Standing:
+        """Refit the model from what the best candidates say of its parameters: it may have been stuck."""
+        base = self.base
+        for best in found[:2]:
+            values = {k: best.block.parameters[k].value for k in free}
+            again = self.data.fit(
+                base.block.with_parameters(feasible(base.block, values)), free, iterations=8
+            )
+            if again.rmse < base.train.rmse:
+                base = CandidateFit("", again)
+        return replace(self, base=base)
+
+
+def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Standing:
+    """Fit a model from its own values and from a regression of the force; return what the better comes to."""
+    shortest, data = segmentations[:2]
+    begins = [block]
+    names = (inertia(block), dry_level(block), viscous_slope(block))
+    plain, own, *_ = force_regression(motion_of(data.train, data.thin, block), data.scales, block)
+    guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
+    guess = {k: v for k, v in guess.items() if k in free}
+    if guess:
+        begins.append(block.with_parameters(feasible(block, guess)))
+    fits = [data.moved(shortest.fit(begin, free, iterations=8), 12) for begin in begins]
+    base = CandidateFit("", min(fits, key=lambda f: f.rmse))
+    return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])
