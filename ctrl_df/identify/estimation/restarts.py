@@ -11,6 +11,7 @@ import numpy as np
 
 from ..prediction.sensed import sensed
 from .outputs import States
+from .states import over_beginnings
 from .thresholds import (
     BETTER,
     EFFORT_BEGUN,
@@ -96,6 +97,9 @@ def _ends(stage, theta, k, some, trials, powers):
     for start in begun:
         ended = alone.over([some], [start]).solve(np.zeros(0), *EFFORT_BEGUN, False, restarts=False)
         yield ended.states.values[0], some.means(ended.residual[0] ** 2)
+    grown = over_beginnings(alone.over([some], None), restarts=False)
+    if grown is not None:
+        yield grown.states.values[0], some.means(grown.residual[0] ** 2)
     problem.count(alone.problem.nfev)
 
 

@@ -25,6 +25,7 @@ from .segmented_records import SegmentedRecords
 from .starts import carried, same_begins
 from .thresholds import (
     BRIEF,
+    EFFORT_ALONE,
     EFFORT_STATES,
     FILTERED,
     HOLDOUT_PARTS,
@@ -256,6 +257,14 @@ class SegmentedData:
             block, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance, hopeless=hopeless
         )
 
+    def states_alone(self, model, view, starts=None) -> FitResult:
+        """Return a model with the initial states of segments fitted to their end, each by itself."""
+        iterations, tolerance = EFFORT_ALONE
+        return self.fit(
+            model, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance,
+            followed=RESTARTS_KEPT,
+        )  # fmt: skip
+
     def rtol_of(self, block) -> float:
         """Return the tolerance of a model's simulations: events that come and go want the finest."""
         return RTOL if block.nonsmooth else self.rtol
@@ -318,12 +327,9 @@ class SegmentedData:
                 near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
             )
             model = near.model
-        starts = same_begins(near, view.segments)
         # single segments may have begun in a wrong minimum: each goes on by itself
-        near = rough.fit(
-            model, (), view=getattr(rough, name), starts=starts, iterations=8, followed=RESTARTS_KEPT
-        )
-        return self.fit(model, (), view=view, starts=near.starts, iterations=4, followed=RESTARTS_KEPT)
+        near = rough.states_alone(model, getattr(rough, name), same_begins(near, view.segments))
+        return self.states_alone(model, view, near.starts)
 
 
 def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:

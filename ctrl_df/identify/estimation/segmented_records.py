@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..data.measurement import Measurement
 from ..prediction.segments import Segments, split
 from ..prediction.sensed import sensed
-from .thresholds import SEGMENT_LEAST
+from .thresholds import BEGINNINGS, SEGMENT_LEAST
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,18 @@ class SegmentedRecords:
         """Return up to `factor` times as many segments over the same samples, none too short."""
         pairs = zip(self.records, self.segments, strict=True)
         return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
+
+    def beginnings(self) -> Iterator[SegmentedRecords]:
+        """Yield the beginnings of the segments, shortest first, each once; then the segments as they are."""
+        whole, before = [len(w.samples) for w in self.segments], [0]
+        for share in BEGINNINGS:
+            pairs = zip(self.shorter(share).segments, self.segments, strict=True)
+            first = tuple(parts.only(np.isin(parts.begins, w.begins)) for parts, w in pairs)
+            lengths = [len(w.samples) for w in first]
+            if lengths not in (before, whole):
+                before = lengths
+                yield replace(self, segments=first)
+        yield self
 
     def every(self, step: int) -> SegmentedRecords:
         """Return every `step`-th segment."""

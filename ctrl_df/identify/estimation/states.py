@@ -10,43 +10,39 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..prediction.segments import split
 from ..thresholds import NOTHING
 from .elimination import states_for
 from .noise_model import power
-from .thresholds import BEGINNINGS, DAMPED, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN, SEGMENT_LEAST
+from .segmented_records import SegmentedRecords
+from .thresholds import DAMPED, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN
 
 
 def find_states(stage) -> list[np.ndarray]:
     """Return the initial states of a stage: found at once, or over the beginnings of its segments first.
 
-    The longer a segment, the more minima its error has over the state it begins in; a short beginning
-    hardly has any. Each way can end in a wrong one: the better counts.
+    Each way can end in a wrong minimum: the better counts.
     """
-    none = np.zeros(0)
-    found = [stage.solve(none, *EFFORT_ALONE, robust=False)]
-    starts = None
-    for first in _beginnings(stage):
-        begun = stage.over(first, starts).solve(none, *EFFORT_BEGUN, robust=False)
-        starts = begun.states.values
-    if starts is not None:
-        again = stage.over(stage.segments, starts)
-        found.append(again.solve(none, *EFFORT_ALONE, robust=False))
+    found = [stage.solve(np.zeros(0), *EFFORT_ALONE, robust=False)]
+    grown = over_beginnings(stage)
+    if grown is not None:
+        found.append(grown)
     return min(found, key=lambda f: power(f.residual)).states.values
 
 
-def _beginnings(stage):
-    """Yield the beginnings of the segments, shortest first, each once."""
-    known = [stage.segments]
-    for share in BEGINNINGS:
-        first = []
-        for record, segments in zip(stage.problem.records, stage.segments, strict=True):
-            parts = split(record, segments, share, SEGMENT_LEAST)
-            first.append(parts.only(np.isin(parts.begins, segments.begins)))
-        ends = [w.ends for w in first]
-        if not any(all(map(np.array_equal, ends, [w.ends for w in k])) for k in known):
-            known.append(first)
-            yield first
+def over_beginnings(stage, restarts=True):
+    """Return what a stage comes to over the beginnings of its segments first; None: they are too short.
+
+    The longer a segment, the more minima its error has over the state it begins in; a short beginning
+    hardly has any. `restarts`: as for `multiple_shooting.Stage.solve`.
+    """
+    none, starts = np.zeros(0), None
+    *first, _ = SegmentedRecords(tuple(stage.problem.records), tuple(stage.segments)).beginnings()
+    for part in first:
+        begun = stage.over(part.segments, starts).solve(none, *EFFORT_BEGUN, False, restarts)
+        starts = begun.states.values
+    if starts is None:
+        return None
+    return stage.over(stage.segments, starts).solve(none, *EFFORT_ALONE, False, restarts)
 
 
 def descend(stage, begun, iterations: int, tolerance: float):

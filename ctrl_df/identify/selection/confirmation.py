@@ -34,6 +34,7 @@ from .thresholds import (
     EFFORT_ENDED,
     EXPLAINS_LITTLE,
     FLOOR,
+    LITTLE_LUCK,
     PROMISING,
     STOPPED_EARLY,
     STRUCTURE_LEAST,
@@ -128,12 +129,18 @@ def _held_out_by_luck(judged, shorter: SegmentedData, fits) -> bool:
     Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
     it is luck whether a model does, and no merit.
 
-    `judged`: models in these segments; `shorter`, `fits`: the next shorter ones, and the fits there.
+    Where that is little of what the baseline leaves, luck decides nothing.
+
+    `judged`: models in these segments, the baseline first; `shorter`, `fits`: the next shorter ones, and the
+    fits there.
     """
-    i = min((i for i, t in enumerate(judged) if t is not None), key=lambda i: judged[i].train.rmse)
-    there = shorter.fine.validate(judged[i]).validation_rmse
-    fitted = max(judged[i].train.rmse / fits[i].rmse, 1.0)
-    return judged[i].validation_rmse > GROWTH * fitted * there
+    nearest, fit = min(
+        ((t, f) for t, f in zip(judged, fits, strict=True) if t is not None), key=lambda p: p[0].train.rmse
+    )
+    if nearest.validation_rmse < LITTLE_LUCK * judged[0].validation_rmse:
+        return False
+    fitted = max(nearest.train.rmse / fit.rmse, 1.0)
+    return nearest.validation_rmse > GROWTH * fitted * shorter.fine.validate(nearest).validation_rmse
 
 
 # --- segments of every length -------------------------------------------------------------------------

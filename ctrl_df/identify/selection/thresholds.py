@@ -95,6 +95,10 @@ comparison at eight lengths."""
 RIVALS = 2
 """Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
 
+LITTLE_LUCK = 0.1
+"""Error of the nearest model held out, of the baseline's, below which it matters little whether luck made
+it: a hundredth of the mean square that evidence is about."""
+
 BRANCHES = 3
 """Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
 hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
