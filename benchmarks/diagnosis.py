@@ -28,9 +28,9 @@ from diagnosis_peers import PEERS
 
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.estimation.segmented import prepare
-from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.improve import improve
 from ctrl_df.identify.refit import refit
+from ctrl_df.identify.shooting.variables import default_free
 
 PAIRS = (
     ("position_ripple", "input_delay"),

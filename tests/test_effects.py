@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.estimation.scales import Scales
+from ctrl_df.identify.shooting.scales import Scales
 from ctrl_df.units import dimension
 
 LIBRARY = cdf.effect_library()

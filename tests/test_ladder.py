@@ -8,10 +8,10 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.course import Course
-from ctrl_df.identify.selection.ladder import Climb
-from ctrl_df.identify.selection.revision import revised
+from ctrl_df.identify.ladder.climb import Climb
+from ctrl_df.identify.ladder.revision import revised
+from ctrl_df.identify.ladder.structure import Structure
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
-from ctrl_df.identify.selection.structure import Structure
 from ctrl_df.identify.starting.extend import applicable, extended
 
 MADE = {

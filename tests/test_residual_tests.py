@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from ctrl_df.identify.estimation.noise_model import noise_model
 from ctrl_df.identify.residuals import regions as where
 from ctrl_df.identify.residuals import residual_tests as tests
+from ctrl_df.identify.shooting.noise_model import noise_model
 
 T = 1e-3 * np.arange(6000)
 

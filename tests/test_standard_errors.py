@@ -9,8 +9,8 @@ from scipy.signal import lfilter
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.estimation.covariance import _widening
 from ctrl_df.identify.estimation.fit import fit_records
-from ctrl_df.identify.estimation.noise_model import noise_model
 from ctrl_df.identify.estimation.noise_spectrum import noise_spectrum
+from ctrl_df.identify.shooting.noise_model import noise_model
 
 N, DT = 4000, 1e-3
 

@@ -7,12 +7,12 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
-from ctrl_df.identify.estimation.variables import default_free
 from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.selection.rounding import rounding_evidence
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
+from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
 from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating

@@ -5,7 +5,7 @@ import math
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.estimation.variables import Variable
+from ctrl_df.identify.shooting.variables import Variable
 
 FREE = cdf.Mass(2.0).with_effect(cdf.Hysteresis(4.0, stroke=0.1)).parameters["hysteresis.stroke"]
 

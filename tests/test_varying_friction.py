@@ -8,15 +8,15 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.estimation.noise_model import (
+from ctrl_df.identify.prediction.initial_states import MEASURED
+from ctrl_df.identify.prediction.segments import make_segments
+from ctrl_df.identify.prediction.simulator import Simulator
+from ctrl_df.identify.shooting.noise_model import (
     acceleration_filter,
     noise_model,
     prediction_error_filter,
     whitened_power,
 )
-from ctrl_df.identify.prediction.initial_states import MEASURED
-from ctrl_df.identify.prediction.segments import make_segments
-from ctrl_df.identify.prediction.simulator import Simulator
 
 DT = 1e-3
 

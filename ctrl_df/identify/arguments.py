@@ -14,8 +14,8 @@ from ..units import dimension
 from .data.imposed import imposes_motion
 from .data.measurement import Measurement
 from .data.quantities import quantity_of
-from .estimation.variables import default_free
 from .prediction.sensed import OUTPUT_COLUMNS
+from .shooting.variables import default_free
 from .thresholds import ON_SAMPLE, SEGMENT_SAMPLES
 
 MODES = ("auto", "free", "windows")

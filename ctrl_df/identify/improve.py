@@ -7,8 +7,8 @@ from ..checks import executor as checked_executor
 from .arguments import check_quantities, effect_classes, free_parameters, mechanism_of
 from .course import Course
 from .datasets.choice import dataset_of
+from .ladder.climb import Climb
 from .results.ladder import Step, Study
-from .selection.ladder import Climb
 
 __all__ = ["Step", "Study", "improve"]
 

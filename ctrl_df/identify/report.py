@@ -74,8 +74,8 @@ def _record(record) -> str:
 
 def _known(study):
     """Refit the final model once more for its standard errors; None where that fails."""
-    from .estimation.variables import default_free
     from .refit import refit
+    from .shooting.variables import default_free
 
     names = default_free(study.model)
     try:

@@ -6,10 +6,7 @@ from types import MappingProxyType
 
 from ..arguments import check_window
 from ..estimation.fit import segment_lengths
-from ..estimation.multiple_shooting import Stage
-from ..estimation.problem import Problem
 from ..estimation.refit_records import blurred, doubts, refit_records
-from ..estimation.states import find_states
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..planning.inputs import input_that_separates
 from ..prediction.prepared import REFERENCE
@@ -18,6 +15,9 @@ from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
+from ..shooting.multiple_shooting import Stage
+from ..shooting.problem import Problem
+from ..shooting.states import find_states
 from .dataset import Dataset, Estimate
 
 

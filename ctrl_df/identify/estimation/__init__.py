@@ -1,1 +1,1 @@
-"""Fits of one model: segments, multiple shooting, initial states, noise, uncertainty."""
+"""Fits of one model, from short segments to the full rate: starts, segmentations, uncertainty."""

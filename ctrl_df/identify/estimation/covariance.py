@@ -7,8 +7,8 @@ import math
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
+from ..shooting.multiple_shooting import Solution, Stage
 from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOTHING
-from .multiple_shooting import Solution, Stage
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
 from .thresholds import FREEDOM_MOST, MANY_SEGMENTS, NOISE_LEAST, UNDETERMINED

@@ -15,14 +15,15 @@ from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
+from ..shooting.multiple_shooting import Solution, Stage
+from ..shooting.noise_model import NoiseModel
+from ..shooting.problem import Problem
+from ..shooting.thresholds import AT_BOUND, ON_BOUND
+from ..shooting.variables import default_free, step_of_sensor
 from ..thresholds import RTOL
 from .covariance import covariance_of
-from .multiple_shooting import Solution, Stage
-from .noise_model import NoiseModel
-from .problem import Problem
 from .sensitivity import OutputSensitivity
-from .thresholds import AT_BOUND, EFFORT_SHORT, ON_BOUND, RESTARTS_KEPT
-from .variables import default_free, step_of_sensor
+from .thresholds import EFFORT_SHORT, RESTARTS_KEPT
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,12 +16,12 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from ..prediction.simulator import feasible
+from ..shooting.thresholds import BETTER
 from ..thresholds import HOPELESS, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
 from .thresholds import (
-    BETTER,
     MOTOR_LEAST,
     OPEN_RANGE,
     RESTART_FACTORS,

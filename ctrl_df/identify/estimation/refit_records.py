@@ -14,12 +14,13 @@ from ..data.derivatives import step_of
 from ..data.measurement import Measurement
 from ..prediction.segments import facts
 from ..prediction.simulators import simulator_of
+from ..shooting.thresholds import SEGMENT_LEAST
+from ..shooting.variables import step_of_sensor
 from ..thresholds import PROCESS_NOISE, TAKES_PART
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .segmented import prepare
-from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, SEGMENT_LEAST
-from .variables import step_of_sensor
+from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS
 
 
 def refit_records(

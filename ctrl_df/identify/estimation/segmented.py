@@ -16,16 +16,17 @@ from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
+from ..shooting.noise_model import NoiseModel, acceleration_filter
+from ..shooting.scales import Scales, scales_of
+from ..shooting.segmented_records import SegmentedRecords
+from ..shooting.thresholds import EFFORT_ALONE
+from ..shooting.variables import RecordScales
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
-from .noise_model import NoiseModel, acceleration_filter
-from .scales import Scales, scales_of
-from .segmented_records import SegmentedRecords
 from .starts import carried, same_begins
 from .thresholds import (
     BRIEF,
-    EFFORT_ALONE,
     EFFORT_STATES,
     FILTERED,
     HOLDOUT_PARTS,
@@ -40,7 +41,6 @@ from .thresholds import (
     SEGMENTS,
     SHORTEST,
 )
-from .variables import RecordScales
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..shooting.elimination import products_of, states_for
 from ..thresholds import NEARLY_NOTHING
-from .elimination import products_of, states_for
 
 
 class OutputSensitivity:

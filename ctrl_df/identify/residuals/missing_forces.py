@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from ..estimation.noise_model import NoiseModel, noise_of_outputs
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..estimation.thresholds import NOISE_ORDER
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
+from ..shooting.noise_model import NoiseModel, noise_of_outputs
+from ..shooting.thresholds import NOISE_ORDER
 from ..thresholds import DEPENDENT, NOTHING, SLOWLY
 from .thresholds import FINER, FREE_STEPS, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..estimation.noise_model import noise_model
+from ..shooting.noise_model import noise_model
 from ..thresholds import NOTHING
 from .thresholds import AT_ROOT, BANDWIDTH, DECORRELATED, INPUT_LAGS, TWO_SIDED, WHITENESS_LAGS
 

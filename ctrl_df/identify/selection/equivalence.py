@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ...blocks.core import level
 from ...blocks.effect import static_levels
-from ..estimation.noise_model import NoiseModel, whitened_power
 from ..estimation.segmented import CandidateFit
+from ..shooting.noise_model import NoiseModel, whitened_power
 from ..thresholds import NOTHING, TOLD_APART
 from .thresholds import BUMP_LEFT, PASSED
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ..estimation.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..estimation.segmented import CandidateFit
+from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from .rounding import rounding_evidence
 from .thresholds import REFUTED
 

@@ -92,16 +92,9 @@ OUTLASTING = 2
 """Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 
-RIVALS = 2
-"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
-
 LITTLE_LUCK = 0.1
 """Error of the nearest model held out, of the baseline's, below which it matters little whether luck made
 it: a hundredth of the mean square that evidence is about."""
-
-BRANCHES = 3
-"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
-hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
 
 EFFORT_TRIED, EFFORT_BENT, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
 """Steps of the fit of an effect at most, and the relative gain of its cost that is none: one whose minimum

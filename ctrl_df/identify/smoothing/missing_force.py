@@ -12,11 +12,11 @@ from ...blocks.mechanism import Mechanism
 from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement
-from ..estimation.variables import default_free
 from ..prediction.prepared import REFERENCE
 from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
+from ..shooting.variables import default_free
 from ..thresholds import SLOWLY
 from .curves import Curve, curve_over
 from .smoother import smooth_record

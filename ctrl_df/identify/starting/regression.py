@@ -14,8 +14,8 @@ import numpy as np
 
 from ...blocks.effect import Effect
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
-from ..estimation.scales import Scales
 from ..prediction.segments import facts, load_of
+from ..shooting.scales import Scales
 from .extend import extended
 from .own_laws import Columns, allowed, own_columns
 from .thresholds import DRY_LEAST, MOVING, STRONG, VISCOUS_LEAST

@@ -14,9 +14,9 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.fit import FitResult
-from ..estimation.scales import Scales
 from ..estimation.segmented import SegmentedData
 from ..estimation.starts import carried
+from ..shooting.scales import Scales
 from ..thresholds import NOTHING
 from .extend import extended
 from .proposals import proposals

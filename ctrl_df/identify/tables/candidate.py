@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..estimation.scales import Scales
+from ..shooting.scales import Scales
 from .errors import log_density, outlying
 from .fit import FittedTable, fit_table
 from .simulated import relative_error, simulate_table

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..estimation.scales import Scales
-from ..estimation.variables import Variable
 from ..prediction.simulator import feasible
+from ..shooting.scales import Scales
+from ..shooting.variables import Variable
 from .errors import rms
 from .points import Points
 from .simulated import relative_error, simulate_table

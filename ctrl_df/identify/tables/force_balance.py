@@ -14,8 +14,8 @@ import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
-from ..estimation.scales import Scales
 from ..prediction.simulator import feasible
+from ..shooting.scales import Scales
 from ..thresholds import NEARLY_NOTHING
 from .points import Points
 from .thresholds import (

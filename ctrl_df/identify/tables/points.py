@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data.frequency_measurement import FrequencyMeasurement
-from ..estimation.scales import Scales
+from ..shooting.scales import Scales
 from ..thresholds import NEARLY_NOTHING
 from .thresholds import SCALE_LEAST
 

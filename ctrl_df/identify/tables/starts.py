@@ -18,7 +18,7 @@ import numpy as np
 
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
-from ..estimation.scales import Scales
+from ..shooting.scales import Scales
 from ..starting.extend import extended
 from ..thresholds import NEARLY_NOTHING
 from .force_balance import ForceBalance, can_be_imposed

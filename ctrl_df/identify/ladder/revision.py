@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from .search import Search
+from ..selection.search import Search
 from .structure import Structure, exchanged
 from .thresholds import RIVALS
 

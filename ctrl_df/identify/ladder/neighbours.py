@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
+from ..selection.search import Search
+from ..selection.verdict import worth
 from ..thresholds import RULED_OUT
-from .search import Search
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import RIVALS
-from .verdict import worth
 
 
 @dataclass(frozen=True, eq=False)

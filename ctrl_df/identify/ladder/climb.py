@@ -21,12 +21,13 @@ from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
+from ..selection.search import Search
+from ..selection.thresholds import CONFIRMED, FLOOR, SHOWS_HARDLY
+from ..selection.verdict import Diagnosed, diagnosed, worth
 from .neighbours import Around, Look
 from .revision import Revision, revised
-from .search import Search
 from .structure import Structure, plainness
-from .thresholds import BRANCHES, CONFIRMED, FLOOR, SHOWS_HARDLY
-from .verdict import Diagnosed, diagnosed, worth
+from .thresholds import BRANCHES
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,75 @@
+"""Numbers of multiple shooting that were chosen, each with its reason."""
+
+from __future__ import annotations
+
+from ..thresholds import RTOL
+
+BETTER = 0.99
+"""Error over the one before that counts as a better minimum."""
+
+OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
+"""Error of a segment over the good quarter's, and over the noise, from which its start is sought anew."""
+
+GOOD = 0.25
+"""Share of the segments that are taken to be right when others are compared with them."""
+
+SIZE_PRIOR = 3.0
+"""Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
+and a half lies `PARAMETER_RANGE`."""
+
+SEGMENT_LEAST = 50
+"""Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
+
+DAMPING, DAMPING_LEAST, DAMPING_MOST = 1e-3, 1e-7, 1e4
+"""Of Levenberg and Marquardt, over the curvature: at the begin; at least, where steps are those of Gauss and
+Newton; at most, where a refused step is too short to gain."""
+
+NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL, (0.05, 0.02), 0.05
+"""Steps of scaled parameters that derivatives are differences over: the first; at least, a hundred times what
+simulations err by; at most, on a linear and on a logarithmic scale; next one over the last, at least."""
+
+OUTPUT_MOVES = 0.3
+"""Of the noise: what the output is to move by over such a step, seen well and linear still."""
+
+STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 0.1
+"""The same of initial states: of place and speed over the typical ones, of what is hidden over its reach."""
+
+SLACK_TURNED = 0.8
+"""Share of a gap from which its state is moved back."""
+
+AT_BOUND, ON_BOUND = 1e-6, 1e-9
+"""Distance of a scaled parameter from a bound that leaves no room; difference that rounding makes."""
+
+OPEN_BOUND = 1e-3
+"""Distance from a bound that a share must not reach."""
+
+LOG_MOST = 40.0
+"""Logarithm of a factor by which a parameter may be off its scale: 17 decades are any number."""
+
+NATURAL = 0.1
+"""Size of a parameter that matters, over what the scales of a record make of its unit; but of a mass."""
+
+GAP_PLACES, GAP_RATES = (0.02, 0.25, 0.5, 0.75, 0.98), (0.0, -0.2, 0.2, -0.7, 0.7)
+"""Where in a gap segments may begin, and how fast they cross it, over the typical speed."""
+
+EFFORT_ALONE, EFFORT_BEGUN, EFFORT_FOLLOWED = (8, 1e-4), (5, 1e-2), (2, 1e-2)
+"""Of initial states alone: to their end; over beginnings of segments, and where tries of them lead; behind
+one step of the parameters."""
+
+DAMPED = 4
+"""Times that a refused step of an initial state is damped tenfold: from 1e-3 to a step a tenth as long."""
+
+UNFOLLOWED = 0.7
+"""Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
+
+RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
+"""Speeds to begin a segment with, over how far the estimate may be off."""
+
+BEGINNINGS = (16, 8, 4, 2)
+"""Shares of a segment over which the state that it begins in is found first, each twice the last."""
+
+NOISE_ORDER = 12
+"""Largest order of the noise model of a residual that others are judged by."""
+
+IMPULSE_GONE = 1e-6
+"""Over its peak, an impulse response that has died out."""
