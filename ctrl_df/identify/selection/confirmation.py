@@ -158,18 +158,31 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     if at.data.disturbed:
         return [short], floor
     near = over(middle, fits, short, floor)
-    pairs = zip(near, over(longest, near, near, floor), strict=True)
-    near, far = zip(*side_by_side(lambda pair: _both_ways(middle, longest, *pair), pairs), strict=True)
+    far = over(longest, near, near, floor)
+    likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
+    pairs = zip(near, far, strict=True)
+    near, far = zip(
+        *side_by_side(lambda pair: _both_ways(middle, longest, *pair, likely), pairs), strict=True
+    )
     return [short, list(near), list(far)], floor
 
 
-def _both_ways(shorter: SegmentedData, longer: SegmentedData, near: FitResult | None, far: FitResult | None):
+def _both_ways(
+    shorter: SegmentedData,
+    longer: SegmentedData,
+    near: FitResult | None,
+    far: FitResult | None,
+    likely: float,
+):
     """Return the fits of a model in shorter and in longer segments, each begun again where the other ended.
 
     Of laws with events the cost has many minima, other ones over other segments: what one fit has missed the
-    other may have come near to. Where long segments show no more error than short ones both are right.
+    other may have come near to. Where long segments show no more error than short ones both are right;
+    `likely`: the error over long ones beyond which a model is behind for other reasons.
     """
-    if near is None or far is None or not far.model.nonsmooth or far.rmse <= FLOOR * near.rmse:
+    if near is None or far is None or not far.model.nonsmooth:
+        return near, far
+    if far.rmse <= FLOOR * near.rmse or far.rmse > likely:
         return near, far
     back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
     there = longer.moved(back, hopeless=far.rmse)
