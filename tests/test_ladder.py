@@ -186,6 +186,24 @@ def test_two_that_stood_in_for_one_are_merged():
     assert any(len(n.dropped) == 1 and n.change == "drop" for n in study.neighbours)
 
 
+def test_a_step_has_to_hold_on_the_data_that_judge_it():
+    class Short(Data):
+        def search(self, block, free):
+            # with a spring the model is judged over longer segments, where the spring explains nothing
+            self.short = "linear_spring" not in self.added(block)
+            return Given(self, block, free)
+
+        def level(self, block):
+            return 0.0 if not self.short else super().level(block)
+
+    data = Short({"": 0, "linear_spring": 900})
+    study = climb(data)
+    assert study.effects == () and study.verdict == "unknown"
+    last = study.steps[-1].diagnosis
+    assert last.doubts and "It was not added" in last.explanation and last.explanation in study.summary()
+    assert not study.neighbours.of("better")
+
+
 def test_equals_are_told_by_fewer_parameters_and_plain_terms_whatever_the_order():
     levels = {"": 0, "constant_force": 500, "asymmetric_coulomb": 501, "hysteresis": 503}
     data = Data(levels, alike=[{"constant_force", "asymmetric_coulomb"}])

@@ -47,7 +47,7 @@ def study_text(folder: Path) -> str:
         return _WHY
     from ..identify.improve import improve
 
-    study = improve(model(), embedded_data())
+    study = improve(model(), embedded_data(), progress=False)
     where = ""
     if importlib.util.find_spec("ctrl_df.identify.report") is not None:
         path = folder / "hidden-effect.html"

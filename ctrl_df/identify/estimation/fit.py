@@ -269,7 +269,7 @@ def fit_segments(
     error_filter : NoiseModel or None
         The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
-        How segments begin: `initial_states.FITTED`, `CONTINUED` or `MEASURED`.
+        How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
     hopeless : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.

@@ -44,6 +44,8 @@ class Rung:
         How it was come to, errors over the data that judge it; the last one is its own.
     before : Rung or None
         From which it was come to.
+    refused : str
+        Id of an effect that was to be added next, and is not.
     """
 
     structure: Structure
@@ -51,12 +53,13 @@ class Rung:
     found: Diagnosis
     steps: tuple[Step, ...]
     before: Rung | None = None
+    refused: str = ""
 
     @property
     def next(self) -> CandidateEffect | None:
         """The effect to be added; None where there is none."""
         ranking = self.found.ranking
-        if not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
+        if self.refused or not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
             return None
         return plainest(ranking)
 
@@ -65,13 +68,18 @@ class Rung:
         """The rungs that led to it, itself the last."""
         return [*(self.before.way if self.before else ()), self]
 
-    def without_next(self, doubt: str) -> Rung:
+    def refusing(self, effect: str, doubt: str) -> Rung:
         """Return the same where what was to be added next is not, and why."""
+        remains = f"{self.found.remains} {doubt}" if self.found.remains else ""
         found = replace(
-            self.found, verdict=UNKNOWN, doubts=(*self.found.doubts, doubt),
-            explanation=f"{self.found.explanation} {doubt}",
-        )  # fmt: skip
-        return replace(self, found=found, steps=(*self.steps[:-1], replace(self.steps[-1], diagnosis=found)))
+            self.found,
+            verdict=UNKNOWN,
+            doubts=(*self.found.doubts, doubt),
+            explanation=doubt,
+            remains=remains,
+        )
+        steps = (*self.steps[:-1], replace(self.steps[-1], diagnosis=found))
+        return replace(self, found=found, steps=steps, refused=effect)
 
 
 def plainest(ranking) -> CandidateEffect:
@@ -137,8 +145,11 @@ class Climb:
                 break
             how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
             ahead = self._rung(revision.structure, rung, how)
-            if not self._beats(_reached(ahead), rung.structure.block, ahead.search):
-                rung = rung.without_next(_lost(best, ahead))
+            gain, held = self._compared(_reached(ahead), rung.structure.block, ahead.search)
+            # what has dropped or replaced others does not need the evidence of an effect more
+            least = rung.search.significant * (-1 if revision.dropped or revision.instead else 1)
+            if gain < least or held[0] > FLOOR * held[1]:
+                rung = rung.refusing(best.id, _refused(best, held))
                 self.rungs[rung.structure.key] = rung
                 break
             rung = ahead
@@ -163,6 +174,7 @@ class Climb:
         room = len(structure.added) < self.max_effects
         known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
         found = known.diagnosis
+        self.course.stage("all models over the same data")
         steps = self._judged((*steps, told(found)), known.search)
         rung = Rung(structure.at(found.model), known.search, found, steps, before)
         self.rungs[structure.key] = rung
@@ -204,7 +216,7 @@ class Climb:
         self._known(end.steps, end.search)
         self.course.stage("every effect left out in turn")
         around = Around(end.structure, end.search, self.free)
-        around.add(end.found.ranking)
+        around.add(end.found.ranking, end.refused)
         around.drop_each()
         if end.found.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
             around.add_again(self._seen(end))
@@ -278,10 +290,14 @@ class Climb:
 
     def _beats(self, block, end, search: Search) -> bool:
         """Whether a model does better than another on the data of a search, held out too."""
-        fits = [search.fitted(b, self.free(b), 6) for b in (end, block)]
-        judged = search.ranked(fits[0], [replace(fits[1], extra=fits[1].extra - fits[0].extra)])[0]
-        held = [search.errors(f)[1] for f in fits]
-        return judged.evidence > search.significant and not held[1] > FLOOR * held[0]
+        evidence, held = self._compared(block, end, search)
+        return evidence > search.significant and not held[0] > FLOOR * held[1]
+
+    def _compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
+        """Return the evidence for a model over another on the data of a search, and both errors held out."""
+        old, new = (search.fitted(b, self.free(b), 6) for b in (other, block))
+        judged = search.ranked(old, [replace(new, extra=new.extra - old.extra)])[0]
+        return judged.evidence, (search.errors(new)[1], search.errors(old)[1])
 
     # --- what is known --------------------------------------------------------------------------------
 
@@ -316,12 +332,13 @@ def _reached(rung: Rung):
     return rung.structure.block if rung.next is None else rung.next.model
 
 
-def _lost(best: CandidateEffect, ahead: Rung) -> str:
-    """Return why an effect was not added that did better over other parts of the data."""
-    name, errors = best.id.replace("_", " "), [s.nrmse_holdout for s in ahead.steps[-2:]]
+def _refused(effect: CandidateEffect, held: tuple[float, float]) -> str:
+    """Return why an effect was not added; `held`: errors held out with it and what follows, and without."""
+    name = effect.id.replace("_", " ")
     return (
-        f"With {name} the model did better over the parts that judged it, but not over those that it bears "
-        f"itself: held out it errs by {errors[1]:.2%} there, without it by {errors[0]:.2%}."
+        f"{name.capitalize()} did better on the data that judged the model without it, but not on those that "
+        f"judge the model with it: held out that errs by {held[0]:.2%}, the model without it by "
+        f"{held[1]:.2%}. It was not added."
     )
 
 

@@ -118,10 +118,10 @@ class Around:
 
     # --- one more -------------------------------------------------------------------------------------
 
-    def add(self, ranking) -> None:
-        """Take what the diagnosis of the model says of every effect besides."""
+    def add(self, ranking, refused: str = "") -> None:
+        """Take what the diagnosis of the model says of every effect besides; one may have been `refused`."""
         for c in ranking:
-            better = c.confirmed and worth(c, self.search)
+            better = c.confirmed and c.id != refused and worth(c, self.search)
             verdict = BETTER if better else WORSE if c.evidence < -RULED_OUT else EQUAL
             errors = c.nrmse, c.nrmse_holdout
             self.far.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))

@@ -48,6 +48,11 @@ class ImposedSimulator(Simulator):
         return tuple(n for n in named if n not in initial_states.SEEN)
 
     @property
+    def apart(self) -> bool:
+        """Whether segments have initial states of their own: they share those of the record."""
+        return False
+
+    @property
     def continued(self) -> bool:
         """Whether initial states of segments have to be carried on: they are, always, within a run."""
         return False

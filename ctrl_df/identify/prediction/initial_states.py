@@ -58,7 +58,7 @@ def carried_names(core, begins: str) -> tuple[str, ...]:
 def reach(which, core, known, segments) -> np.ndarray:
     """Return how far each of the initial states `which` may be from its estimate, (nw, number of states).
 
-    `known`: `windows.facts` of the record.
+    `known`: `segments.facts` of the record.
     """
     one = np.ones(len(segments))
     errors, typical = PLACE_REACH

@@ -114,6 +114,11 @@ class Simulator:
         """Whether some of the initial states go on from one segment into the next."""
         return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
 
+    @property
+    def apart(self) -> bool:
+        """Whether segments have initial states of their own, which nothing else moves."""
+        return not self.continued
+
     def priors(self, segments: Segments) -> np.ndarray:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
         if not self.nuisances:

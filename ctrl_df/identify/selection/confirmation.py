@@ -23,7 +23,7 @@ from ..estimation.multistart import (
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
-from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE
+from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .attempts import itself
 from .evidence import ranked, rounds
 from .standing import Standing
@@ -129,7 +129,7 @@ def _held_out_by_luck(judged, shorter: SegmentedData, fits) -> bool:
     Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
     it is luck whether a model does, and no merit.
 
-    Where that is little of what the baseline leaves, luck decides nothing.
+    Where it leaves a small share of the baseline's error all the same, luck decides nothing.
 
     `judged`: models in these segments, the baseline first; `shorter`, `fits`: the next shorter ones, and the
     fits there.
@@ -137,9 +137,9 @@ def _held_out_by_luck(judged, shorter: SegmentedData, fits) -> bool:
     nearest, fit = min(
         ((t, f) for t, f in zip(judged, fits, strict=True) if t is not None), key=lambda p: p[0].train.rmse
     )
-    if nearest.validation_rmse < LITTLE_LUCK * judged[0].validation_rmse:
+    if nearest.validation_rmse <= LITTLE_LUCK * judged[0].validation_rmse:
         return False
-    fitted = max(nearest.train.rmse / fit.rmse, 1.0)
+    fitted = max(nearest.train.rmse / max(fit.rmse, NOTHING), 1.0)
     return nearest.validation_rmse > GROWTH * fitted * shorter.fine.validate(nearest).validation_rmse
 
 
@@ -160,11 +160,10 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     near = over(middle, fits, short, floor)
     far = over(longest, near, near, floor)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
-    pairs = zip(near, far, strict=True)
-    near, far = zip(
-        *side_by_side(lambda pair: _both_ways(middle, longest, *pair, likely), pairs), strict=True
+    both = side_by_side(
+        lambda pair: _both_ways(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
     )
-    return [short, list(near), list(far)], floor
+    return [short, [n for n, _ in both], [f for _, f in both]], floor
 
 
 def _both_ways(

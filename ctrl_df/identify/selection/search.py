@@ -79,7 +79,7 @@ class Search(ABC):
         The model refitted.
     free : tuple of str
         Parameters of the model that are refitted.
-    significant, significant_held : float
+    significant, significant_validation : float
         Evidence [nats] an effect needs on the data fitted, and on those held out alone.
     measure : str
         What errors are of: ``output``, ``acceleration`` or ``N``.

@@ -43,6 +43,10 @@ an rms over 500 effective samples, 1.03."""
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 """Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
 
+LITTLE_LUCK = 0.1
+"""Error held out, of the baseline's, below which it does not matter whether luck has made a part of it: 99 %
+of the power are explained in any case (rig "stop, open" of `benchmarks/verdicts.py`: 3 %)."""
+
 STRUCTURE_LEAST = 0.1
 """Power of the baseline's error beyond noise, over that of the noise, below which there is hardly any: of 200
 effective samples noise has that spread."""
@@ -91,10 +95,6 @@ where disturbance forces let it tell little."""
 OUTLASTING = 2
 """Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
 comparison at eight lengths."""
-
-LITTLE_LUCK = 0.1
-"""Error of the nearest model held out, of the baseline's, below which it matters little whether luck made
-it: a hundredth of the mean square that evidence is about."""
 
 EFFORT_TRIED, EFFORT_BENT, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
 """Steps of the fit of an effect at most, and the relative gain of its cost that is none: one whose minimum

@@ -139,7 +139,7 @@ class Stage(SegmentOutputs):
     def _descend(self, theta, states, iterations, tolerance, robust, trusts=None, slopes=None) -> Solution:
         problem = self.problem
         found = Solution(theta, states, self.residual(theta, states.values), slopes)
-        if problem.followed and not problem.names and not any(s.continued for s in self.simulators):
+        if problem.followed and not problem.names and all(s.apart for s in self.simulators):
             return descend(self, found, iterations, tolerance)
         if not problem.names and not any(a.size for a in states.values):
             iterations = 0

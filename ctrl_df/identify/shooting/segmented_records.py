@@ -26,7 +26,7 @@ class SegmentedRecords:
         return SegmentedRecords(self.records, tuple(split(r, w, factor, SEGMENT_LEAST) for r, w in pairs))
 
     def beginnings(self) -> Iterator[SegmentedRecords]:
-        """Yield the beginnings of the segments, shortest first, each once; then the segments as they are."""
+        """Yield the beginnings of the segments, shortest first, each once."""
         whole, before = [len(w.samples) for w in self.segments], [0]
         for share in BEGINNINGS:
             pairs = zip(self.shorter(share).segments, self.segments, strict=True)
@@ -35,7 +35,6 @@ class SegmentedRecords:
             if lengths not in (before, whole):
                 before = lengths
                 yield replace(self, segments=first)
-        yield self
 
     def every(self, step: int) -> SegmentedRecords:
         """Return every `step`-th segment."""

@@ -36,8 +36,7 @@ def over_beginnings(stage, restarts=True):
     hardly has any. `restarts`: as for `multiple_shooting.Stage.solve`.
     """
     none, starts = np.zeros(0), None
-    *first, _ = SegmentedRecords(tuple(stage.problem.records), tuple(stage.segments)).beginnings()
-    for part in first:
+    for part in SegmentedRecords(tuple(stage.problem.records), tuple(stage.segments)).beginnings():
         begun = stage.over(part.segments, starts).solve(none, *EFFORT_BEGUN, False, restarts)
         starts = begun.states.values
     if starts is None:

@@ -15,7 +15,7 @@ GOOD = 0.25
 
 SIZE_PRIOR = 3.0
 """Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
-and a half lies `PARAMETER_RANGE`."""
+and a quarter lies `PARAMETER_RANGE`."""
 
 SEGMENT_LEAST = 50
 """Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
@@ -57,7 +57,7 @@ EFFORT_ALONE, EFFORT_BEGUN, EFFORT_FOLLOWED = (8, 1e-4), (5, 1e-2), (2, 1e-2)
 one step of the parameters."""
 
 DAMPED = 4
-"""Times that a refused step of an initial state is damped tenfold: from 1e-3 to a step a tenth as long."""
+"""Times that a refused step of an initial state is damped tenfold: from 1e-3 to 1, a step half as long."""
 
 UNFOLLOWED = 0.7
 """Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
@@ -66,7 +66,8 @@ RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
 """Speeds to begin a segment with, over how far the estimate may be off."""
 
 BEGINNINGS = (16, 8, 4, 2)
-"""Shares of a segment over which the state that it begins in is found first, each twice the last."""
+"""Parts that a segment is divided into: the state that it begins in is found over the first of them, then
+over twice that."""
 
 NOISE_ORDER = 12
 """Largest order of the noise model of a residual that others are judged by."""

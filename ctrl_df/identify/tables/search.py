@@ -169,10 +169,8 @@ class TableSearch(Search):
     def confirm(self, found, course=None):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
         (course or Course()).stage("the best fitted to all points")
-        base, best = (
-            self.base,
-            [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE],
-        )
+        base = self.base
+        best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
             try:

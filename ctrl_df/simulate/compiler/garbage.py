@@ -26,7 +26,8 @@ class FewerCollections(event.Listener):
             self._within += 1
             if self._within == 1:
                 self._usual = gc.get_threshold()
-                gc.set_threshold(*COLLECTED)
+                if 0 < self._usual[0] < COLLECTED[0]:  # else the user wants fewer still, or none
+                    gc.set_threshold(*COLLECTED)
 
     def on_end(self, event):
         """Leave everything as it was, after the outermost."""
