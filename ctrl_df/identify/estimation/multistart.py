@@ -158,9 +158,9 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
     block = tried.block.with_parameters(feasible(tried.block, shared))
     starts = data.starts_as(block, data.train.records, nearer.train)
     near = data.fit(block, (), starts=starts, iterations=4, hopeless=tried.train.rmse)
-    if near.rmse < tried.train.rmse:
+    if near.rmse < BETTER * tried.train.rmse:
         fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
-        if fitted.rmse < tried.train.rmse:
+        if fitted.rmse < BETTER * tried.train.rmse:
             return data.validate(replace(tried, train=fitted))
     return tried
 
