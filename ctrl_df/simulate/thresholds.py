@@ -204,9 +204,6 @@ EXPONENTIAL_SHARE, CURVED_SHARE = 1e-3, 0.1
 """Share of an eps at which its series ends: twelve squarings make four eps of it; and where steps
 double one by one."""
 
-SHARED = 16
-"""Parts of an input's step, at most, of which another step is a whole number: samples that make one step."""
-
 AHEAD = 1.5
 """Steps ahead of which kinks on their way out of a delay are looked for."""
 
@@ -214,6 +211,9 @@ AHEAD = 1.5
 
 NEAR = 1e-3
 """Times the tolerance: how far a step may be from a known length, relative to it."""
+
+ALIKE = 1e-6
+"""Relative difference of two steps below which they count as the same length."""
 
 PACED_SHARE = 0.1
 """Share of a step's tolerance that one between samples may have: many of them stand for one."""

@@ -49,7 +49,7 @@ from ..program.layout import (
 from ..thresholds import AFFINE_SHARE, FORCING_SHARE, SLOTS, TERMS, UNIT
 from .roots import first_root
 
-LENGTHS = 4  # of steps whose propagators are kept: inputs of four samples a step are met in as many
+LENGTHS = 2  # of steps whose propagators are kept
 RANKS = (
     4  # kinds of propagators for each length where laws are curved, see `ctrl_df.simulate.kernel.exponential`
 )

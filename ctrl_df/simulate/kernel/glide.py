@@ -23,11 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.compiled import part
-from ..dynamics.matrices import row_times
+from ..dynamics.matrices import multiply, row_times
 from ..dynamics.mechanics import mechanism
 from ..dynamics.modes import settle
 from ..program import layout as L
 from ..thresholds import (
+    ALIKE,
     EPS,
     EXPONENTIAL_HALVINGS,
     EXPONENTIAL_SHARE,
@@ -38,7 +39,6 @@ from ..thresholds import (
     NEAR,
     PACED_SHARE,
     RANK_PATIENCE,
-    SHARED,
     STIFF,
 )
 from .affine import LENGTHS, RANKS, Memory, entry, forget_uses, ranks, recall
@@ -64,8 +64,7 @@ class Glide(NamedTuple):
     """
 
     length: np.ndarray  # (LENGTHS,): steps of this run [s]; of an earlier one: less than zero; 0: none
-    newest: np.ndarray  # (2,): which was learnt last; how many this run has learnt
-    born: np.ndarray  # (LENGTHS,): the how-manieth of this run it was; 0: none of this run
+    newest: np.ndarray  # (1,): which was learnt last
     first: np.ndarray  # (SLOTS * LENGTHS * ranks, rows + 1): where a row begins in `column` and `value`
     column: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
     value: np.ndarray  # (SLOTS * LENGTHS * ranks, room)
@@ -89,8 +88,7 @@ def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
     nz = n + 2 * nr + 2 if usable else 0
     rows = n + margins + ny if usable else 0
     return Glide(
-        np.zeros(LENGTHS), np.zeros(2, np.int64), np.zeros(LENGTHS, np.int64),
-        np.zeros((used, rows + 1), np.int64),
+        np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
         np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
         np.zeros((used, margins), np.int64), np.zeros(used, np.int64), np.zeros((used, margins), np.int64),
         np.zeros((used, margins), np.int64),
@@ -107,10 +105,8 @@ def forget_run(store, tracks):
     Matrices are: they are the same whoever has them made.
     """
     forget_uses(store)
-    tracks.newest[1] = 0
     for which in range(LENGTHS):
         tracks.length[which] = -abs(tracks.length[which])
-        tracks.born[which] = 0
 
 
 @part
@@ -467,7 +463,7 @@ def _known(tracks, length, near):
 
 @part
 def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_tick):
-    """Learn a new length of step in place of an older one, if steps go on like it; -1 if not."""
+    """Learn a new length of step in place of the older one, if steps go on like it; -1 if not."""
     ahead, s, i = t1, segment, index
     regular = False
     for _ in range(2):  # every step, or every other one
@@ -476,39 +472,28 @@ def _learn_length(store, tracks, t, t1, near, time, segment, tout, index, next_t
         while i < tout.shape[0] and tout[i] <= ahead:
             i += 1
         beyond = _following(ahead, time, s, tout, i, next_tick if next_tick > ahead else math.inf)
-        regular = regular or abs((beyond - ahead) - (t1 - t)) <= 2.0 * near
+        regular = regular or abs((beyond - ahead) - (t1 - t)) <= ALIKE * (t1 - t)
         ahead = beyond
     if not regular:
         return -1
     length = t1 - t
-    if time.shape[0] > 3:
-        # the same wherever in the record a run begins; its first step may hold for all time before, its last
-        # one may be what is left of a step
-        mean = (time[time.shape[0] - 2] - time[1]) / (time.shape[0] - 3)
+    if time.shape[0] > 1:
+        # the same wherever in the record a run begins
+        mean = (time[time.shape[0] - 1] - time[0]) / (time.shape[0] - 1)
         share = mean / max(round(mean / length), 1.0)
-        count = 1
-        while abs(share - length) > near and count < SHARED:
-            count += 1
-            share = round(length * count / mean) * mean / count
         if abs(share - length) <= near:
             length = share
-    which = -1
-    for other in range(LENGTHS):
-        if tracks.length[other] == -length:
-            which = other
-    if which < 0:
-        # in the place of one that this run has not had, or had first
-        for k in range(1, LENGTHS + 1):
-            other = (tracks.newest[0] + k) % LENGTHS
-            if which < 0 or tracks.born[other] < tracks.born[which]:
-                which = other
-        for place in range(store.ready.shape[0]):
-            if place // ranks(store) % LENGTHS == which:
-                store.ready[place] = 0
+    for which in range(LENGTHS):
+        if tracks.length[which] == -length:
+            tracks.newest[0] = which
+            tracks.length[which] = length
+            return which
+    which = (tracks.newest[0] + 1) % LENGTHS
     tracks.newest[0] = which
-    tracks.newest[1] += 1
-    tracks.born[which] = tracks.newest[1]
     tracks.length[which] = length
+    for place in range(store.ready.shape[0]):
+        if place // ranks(store) % LENGTHS == which:
+            store.ready[place] = 0
     return which
 
 
@@ -570,12 +555,9 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
     for i in range(nz):
         for j in range(nz):
             absolute[i, j] = abs(m[i, j])
-    halvings = terms = 0
-    while halvings <= EXPONENTIAL_HALVINGS:
-        terms, more = _exponential(absolute, n, h, halvings, 0, whole, power, scratch)
-        if more == 0:
-            break
-        halvings += more
+    halvings = 0
+    while halvings <= EXPONENTIAL_HALVINGS and not _exponential(absolute, h, halvings, whole, power, scratch):
+        halvings += 1
     usable = halvings <= EXPONENTIAL_HALVINGS
     # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
     for row in range(margins):
@@ -603,7 +585,7 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
             usable = usable and tracks.curved[place, row, j] < math.inf
     if not usable:
         return -1
-    _exponential(m, n, h, halvings, terms, whole, power, scratch)
+    _exponential(m, h, halvings, whole, power, scratch)
     # --- the rows, zeros left out
     count = 0
     for row in range(n):
@@ -616,70 +598,27 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
 
 
 @part
-def _exponential(m, n, h, halvings, terms, out, power, scratch):
-    """Write exp(m h), summed over h / 2^halvings and squared as often, to `out`.
-
-    Of `m` the first `n` rows are of states; inputs with their slopes, and the time, go on as straight lines.
-    `terms`: how many are summed; 0: until every one is small. Returns their number, and by how many more
-    halvings the last one had been small.
-    """
+def _exponential(m, h, halvings, out, power, scratch):
+    """Sum exp(m h / 2^halvings), squared as often; False where so many terms are too few for an element."""
     nz = m.shape[0]
-    step, found = h / 2.0**halvings, terms
-    _identity(out, n, step)
-    for i in range(n):
-        for j in range(nz):
-            power[i, j] = out[i, j]
-    worst = 0.0  # a term over what is small, that of the worst element
-    for k in range(1, (terms if terms > 0 else EXPONENTIAL_TERMS) + 1):
-        _rows_times(power, m, n, scratch)
-        worst = 0.0
-        for i in range(n):
-            for j in range(nz):
-                value = scratch[i, j] * step / k
-                power[i, j] = value
-                out[i, j] += value
-                if terms == 0 and value != 0.0:
-                    worst = max(worst, abs(value) / abs(EXPONENTIAL_SHARE * EPS * out[i, j]))
-        found = k
-        if terms == 0 and worst <= 1.0:
-            break
-    if terms == 0 and not worst <= 1.0:
-        return found, max(math.ceil(math.log2(worst) / found), 1) if worst < math.inf else 1
-    for _ in range(halvings):
-        _rows_times(out, out, n, scratch)
-        step *= 2.0
-        _identity(out, n, step)
-        for i in range(n):
-            for j in range(nz):
-                out[i, j] = scratch[i, j]
-    return found, 0
-
-
-@part(inline=True)
-def _identity(out, n, step):
-    """Write the matrix that holds all states, and lets the inputs and the time go on for `step` seconds."""
-    nz = out.shape[0]
-    nr = (nz - n - 2) // 2
+    step = h / 2.0**halvings
     for i in range(nz):
         for j in range(nz):
-            out[i, j] = 1.0 if i == j else 0.0
-    for k in range(nr):
-        out[n + k, n + nr + k] = step
-    out[nz - 2, nz - 1] = step
-
-
-@part(inline=True)
-def _rows_times(a, b, n, out):
-    """Write the first `n` rows of a b to `out`; zeros of both, where many are, cost nothing."""
-    nz = b.shape[0]
-    for i in range(n):
-        for j in range(nz):
-            out[i, j] = 0.0
-        for q in range(n):
-            if a[i, q] != 0.0:
-                for j in range(nz):
-                    out[i, j] += a[i, q] * b[q, j]
-        for q in range(n, nz):
-            if a[i, q] != 0.0:
-                for j in range(n, nz):
-                    out[i, j] += a[i, q] * b[q, j]
+            out[i, j] = power[i, j] = 1.0 if i == j else 0.0
+    small = False
+    for k in range(1, EXPONENTIAL_TERMS + 1):
+        small = True
+        multiply(m, power, scratch)
+        for i in range(nz):
+            for j in range(nz):
+                power[i, j] = scratch[i, j] * step / k
+                out[i, j] += power[i, j]
+                small = small and abs(power[i, j]) <= EXPONENTIAL_SHARE * EPS * abs(out[i, j])
+        if small:
+            break
+    for _ in range(halvings):
+        multiply(out, out, scratch)
+        for i in range(nz):
+            for j in range(nz):
+                out[i, j] = scratch[i, j]
+    return small
