@@ -7,7 +7,9 @@ probable the recorded values are.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..estimation.segmented import CandidateFit
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
@@ -28,7 +30,7 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than starts was fitted to the segments to validate on: their gain also stands alone
-        price = 0.5 * t.extra * math.log(sum(n for _, n in before))
+        price = 0.5 * t.extra * math.log(before.count + int(before.counts.sum()))
         judged.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
     return sorted(judged, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
@@ -44,18 +46,50 @@ def _step(tried: CandidateFit) -> float:
     return next(steps, 0.0)
 
 
-def _powers(tried: CandidateFit, noise: NoiseModel):
-    """Return power and number of whitened residuals of the segments fitted, and of those held out."""
-    validation = tried.validation.residual_pieces if tried.validation is not None else []
-    return whitened_power(tried.train.residual_pieces, noise), whitened_power(validation, noise)
+@dataclass(frozen=True, eq=False)
+class _Powers:
+    """Power and number of whitened residuals: of the segments fitted, and of each one held out."""
+
+    fitted: float
+    count: int
+    held: np.ndarray
+    counts: np.ndarray
+
+    def over(self, kept: np.ndarray, held_alone: bool = False) -> tuple[float, int]:
+        """Return power and number, of the segments held out only those `kept`."""
+        fitted, count = (0.0, 0) if held_alone else (self.fitted, self.count)
+        return fitted + float(self.held[kept].sum()), count + int(self.counts[kept].sum())
 
 
-def _gains(before, after) -> tuple[float, float]:
-    """Return the log likelihood ratio of all segments, and of those held out."""
-    (fitted, n), (validation, n_held) = before
-    (fitted_t, _), (held_t, _) = after
-    gain_held = 0.5 * n_held * math.log(validation / held_t) if n_held else 0.0
-    return 0.5 * (n + n_held) * math.log((fitted + validation) / (fitted_t + held_t)), gain_held
+def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
+    held = tried.validation
+    validation = [noise.weighed(r, i) for i, r in enumerate(held.residual_pieces)] if held else []
+    # a filter leaves out the first samples of a piece
+    owners = [o[len(o) - len(r) :] for o, r in zip(held.segment_of, validation, strict=True)] if held else []
+    owner = np.concatenate([*owners, np.empty(0, int)])
+    squares = np.concatenate([*(r * r for r in validation), np.empty(0)])
+    return _Powers(
+        *whitened_power(tried.train.residual_pieces, noise), np.bincount(owner, squares), np.bincount(owner)
+    )
+
+
+def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
+    """Return the log likelihood ratio of all segments, and of those held out, the one most for it left out.
+
+    Held out a model may follow, or fail, in a single segment by luck, with an error that outweighs all
+    others: no effect may rest on one.
+    """
+    number = len(before.held)
+    without = ~np.eye(number, dtype=bool) if number > 1 else np.ones((1, number), dtype=bool)
+    return tuple(
+        min(_gain(before.over(kept, alone), after.over(kept, alone)) for kept in without)
+        for alone in (False, True)
+    )  # pyright: ignore[reportReturnType]
+
+
+def _gain(before: tuple[float, int], after: tuple[float, int]) -> float:
+    (power, n), (power_t, _) = before, after
+    return 0.5 * n * math.log(power / power_t) if n else 0.0
 
 
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
@@ -63,7 +97,9 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
     step = _step(tried)
     noise = prediction_error_filter(base.residuals, None, base.train.outputs)
     gains = []
-    for fit, power in zip((base.train, base.validation), _powers(base, noise), strict=True):
+    powers = _powers(base, noise)
+    held = float(powers.held.sum()), int(powers.counts.sum())
+    for fit, power in ((base.train, (powers.fitted, powers.count)), (base.validation, held)):
         if fit is None:
             gains.append(0.0)
             continue
