@@ -42,7 +42,5 @@ def sigma_points(
     for e, axis in zip(eigen, axes.T, strict=True):
         for sign in (-1, 1):
             step = sign * axis / np.sqrt(max(float(e), 1.0))
-            found.append(
-                {v.name: v.p(v.clip(q + d)) for v, q, d in zip(variables, theta, step, strict=True)}
-            )
+            found.append({v.name: v.p(v.clip(q + d)) for v, q, d in zip(variables, theta, step, strict=True)})
     return found

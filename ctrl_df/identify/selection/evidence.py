@@ -30,7 +30,7 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than starts was fitted to the segments to validate on: their gain also stands alone
-        price = 0.5 * t.extra * math.log(before.count + int(before.counts.sum()))
+        price = 0.5 * t.extra * math.log(before.fitted[1] + before.held[1])
         judged.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
     return sorted(judged, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
@@ -48,29 +48,35 @@ def _step(tried: CandidateFit) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Powers:
-    """Power and number of whitened residuals: of the segments fitted, and of each one held out."""
+    """Power and number of whitened residuals: (power, number) each.
 
-    fitted: float
-    count: int
-    held: np.ndarray
-    counts: np.ndarray
+    Attributes
+    ----------
+    fitted, held : tuple
+        Of the segments fitted, and of those held out.
+    without : list of tuple
+        Of those held out but one: each of them in turn. Where there is but one: of that one.
+    """
 
-    def over(self, kept: np.ndarray, held_alone: bool = False) -> tuple[float, int]:
-        """Return power and number, of the segments held out only those `kept`."""
-        fitted, count = (0.0, 0) if held_alone else (self.fitted, self.count)
-        return fitted + float(self.held[kept].sum()), count + int(self.counts[kept].sum())
+    fitted: tuple[float, int]
+    held: tuple[float, int]
+    without: list[tuple[float, int]]
 
 
 def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
-    held = tried.validation
-    validation = [noise.weighed(r, i) for i, r in enumerate(held.residual_pieces)] if held else []
-    # a filter leaves out the first samples of a piece
-    owners = [o[len(o) - len(r) :] for o, r in zip(held.segment_of, validation, strict=True)] if held else []
-    owner = np.concatenate([*owners, np.empty(0, int)])
-    squares = np.concatenate([*(r * r for r in validation), np.empty(0)])
-    return _Powers(
-        *whitened_power(tried.train.residual_pieces, noise), np.bincount(owner, squares), np.bincount(owner)
-    )
+    fitted = whitened_power(tried.train.residual_pieces, noise)
+    if tried.validation is None:
+        return _Powers(fitted, (0.0, 0), [(0.0, 0)])
+    white = [noise.weighed(r, i) for i, r in enumerate(tried.validation.residual_pieces)]
+    squares = np.concatenate([r * r for r in white])
+    owners = list(zip(tried.validation.segment_of, white, strict=True))
+    # a whitened value sees samples before it, too: across the bounds of segments it is of both
+    last = np.concatenate([o[len(o) - len(r) :] for o, r in owners])
+    first = np.concatenate([o[: len(r)] for o, r in owners])
+    held, number = (float(squares.sum()), len(squares)), 1 + int(np.max(last, initial=0))
+    others = [(last != i) & (first != i) for i in range(number)]
+    without = [(float(squares[o].sum()), int(o.sum())) for o in others]
+    return _Powers(fitted, held, without if number > 1 else [held])
 
 
 def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
@@ -79,17 +85,16 @@ def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
     Held out a model may follow, or fail, in a single segment by luck, with an error that outweighs all
     others: no effect may rest on one.
     """
-    number = len(before.held)
-    without = ~np.eye(number, dtype=bool) if number > 1 else np.ones((1, number), dtype=bool)
-    return tuple(
-        min(_gain(before.over(kept, alone), after.over(kept, alone)) for kept in without)
-        for alone in (False, True)
-    )  # pyright: ignore[reportReturnType]
+    (power, n), (power_t, _) = before.fitted, after.fitted
+    held = list(zip(before.without, after.without, strict=True))
+    return (
+        min(_gain((power + p, n + k), power_t + q) for (p, k), (q, _) in held),
+        min(_gain(b, q) for b, (q, _) in held),
+    )
 
 
-def _gain(before: tuple[float, int], after: tuple[float, int]) -> float:
-    (power, n), (power_t, _) = before, after
-    return 0.5 * n * math.log(power / power_t) if n else 0.0
+def _gain(before: tuple[float, int], power: float) -> float:
+    return 0.5 * before[1] * math.log(before[0] / power) if before[1] else 0.0
 
 
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
@@ -98,8 +103,7 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
     noise = prediction_error_filter(base.residuals, None, base.train.outputs)
     gains = []
     powers = _powers(base, noise)
-    held = float(powers.held.sum()), int(powers.counts.sum())
-    for fit, power in ((base.train, (powers.fitted, powers.count)), (base.validation, held)):
+    for fit, power in ((base.train, powers.fitted), (base.validation, powers.held)):
         if fit is None:
             gains.append(0.0)
             continue
