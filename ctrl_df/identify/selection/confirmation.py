@@ -161,7 +161,8 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     near = over(middle, fits, short, floor)
     far = over(longest, near, near, floor)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
-    far = side_by_side(lambda pair: _begun_about(longest, *pair, likely), zip(near, far, strict=True))
+    pairs = zip(near, far, strict=True)
+    far = side_by_side(lambda pair: _begun_about(longest, pair[0], pair[1], likely), pairs)
     return [short, near, far], floor
 
 

@@ -100,16 +100,23 @@ def _gain(before: tuple[float, int], power: float) -> float:
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
     step = _step(tried)
-    noise = prediction_error_filter(base.residuals, None, base.train.outputs)
+    powers = _powers(base, prediction_error_filter(base.residuals, None, base.train.outputs))
+    # a sample counts little for rounding, whatever the model does: luck is where the baseline errs most
+    lucky = min(range(len(powers.without)), key=lambda i: powers.without[i][0])
+    left_out = lucky if len(powers.without) > 1 else -1
     gains = []
-    powers = _powers(base, noise)
-    for fit, power in ((base.train, powers.fitted), (base.validation, powers.held)):
+    for fit, plain, out in (
+        (base.train, powers.fitted, -1),
+        (base.validation, powers.without[lucky], left_out),
+    ):
         if fit is None:
             gains.append(0.0)
             continue
+        kept = [segment != out for segment in fit.segment_of]
+        simulated = [y[k] for y, k in zip(fit.simulated_pieces, kept, strict=True)]
+        measured = [y + e[k] for y, e, k in zip(simulated, fit.residual_pieces, kept, strict=True)]
         # for as many samples as the rounding is judged by: a density has a unit, a ratio of two has none
-        samples = sum(len(r) for r in fit.residual)
-        plain = -0.5 * samples * math.log(2 * math.pi * math.e * power[0] / power[1])
-        measured = [a + b for a, b in zip(fit.simulated, fit.residual, strict=True)]
-        gains.append(rounding_evidence(measured, fit.simulated, step) - plain)
+        samples = sum(map(len, measured))
+        likelihood = -0.5 * samples * math.log(2 * math.pi * math.e * plain[0] / plain[1])
+        gains.append(rounding_evidence(measured, simulated, step) - likelihood)
     return sum(gains), gains[1]
