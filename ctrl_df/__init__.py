@@ -10,6 +10,7 @@ Two flows run through the package::
     Measurement     compare     diagnose     block.with_effect   refit    improve (the whole ladder)
 """
 
+import sys as _sys
 from importlib import import_module as _import_module
 
 from .blocks.effect import Effect, effect_class, effect_library, register_effect
@@ -119,7 +120,8 @@ def __getattr__(name):
         value = getattr(_import_module(f".{_LAZY[name]}", __name__), name)
         globals()[name] = value
         return value
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    message = f"module {__name__!r} has no attribute {name!r}"
+    raise AttributeError(message, name=name, obj=_sys.modules[__name__])  # Python suggests the nearest
 
 
 def __dir__():

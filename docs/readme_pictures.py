@@ -78,7 +78,7 @@ def hunting(said):
 def missing(said):
     """Draw the error of the model before and after, and the candidates in order."""
     diagnosis, record = said["diagnosis"], said["record"]
-    before = cdf.compare(diagnosis.baseline, record, mode="free")
+    before = cdf.compare(diagnosis.baseline.model, record, mode="free")
     after = cdf.compare(diagnosis.best.model, record, mode="free")
     figure, (error, bars) = plt.subplots(
         1, 2, figsize=(7.4, 2.8), layout="constrained", width_ratios=(1.5, 1)

@@ -68,7 +68,7 @@ lifted = wanted + weight * np.sin(wanted - hangs) / 20
 for name, command in (("as it is", wanted), ("with the weight added", lifted)):
     run = cdf.event_response(loop, [0, 2.5, 5], command, [hangs, 0.0])
     rest = float(run.outputs[0, -1])
-    print(f"command {name}: comes to rest at {rest:.3f} rad, {wanted - rest:.3f} short of {wanted}")
+    print(f"command {name}: comes to rest at {rest:.3f} rad, {rest - wanted:+.3f} from {wanted}")
     if command == wanted:
         sagged = rest
 

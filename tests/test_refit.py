@@ -26,12 +26,13 @@ def test_standard_errors_hold_for_wrong_parameters():
             excitation=rigs.EXCITATIONS[seed % 3],
             snr_db=[60.0, 40.0][seed % 2],
             noise=NOISES[(seed // 2) % 3],
+            n=4000,
         )
         fit = fit_records(rig.baseline, [rig.train[0].measurement()])
         errors = fit.standard_errors
         inside += [abs(v - rig.truth[k]) < 2 * errors[k] for k, v in fit.parameters.items()]
         ratios.append(fit.rmse / rig.train[0].noise)
-    # The three errors of one rig are correlated: these 24 count as about 10. Measured 0.79.
+    # The three errors of one rig are correlated: these 24 count as about 10. Measured 1.0.
     assert np.mean(inside) >= 0.7
     assert np.median(ratios) == pytest.approx(1.0, abs=0.03)
 

@@ -1,6 +1,8 @@
 """Tuned numbers of a package stand in one file, each with its reason; those that follow from others do."""
 
 import ast
+import collections
+import functools
 import math
 import re
 from pathlib import Path
@@ -57,9 +59,14 @@ ROOMS = (
 )
 
 
+@functools.cache
+def parsed(path):
+    return ast.parse(path.read_text())
+
+
 def numbers_of(path):
     """Yield names of a file's module-level constants that hold numbers."""
-    for node in ast.parse(path.read_text()).body:
+    for node in parsed(path).body:
         if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
             continue
         if any(isinstance(n, ast.Constant) and type(n.value) in (int, float) for n in ast.walk(node.value)):
@@ -91,7 +98,7 @@ def test_what_follows_follows():
 def test_rooms_share_what_stands_above_them():
     root, users = PACKAGE / "identify", {}
     for path in sorted(root.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
                 users.setdefault(node.id, set()).add(path.parent)
     of_one = [
@@ -105,14 +112,14 @@ def test_rooms_share_what_stands_above_them():
 
 def assigned(path):
     """Yield the names of a file's constants, assignment by assignment."""
-    for node in ast.parse(path.read_text()).body:
+    for node in parsed(path).body:
         if isinstance(node, ast.Assign):
             yield [n.id for n in ast.walk(node.targets[0]) if isinstance(n, ast.Name)]
 
 
 def reasons(path):
     """Yield the names of a file's constants, and whether a docstring follows."""
-    body = ast.parse(path.read_text()).body
+    body = parsed(path).body
     for node, after in zip(body, [*body[1:], None], strict=True):
         if isinstance(node, ast.Assign):
             told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
@@ -125,7 +132,7 @@ def literals(path):
     A number that a formula divides by, divides or raises to a power belongs to the formula. Defaults of
     arguments stand in signatures, where users look for them; indices, shapes and texts choose nothing.
     """
-    tree = ast.parse(path.read_text())
+    tree = parsed(path)
     passed_over, limits = set(), set()
     for node in ast.walk(tree):
         if isinstance(node, ast.arguments):
@@ -172,5 +179,5 @@ def test_every_tuned_number_of_a_package_has_its_place_and_its_reason(package):
     assert not found, sorted(found)
     named = {name: told for path in places.values() for name, told in reasons(path)}
     assert all(named.values()), [name for name, told in named.items() if not told]
-    text = "".join(p.read_text() for p in files.values())
-    assert not [name for name in named if len(re.findall(rf"\b{name}\b", text)) < 2], "nobody asks for it"
+    words = collections.Counter(w for p in files.values() for w in re.findall(r"\w+", p.read_text()))
+    assert not [name for name in named if words[name] < 2], "nobody asks for it"

@@ -49,8 +49,13 @@ MODEL = cdf.Mass(2.5, [cdf.Coulomb(2.4), cdf.Viscous(5.0), cdf.LinearSpring(0.5)
 FEW = ("asymmetric_viscous", "asymmetric_coulomb", "quadratic_drag")
 
 
-def test_what_is_missing_is_told_from_what_varies():
-    found = diagnose(MODEL, machine(1, difference=2.0), holdout=machine(2, difference=2.0), candidates=FEW)
+@pytest.fixture(scope="module")
+def study():
+    return cdf.improve(MODEL, machine(1, difference=2.0), machine(2, difference=2.0), 1, candidates=FEW)
+
+
+def test_what_is_missing_is_told_from_what_varies(study):
+    found = study.steps[0].diagnosis
     assert found.measure == "acceleration"
     best = found.ranking[0]
     assert best.id == "asymmetric_viscous"
@@ -77,11 +82,9 @@ def test_parameters_are_fitted_where_slow_forces_move_nothing_far():
     assert fit.parameters["mass"].standard_error < 0.7 * named.parameters["mass"].standard_error
 
 
-def test_a_ladder_of_a_machine_whose_friction_varies_has_such_parameters():
-    train, held = machine(1, difference=2.0), machine(2, difference=2.0)
-    study = cdf.improve(MODEL, train, held, 1, candidates=("asymmetric_viscous", "quadratic_drag"))
+def test_a_ladder_of_a_machine_whose_friction_varies_has_such_parameters(study):
     assert study.effects == ("asymmetric_viscous",)
-    again = cdf.refit(study.model, train)
+    again = cdf.refit(study.model, machine(1, difference=2.0))
     for name, found in again.parameters.items():
         assert abs(study.model.parameters[name].value - found.value) < found.standard_error
     assert study.steps[-1].parameters["mass"] == study.model.parameters["mass"].value

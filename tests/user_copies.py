@@ -19,7 +19,7 @@ def source_of(cls) -> str:
     kept = []
     for node in tree.body:
         if isinstance(node, ast.ImportFrom) and node.level:
-            package = {2: "ctrl_df.blocks", 3: "ctrl_df"}[node.level]
+            package = {1: "ctrl_df.blocks.effects", 2: "ctrl_df.blocks", 3: "ctrl_df"}[node.level]
             node.module, node.level = f"{package}.{node.module}", 0
         if isinstance(node, ast.ClassDef):
             if node.name != cls.__name__:

@@ -36,6 +36,7 @@ def as_records(data, name: str = "data") -> tuple[Measurement, ...]:
     if bad or not records:
         got = type(bad[0]).__name__ if bad else "an empty sequence"
         raise TypeError(
-            f"{name} must be a Measurement or several; got {got}. Wrap arrays: ctrl_df.Measurement(t, u, y)."
+            f"{name} must be a Measurement or several; got {got}. The model comes first, then its data; wrap "
+            "arrays: ctrl_df.Measurement(t, u, y)."
         )
     return records

@@ -163,7 +163,7 @@ def select(
     said = {"t": "time", "u": "input", "y": "output", "velocity": "velocity"}
 
     def take(wanted, what):
-        column, unit = find_column(table, wanted, source)
+        column, unit = find_column(table, wanted, source, what)
         if column in taken:
             raise ValueError(
                 f"{taken[column]} and {what} need a column each; both are {column!r} of {source}. "
@@ -203,17 +203,18 @@ def _several(channels):
     return names("a record", "channels", channels)
 
 
-def find_column(table: Mapping[str, Any], wanted, source: str) -> tuple[str, str]:
-    """Return the column's full name and the unit its header states."""
+def find_column(table: Mapping[str, Any], wanted, source: str, what: str = "channel") -> tuple[str, str]:
+    """Return the column's full name and the unit its header states; `what` it is to be, for messages."""
     known = list(table)
     if not isinstance(wanted, str | int | np.integer) or isinstance(wanted, bool):
         raise TypeError(
-            f"a column must be given by name or number; got {shown(wanted)}. {_exist(known, source)}"
+            f"the {what} column must be given by name or number; got {shown(wanted)}. {_exist(known, source)}"
         )
     if not isinstance(wanted, str):
         if not 0 <= wanted < len(known):
             raise ValueError(
-                f"a column number must be 0 to {len(known) - 1}; got {wanted}. {_exist(known, source)}"
+                f"the {what} column number must be 0 to {len(known) - 1}; got {wanted}. "
+                f"{_exist(known, source)}"
             )
         wanted = known[wanted]
     plain = {name: _UNIT.match(name) for name in known}
@@ -221,7 +222,9 @@ def find_column(table: Mapping[str, Any], wanted, source: str) -> tuple[str, str
         n for n, m in plain.items() if m and m.group(1).strip() == wanted
     ]
     if len(matches) != 1:
-        raise ValueError(f"a column must be named as in the file; got {wanted!r}. {_exist(known, source)}")
+        raise ValueError(
+            f"the {what} column must be named as in the file; got {wanted!r}. {_exist(known, source)}"
+        )
     m = plain[matches[0]]
     return matches[0], m.group(2) if m else ""
 

@@ -99,7 +99,8 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
             wrong = next(i for i, size in enumerate(sizes) if size != width)
             raise ValueError(
                 f"{path}, line {some[wrong] + 1}: needs {len(header)} cells like the header; got "
-                f"{sizes[wrong]}. Complete or delete the line; decimal commas need another delimiter."
+                f"{sizes[wrong]}. Complete or delete the line, or what stands above the header (lines that "
+                "begin with # are passed over); decimal commas need another delimiter."
             )
         for j in range(len(header)):
             column = cells[j::width]

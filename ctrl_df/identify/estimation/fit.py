@@ -23,6 +23,7 @@ from ..shooting.variables import default_free, step_of_sensor
 from ..thresholds import RTOL
 from .covariance import covariance_of
 from .sensitivity import OutputSensitivity
+from .sigma_points import sigma_points
 from .thresholds import EFFORT_SHORT, RESTARTS_KEPT
 
 
@@ -65,6 +66,8 @@ class FitResult:
         Where the model was started anew.
     linear : callable or None
         Works out `sensitivity`, once it is asked for.
+    about : callable or None
+        Works out `sigma_points`, given the curvature of the cost and the variance of the error.
     """
 
     model: Any
@@ -86,15 +89,24 @@ class FitResult:
     starts: list
     segments: list
     linear: Callable[[], OutputSensitivity] | None = field(repr=False, default=None)
+    about: Callable[..., list[dict[str, float]]] | None = field(repr=False, default=None)
 
     @cached_property
     def sensitivity(self) -> OutputSensitivity | None:
         """The fitted model as a linear map of its parameters and initial states; None without parameters."""
         return self.linear() if self.linear is not None else None
 
+    @property
+    def sigma_points(self) -> list[dict[str, float]]:
+        """Values one standard error off, for white errors, along every principal axis of the covariance."""
+        if self.sensitivity is None or self.about is None:
+            return []
+        slopes = np.concatenate(self.sensitivity.parameters)
+        return self.about(slopes.T @ slopes, self.rmse**2)
+
     def __getstate__(self):
-        # what works it out stays behind with the simulations of the fit
-        return {**self.__dict__, "linear": None}
+        # what works them out stays behind with the simulations of the fit
+        return {**self.__dict__, "linear": None, "about": None}
 
     @property
     def residual_pieces(self) -> list[np.ndarray]:
@@ -115,6 +127,19 @@ class FitResult:
         if self.error_filter is not None:
             return self.by_segment(signals)
         return [x[b] for w, x in zip(self.segments, signals, strict=True) for b in w.blocks]
+
+    @property
+    def segment_of(self) -> list[np.ndarray]:
+        """Of every sample of `residual_pieces` the number of its segment, counted over all records."""
+        first, found = 0, []
+        for w in self.segments:
+            numbers = first + np.arange(len(w))
+            parts = [np.repeat(numbers, w.counts)]
+            if self.error_filter is not None:
+                parts = [np.full(n, k) for k, n in zip(numbers, w.counts, strict=True)]
+            found += parts * w.outputs
+            first += len(w)
+        return found
 
     def by_segment(self, signals) -> list[np.ndarray]:
         """Return signals, one a record, segment by segment."""
@@ -366,4 +391,5 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         starts=found.states.values,
         segments=stage.segments,
         linear=linear,
+        about=partial(sigma_points, problem.variables, theta, problem.about, problem.precision),
     )

@@ -250,19 +250,17 @@ class SegmentedData:
             robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
-    def states_of(self, block, *, view=None, starts=None, hopeless=math.inf) -> FitResult:
-        """Fit the initial states alone, well enough for a fit that goes on from them."""
-        iterations, tolerance = EFFORT_STATES
-        return self.fit(
-            block, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance, hopeless=hopeless
-        )
+    def states_of(
+        self, block, *, view=None, starts=None, effort=EFFORT_STATES, followed=0, hopeless=math.inf
+    ) -> FitResult:
+        """Fit the initial states alone; by default, well enough for a fit that goes on from them.
 
-    def states_alone(self, model, view, starts=None) -> FitResult:
-        """Return a model with the initial states of segments fitted to their end, each by itself."""
-        iterations, tolerance = EFFORT_ALONE
+        `effort`: steps at most and the relative gain that is none; `followed`: as for `fit`.
+        """
+        iterations, tolerance = effort
         return self.fit(
-            model, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance,
-            followed=RESTARTS_KEPT,
+            block, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance,
+            followed=followed, hopeless=hopeless,
         )  # fmt: skip
 
     def rtol_of(self, block) -> float:
@@ -328,8 +326,12 @@ class SegmentedData:
             )
             model = near.model
         # single segments may have begun in a wrong minimum: each goes on by itself
-        near = rough.states_alone(model, getattr(rough, name), same_begins(near, view.segments))
-        return self.states_alone(model, view, near.starts)
+        for data in (rough, self):
+            near = data.states_of(
+                model, view=getattr(data, name), starts=same_begins(near, view.segments),
+                effort=EFFORT_ALONE, followed=RESTARTS_KEPT,
+            )  # fmt: skip
+        return near
 
 
 def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:

@@ -54,7 +54,8 @@ ANGLES = 6
 # --- descents ---------------------------------------------------------------------------------------
 
 MOTOR_LEAST = 0.05
-"""Share of its dry friction that the motor keeps where the load gains some."""
+"""Share of its dry friction that the motor keeps where the load gains some: at none the level would lie on
+its bound, and its scale would no longer be its own. Half or twice of it changes nothing (a rubbing load)."""
 
 # --- how long fits go on: steps at most, relative gain of the cost that is none -----------------------
 

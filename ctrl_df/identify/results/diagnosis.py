@@ -236,13 +236,16 @@ class Diagnosis:
 
     def table(self, rows: int = 8) -> str:
         """Return the ranking as text."""
-        lines = [f"{'effect':<22} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>6}  parameters"]
-        lines.append(f"{'(none: refitted)':<22} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
-        for c in self.ranking[:rows]:
+        shown = self.ranking[:rows]
+        names = [" = ".join(filter(None, (c.id, ", ".join(c.equivalents)))) for c in shown]
+        none = "(none: refitted)"
+        w = max(map(len, (none, *names)))
+        lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>6}  parameters"]
+        lines.append(f"{none:<{w}} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
+        for name, c in zip(names, shown, strict=True):
             values = ", ".join(f"{k} {v:.4g}" for k, v in c.parameters.items())
-            name = c.id + (" = " + ", ".join(c.equivalents) if c.equivalents else "")
             lines.append(
-                f"{name:<22} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
+                f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
                 f"{c.probability:>6.1%}  {values}"
             )
         return "\n".join(lines)

@@ -23,6 +23,7 @@ from ..estimation.multistart import (
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
+from ..prediction.simulator import feasible
 from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .attempts import itself
 from .evidence import ranked, rounds
@@ -160,32 +161,34 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     near = over(middle, fits, short, floor)
     far = over(longest, near, near, floor)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
-    both = side_by_side(
-        lambda pair: _both_ways(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
-    )
-    return [short, [n for n, _ in both], [f for _, f in both]], floor
+    pairs = zip(near, far, strict=True)
+    far = side_by_side(lambda pair: _begun_about(longest, pair[0], pair[1], likely), pairs)
+    return [short, near, far], floor
 
 
-def _both_ways(
-    shorter: SegmentedData,
-    longer: SegmentedData,
-    near: FitResult | None,
-    far: FitResult | None,
-    likely: float,
-):
-    """Return the fits of a model in shorter and in longer segments, each begun again where the other ended.
+def _begun_about(
+    longer: SegmentedData, near: FitResult | None, far: FitResult | None, likely: float
+) -> FitResult | None:
+    """Return the fit of a model in longer segments, begun all about what shorter ones say of its parameters.
 
-    Of laws with events the cost has many minima, other ones over other segments: what one fit has missed the
-    other may have come near to. Where long segments show no more error than short ones both are right;
-    `likely`: the error over long ones beyond which a model is behind for other reasons.
+    Of laws with events the cost over long segments has many minima, the right one within what shorter
+    segments leave open. Where long segments show no more error than short ones it is found; `likely`: the
+    error over long ones beyond which a model is behind for other reasons.
     """
     if near is None or far is None or not far.model.nonsmooth:
-        return near, far
+        return far
     if far.rmse <= FLOOR * near.rmse or far.rmse > likely:
-        return near, far
-    back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
-    there = longer.moved(back, hopeless=far.rmse)
-    return min(near, back, key=lambda f: f.rmse), min(far, there, key=lambda f: f.rmse)
+        return far
+    models = [near.model.with_parameters(feasible(near.model, values)) for values in near.sigma_points]
+    begun = side_by_side(
+        lambda model: longer.moved(replace(near, model=model), iterations=2, hopeless=HOPELESS * far.rmse),
+        models,
+    )
+    begun = sorted(begun, key=lambda f: f.rmse)[:RESTARTS_KEPT]
+    ended = side_by_side(
+        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=6, hopeless=far.rmse), begun
+    )
+    return min([far, *ended], key=lambda f: f.rmse)
 
 
 def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | None]:

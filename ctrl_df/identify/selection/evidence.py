@@ -7,7 +7,9 @@ probable the recorded values are.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..estimation.segmented import CandidateFit
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
@@ -28,7 +30,7 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than starts was fitted to the segments to validate on: their gain also stands alone
-        price = 0.5 * t.extra * math.log(sum(n for _, n in before))
+        price = 0.5 * t.extra * math.log(before.fitted[1] + before.held[1])
         judged.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
     return sorted(judged, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
@@ -44,32 +46,77 @@ def _step(tried: CandidateFit) -> float:
     return next(steps, 0.0)
 
 
-def _powers(tried: CandidateFit, noise: NoiseModel):
-    """Return power and number of whitened residuals of the segments fitted, and of those held out."""
-    validation = tried.validation.residual_pieces if tried.validation is not None else []
-    return whitened_power(tried.train.residual_pieces, noise), whitened_power(validation, noise)
+@dataclass(frozen=True, eq=False)
+class _Powers:
+    """Power and number of whitened residuals: (power, number) each.
+
+    Attributes
+    ----------
+    fitted, held : tuple
+        Of the segments fitted, and of those held out.
+    without : list of tuple
+        Of those held out but one: each of them in turn. Where there is but one: of that one.
+    """
+
+    fitted: tuple[float, int]
+    held: tuple[float, int]
+    without: list[tuple[float, int]]
 
 
-def _gains(before, after) -> tuple[float, float]:
-    """Return the log likelihood ratio of all segments, and of those held out."""
-    (fitted, n), (validation, n_held) = before
-    (fitted_t, _), (held_t, _) = after
-    gain_held = 0.5 * n_held * math.log(validation / held_t) if n_held else 0.0
-    return 0.5 * (n + n_held) * math.log((fitted + validation) / (fitted_t + held_t)), gain_held
+def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
+    fitted = whitened_power(tried.train.residual_pieces, noise)
+    if tried.validation is None:
+        return _Powers(fitted, (0.0, 0), [(0.0, 0)])
+    white = [noise.weighed(r, i) for i, r in enumerate(tried.validation.residual_pieces)]
+    squares = np.concatenate([r * r for r in white])
+    owners = list(zip(tried.validation.segment_of, white, strict=True))
+    # a whitened value sees samples before it, too: across the bounds of segments it is of both
+    last = np.concatenate([o[len(o) - len(r) :] for o, r in owners])
+    first = np.concatenate([o[: len(r)] for o, r in owners])
+    held, number = (float(squares.sum()), len(squares)), 1 + int(np.max(last, initial=0))
+    others = [(last != i) & (first != i) for i in range(number)]
+    without = [(float(squares[o].sum()), int(o.sum())) for o in others]
+    return _Powers(fitted, held, without if number > 1 else [held])
+
+
+def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
+    """Return the log likelihood ratio of all segments, and of those held out, the one most for it left out.
+
+    Held out a model may follow, or fail, in a single segment by luck, with an error that outweighs all
+    others: no effect may rest on one.
+    """
+    (power, n), (power_t, _) = before.fitted, after.fitted
+    held = list(zip(before.without, after.without, strict=True))
+    return (
+        min(_gain((power + p, n + k), power_t + q) for (p, k), (q, _) in held),
+        min(_gain(b, q) for b, (q, _) in held),
+    )
+
+
+def _gain(before: tuple[float, int], power: float) -> float:
+    return 0.5 * before[1] * math.log(before[0] / power) if before[1] else 0.0
 
 
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
     step = _step(tried)
-    noise = prediction_error_filter(base.residuals, None, base.train.outputs)
+    powers = _powers(base, prediction_error_filter(base.residuals, None, base.train.outputs))
+    # a sample counts little for rounding, whatever the model does: luck is where the baseline errs most
+    lucky = min(range(len(powers.without)), key=lambda i: powers.without[i][0])
+    left_out = lucky if len(powers.without) > 1 else -1
     gains = []
-    for fit, power in zip((base.train, base.validation), _powers(base, noise), strict=True):
+    for fit, plain, out in (
+        (base.train, powers.fitted, -1),
+        (base.validation, powers.without[lucky], left_out),
+    ):
         if fit is None:
             gains.append(0.0)
             continue
+        kept = [segment != out for segment in fit.segment_of]
+        simulated = [y[k] for y, k in zip(fit.simulated_pieces, kept, strict=True)]
+        measured = [y + e[k] for y, e, k in zip(simulated, fit.residual_pieces, kept, strict=True)]
         # for as many samples as the rounding is judged by: a density has a unit, a ratio of two has none
-        samples = sum(len(r) for r in fit.residual)
-        plain = -0.5 * samples * math.log(2 * math.pi * math.e * power[0] / power[1])
-        measured = [a + b for a, b in zip(fit.simulated, fit.residual, strict=True)]
-        gains.append(rounding_evidence(measured, fit.simulated, step) - plain)
+        samples = sum(map(len, measured))
+        likelihood = -0.5 * samples * math.log(2 * math.pi * math.e * plain[0] / plain[1])
+        gains.append(rounding_evidence(measured, simulated, step) - likelihood)
     return sum(gains), gains[1]

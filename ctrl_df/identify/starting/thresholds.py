@@ -31,7 +31,8 @@ PROPORTIONAL_SIZES, SIZES = (0.02, 0.1, 0.4), (0.003, 0.01, 0.03, 0.1, 0.3, 1.0,
 proportional to them, and what is left scaled; of any other, half a decade apart."""
 
 AS_IT_IS, FACTOR_MOST = 1.25, 300.0
-"""Factor up to which such a start is not scaled; by which it is at most: beyond nothing is proportional."""
+"""Factor up to which such a start is not scaled, as it leaves (1 - 1/1.25)^2, 4 %, of what the effect takes
+away; by which it is at most: beyond nothing is proportional."""
 
 MOVING = 0.03
 """Speed, over the typical one, from which a sample tells of forces: below, friction may be anything."""
@@ -49,7 +50,9 @@ WAVE_TRIED = 0.01
 """Amplitude of a ripple whose change of the output is simulated, over the typical force: linear still."""
 
 RUN_LEAST = 12
-"""Samples of a part of a record without holes that is asked for ripples, at least."""
+"""Samples of a part of a record without holes that is asked for ripples, at least: its second differences,
+two fewer, are then more than the nine forces that are regressed from them (the one given, six without waves,
+two of a wave)."""
 
 GRID_RANGE, GRID_STEPS, GRID_CONTRAST = (0.3, 3.0), (10, 4000), 0.9
 """Steps of a sensor that rounds: about the one whose error is the one seen, by half a decade; how many are

@@ -1,0 +1,46 @@
+"""Values of parameters all about an estimate, as far off as the data leave them open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..shooting.variables import Variable
+
+
+def sigma_points(
+    variables: Sequence[Variable], theta, about, precision, curvature, variance: float
+) -> list[dict[str, float]]:
+    """Return the values one standard deviation off an estimate, to both sides along every principal axis.
+
+    Parameters
+    ----------
+    variables : sequence of Variable
+        p of them.
+    theta : (p,) array
+        The estimate, scaled.
+    about, precision : (p,) arrays
+        What is known beforehand (see `beforehand`).
+    curvature : (p, p) array
+        Of half the squared error: ``J.T @ J`` of the outputs' derivatives by scaled parameters.
+    variance : float
+        Of the error of a sample.
+
+    Returns
+    -------
+    list of dict
+        2 p of them, within the bounds, and no farther than a factor of e.
+
+    References
+    ----------
+    Julier & Uhlmann (2004), the points of the unscented transformation.
+    """
+    information = curvature / variance + np.diag(precision)
+    eigen, axes = np.linalg.eigh(information)
+    found = []
+    for e, axis in zip(eigen, axes.T, strict=True):
+        for sign in (-1, 1):
+            step = sign * axis / np.sqrt(max(float(e), 1.0))
+            found.append({v.name: v.p(v.clip(q + d)) for v, q, d in zip(variables, theta, step, strict=True)})
+    return found

@@ -1,0 +1,99 @@
+"""What speaks for an effect: no single segment held out, whatever it says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
+from ctrl_df.identify.estimation.sigma_points import sigma_points
+from ctrl_df.identify.prediction.simulator import free_run
+from ctrl_df.identify.selection.evidence import ranked
+from ctrl_df.identify.shooting.variables import Variable
+
+PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
+
+
+def made(block, seed, n=2500, dt=2e-3):
+    """Return a record of a block with noise."""
+    rng, t = np.random.default_rng(seed), dt * np.arange(n)
+    u = 5 * np.sin((9 + seed) * t) + 3 * np.sin((31 - seed) * t)
+    blank = cdf.Measurement(t, u, np.sin(t))
+    return cdf.Measurement(t, u, free_run(block, blank) + 1e-4 * rng.normal(size=n))
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """Baseline, and one with the spring that is missing, fitted and validated; the data."""
+    true = PLAIN.with_effect(cdf.LinearSpring(20.0))
+    data = prepare(PLAIN, [made(true, 0)], [made(true, 1)]).segmentations[1].fine
+    names = tuple(PLAIN.parameters)
+    base = data.validate(CandidateFit("", data.fit(PLAIN, names)))
+    sprung = PLAIN.with_effect(cdf.LinearSpring(10.0))
+    spring = CandidateFit("linear_spring", data.fit(sprung, tuple(sprung.parameters)), extra=1)
+    return data, base, data.validate(spring)
+
+
+def with_error(tried, segment, times):
+    """Return a model that errs so many times as much in one of the segments held out."""
+    held = tried.validation
+    errors = [e.copy() for e in held.residual]
+    errors[0][held.segments[0].slices[segment]] *= times
+    return replace(tried, validation=replace(held, residual=errors))
+
+
+def test_one_segment_held_out_speaks_for_no_effect(fitted):
+    _, base, spring = fitted
+    held = len(base.validation.segments[0])
+    assert held >= 4
+    for segment in range(held):
+        unlucky = with_error(base, segment, 100.0)
+        lucky = replace(base, key="linear_spring", extra=1)
+        judged = ranked(unlucky, [lucky])[0][0]
+        assert judged.evidence < 0 and judged.evidence_validation == pytest.approx(0, abs=1e-6)
+        # what all segments speak for is found all the same, whatever the baseline does in one of them
+        assert ranked(unlucky, [spring])[0][0].evidence > 100
+
+
+def test_a_failure_in_one_segment_counts(fitted):
+    _, base, spring = fitted
+    failed = with_error(spring, 0, 1e4)
+    judged = ranked(base, [failed])[0][0]
+    assert judged.evidence < 0 and judged.evidence_validation < 0
+
+
+def test_evidence_is_the_least_of_those_without_one_segment(fitted):
+    data, base, spring = fitted
+    judged = ranked(base, [spring])[0][0]
+    # white noise: what all tell, less the share of one segment
+    total = np.concatenate(base.residuals), np.concatenate(spring.residuals)
+    whole = 0.5 * len(total[0]) * np.log(np.sum(total[0] ** 2) / np.sum(total[1] ** 2))
+    count = sum(map(len, (data.train.segments[0], data.validation.segments[0])))
+    assert 0.6 * (1 - 1 / count) * whole < judged.evidence < whole
+
+
+def test_sigma_points_are_a_standard_deviation_off():
+    table = PLAIN.parameters
+    variables = [Variable(n, table[n], table[n].value) for n in table]
+    theta = np.array([v.q(table[v.name].value) for v in variables])
+    jacobian = np.random.default_rng(3).normal(size=(200, 3)) * (1.0, 20.0, 3.0)
+    curvature = jacobian.T @ jacobian
+    found = sigma_points(variables, theta, theta, np.zeros(3), curvature, 0.01)
+    steps = np.array([[v.q(p[v.name]) for v in variables] for p in found]) - theta
+    assert len(found) == 6
+    assert np.einsum("ij,jk,ik->i", steps, curvature / 0.01, steps) == pytest.approx(1, rel=1e-9)
+    assert steps[::2] == pytest.approx(-steps[1::2])
+    assert steps.T @ steps / 2 == pytest.approx(np.linalg.inv(curvature / 0.01), rel=1e-9)
+    # what data do not determine, and nothing else is known of, moves by a factor of e at most
+    loose = sigma_points(variables, theta, theta, np.zeros(3), 0 * curvature, 0.01)
+    assert max(p["mass"] for p in loose) == pytest.approx(2.0 * np.e)
+
+
+def test_a_fit_has_the_sigma_points_of_its_covariance(fitted):
+    _, _, spring = fitted
+    fit = spring.train
+    steps = np.array([[p[n] for n in fit.names] for p in fit.sigma_points]) - fit.values
+    spread = np.sqrt(np.einsum("ij,ij->j", steps, steps) / 2)
+    # its standard errors are of the noise's own colour
+    assert spread == pytest.approx(np.sqrt(np.diag(fit.covariance)), rel=0.3)
