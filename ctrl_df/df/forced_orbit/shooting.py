@@ -375,4 +375,3 @@ def spectral_radius(shot, jacobian):
 @part
 def _attracts(shot, jacobian):
     return spectral_radius(shot, jacobian) < 1.0 + NEUTRAL_SHOT
-
