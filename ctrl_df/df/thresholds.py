@@ -185,11 +185,11 @@ SAME_CURVE = 1e-3
 
 # --- forced periodic orbits -------------------------------------------------------------------------
 
-RTOL, COARSE = 5e-10, 1e-7
-"""Tolerance of shots, and while a transient is followed."""
+RTOL, COARSE = 5e-10, 1e-6
+"""Tolerance of shots, and while a transient is followed: it only leads near the orbit."""
 
-TOLERANCE = 3e-10
-"""Error of an orbit's state, relative to its size: what shots at `RTOL` allow."""
+TOLERANCE = 5e-10
+"""Error of an orbit's state, relative to its size: that of the shots themselves."""
 
 SHOTS, SHOTS_ALONE = 20, 24
 """For one orbit in a line and alone, beside those for Jacobians: while it comes nearer, no other start is
@@ -202,8 +202,16 @@ SHARP = (100, 1e3)
 """Mismatch and error, in tolerances of a shot, that are taken where fresh Jacobians bring it no nearer: along
 directions that hardly attract the error is larger than the mismatch."""
 
-ROUGHLY, SHARPER = 1e-7, 1e-3
-"""Tolerance of shots far from the orbit, and over the mismatch expected of them."""
+ROUGHLY, SHARPER = 3e-5, 1e-2
+"""Tolerance of shots far from the orbit, and over the mismatch expected of them, a hundredth of which spoils
+no correction of the Jacobian: of several both took the fewest steps over thirteen families."""
+
+STALE, JACOBIANS = 0.7, 5
+"""What is left of a mismatch after a step where the Jacobian has to be differenced anew, and how often it is:
+beyond, following the motion is cheaper."""
+
+TOO_FAR = 2.0
+"""Newton's step, in sizes of the motion, that leads out of its reach: the shot itself leads nearer."""
 
 EXPECTED, SHRINKS, SHRINKS_FIRST = 1e-2, 0.1, 0.01
 """Mismatch expected of the first shot; ratio of two that is expected to hold, and that of the first two."""
@@ -265,6 +273,11 @@ some below and above; one that stays in touch is enough."""
 KNOCKED, NUDGED, LATER, LATEST = 20, 30, 27, 40
 """Periods followed after a knock, and after what breaks a symmetry then; where the first ones did not do, and
 before a motion is taken to have no period."""
+
+SETTLED_AT_FIRST, SETTLED_BETTER, SETTLED_AT_LAST = 3e-2, 0.1, 1e-5
+"""Change from shot to shot, relative, at which a motion is taken to be near its orbit; by how much less it
+must be where none was found; and where no more is tried before the periods are over: coarse shots differ by
+little less."""
 
 WAITS = (64, 256, 1024, 4096)
 """Periods followed where a motion is seen to be still on its way."""

@@ -104,6 +104,10 @@ ROUGH = 0.1
 LAST_BASIS = 0.0084
 """Largest value of that term's basis function, theta^4 (1 - theta)^3, at theta = 4/7."""
 
+WAVE_ROUGH = 3.0
+"""Error of the interpolant, in tolerances, where outputs are only integrated: over a step it is 0.42 of its
+largest, 1/280 over `LAST_BASIS`, and the errors of steps cancel in part."""
+
 LOW_ORDER = 0.01
 """Weight of the error of order 3 beside that of order 5 in Dormand and Prince's 8(5,3) pair (HNW, II.5)."""
 
@@ -116,6 +120,9 @@ GAUSS = 10
 GAUSS_REACH, GAUSS_REACH_AFFINE = 10.0, 6.0
 """Angle [rad] of the highest harmonic between these: L^21 (10!)^4 / (21 (20!)^3) is 6e-10, and 1e-14 where
 the states themselves are exact."""
+
+GAUSS_FEW, GAUSS_REACH_FEW = 6, 2.0
+"""The same where few do: L^13 (6!)^4 / (13 (12!)^3) is 2e-12 at this angle."""
 
 # --- events -----------------------------------------------------------------------------------------
 

@@ -33,26 +33,31 @@ class Line:
         self._power = solver.symmetries.power
         self._past = np.zeros((4, max(len(self._power), 1)))
         self._mode, self._known = np.zeros(0, np.int64), 0
+        self.symmetrical = False  # the last orbit closed turned out to be, though sought without symmetry
 
     def close(self, first: int) -> int:
-        """Close the orbits from point `first` on, whose predecessor the solver has; return how many."""
+        """Close the orbits from point `first` on, whose predecessor the solver has; return how many.
+
+        Where laws are odd and an orbit sought without half-wave symmetry has it, it is the last of them.
+        """
         s, state = self.solver, self.solver.previous
         self._past[0, : len(state.x)] = state.x / self._units(first - 1)
         self._past[3, 0] = FIRST_STEP
         self._mode, self._known = state.mode.copy(), 1
-        p = first
+        p, broken = first, s.symmetric and not s.mirrored
+        self.symmetrical = False
         while p < len(self.A):  # compiled code hears no Ctrl-C: some points at a time
             end = min(p + AT_ONCE, len(self.A))
-            done, _, self._known = sweep(
+            done, self._known, self.symmetrical = sweep(
                 address(), s.shot.at, self._drive, self._scratch, self.A[p:end], self.omega[p:end],
-                self._power, self._past, self._mode, self._known, s.mirrored, RTOL,
+                self._power, self._past, self._mode, self._known, s.mirrored, broken, RTOL,
                 s._hmax(self.orders), s.max_steps, self.integrals[p:end], self.ends[p:end],
                 self.miss[p:end], self.kinds[p:end], self.still[p:end],
             )  # fmt: skip
             go_on()
             s._raise_if_raised()
             p += done
-            if p < end:
+            if p < end or self.symmetrical:
                 break
         return p - first
 

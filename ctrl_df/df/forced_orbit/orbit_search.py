@@ -31,6 +31,9 @@ from ..thresholds import (
     PUSHED,
     RTOL,
     RUNS_AWAY,
+    SETTLED_AT_FIRST,
+    SETTLED_AT_LAST,
+    SETTLED_BETTER,
     SHIFTS,
     SHOTS_ALONE,
     SIZE_AT_FIRST,
@@ -175,6 +178,7 @@ class OrbitSearch:
     def forget(self):
         """Start the next point from rest."""
         self.previous = self.first = None
+        self.broken = False
         self.shot.jacobian[:] = np.nan
         self.shot.size[:] = 0.0
         self.shot.clock[:] = 0.0  # the step of the last run: a line must not depend on the one before
@@ -241,14 +245,50 @@ class OrbitSearch:
         """Coordinates before each of some shots of the state, in place."""
         trail = np.empty((shots, len(state.x)))
         for first in range(0, shots, AT_ONCE):
-            reason, spent = follow(
-                self.shot.at, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
-                self._hmax(1) * self.period, FIRST_STEP * self.period, self.budget,
-                trail[first : first + AT_ONCE],
-            )  # fmt: skip
-            self.budget -= spent
-            self._checked(reason, state)
+            self._some(state, trail[first : first + AT_ONCE], rtol, (0.0, 0.0))
         return trail
+
+    def _some(self, state, trail, rtol, settled):
+        """Take some shots of the state, in place; return how many, and after how many it repeats.
+
+        Zero: it does not yet. `settled`: within what it has to, after one shot and after two.
+        """
+        reason, spent, done, repeats = follow(
+            self.shot.at, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
+            self._hmax(1) * self.period, FIRST_STEP * self.period, self.budget, trail, *settled,
+        )  # fmt: skip
+        self.budget -= spent
+        self._checked(reason, state)
+        return done, repeats
+
+    def _followed(self, state, periods, orders):
+        """Follow the state, in place, for some periods, and close its orbit where it seems to have settled.
+
+        It is tried as well each time the motion has been followed twice as long as before. Returns state and
+        mismatch of an attracting orbit, or None. A motion that repeats after two half periods, and not after
+        one, is closed as what it is; `mirrored` then says so.
+        """
+        settled, shots = [SETTLED_AT_FIRST] * 2, 2 if self.mirrored else 1
+        left, wait = shots * periods, shots * max(self.transient, 1)
+        ahead = wait  # shots to the next attempt, settled or not
+        while left > 0:
+            trail = np.empty((min(left, ahead, AT_ONCE), len(state.x)))
+            done, repeats = self._some(state, trail, COARSE, settled)
+            left, ahead = left - done, ahead - done
+            if repeats == 0 and left > 0 and ahead > 0:
+                continue
+            alternates = repeats == 2
+            if settled[alternates] > 0:
+                settled[alternates] *= SETTLED_BETTER if settled[alternates] > SETTLED_AT_LAST else 0.0
+            if alternates and not self.mirrored:
+                continue
+            wait = ahead = 2 * wait
+            self.mirrored = self.mirrored and not alternates
+            orbit = self._periodic(state, orders=orders)
+            if orbit is not None:
+                return orbit
+            self.mirrored = self.mirrored or alternates
+        return None
 
     def _checked(self, reason, state):
         go_on()

@@ -141,6 +141,11 @@ def _steady(means, sizes) -> bool:
     return True
 
 
+def _even(y):
+    """Largest even harmonic over the fundamental."""
+    return np.max(np.abs(y[..., 2::2]), axis=-1, initial=0.0) / np.maximum(np.abs(y[..., 1]), NOTHING)
+
+
 _kept = threading.local()
 
 
@@ -169,7 +174,7 @@ class OrbitSolver(OrbitSearch):
         line, power = Line(self, A, omega, orders), self.symmetries.power
         p = 0
         if self.previous is not None and self.first is not None:  # the line before starts where this one does
-            x, mode, units = self.first
+            x, mode, units, self.broken = self.first
             self.previous = State(0.0, x / units * A[0] / omega[0] ** power, mode)
         while p < n:
             # the point by itself: its start, its regime, its checks
@@ -180,27 +185,38 @@ class OrbitSolver(OrbitSearch):
             if p == 0:
                 self.first = None
                 if self.previous is not None and self.simple and name not in ("stuck", "free"):
-                    self.first = (self.previous.x, self.previous.mode, A[0] / omega[0] ** power)
+                    self.first = (self.previous.x, self.previous.mode, A[0] / omega[0] ** power, self.broken)
             p += 1
             if p == n or self.previous is None or not self.simple:
                 continue
-            done = line.close(p)
-            some = slice(p, p + done)
-            y = self._coefficients(
-                line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]
-            )
-            finished = self._turned(y, omega[some]) / A[some, None]
-            for q in range(p, p + done):
-                self.kinds, self.still = int(line.kinds[q]), bool(line.still[q])
-                name = self._name(y[q - p], line.ends[q, :, self.row], line.miss[q])
-                if name in ("stuck", "free"):  # these need a second look
-                    done = q - p
+            while p < n:
+                done = self._take_over(line, p, harmonics, regime, residual, row, column)
+                if done:
+                    p += done
+                    self.previous = line.state(p - 1)
+                if not (done and line.symmetrical):
                     break
-                harmonics[row[q], column[q]] = finished[q - p]
-                regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], line.miss[q]
-            if done:
-                p += done
-                self.previous = line.state(p - 1)
+
+    def _take_over(self, line, p, harmonics, regime, residual, row, column):
+        """Close points of a line from `p` on by compiled code; return how many need no second look."""
+        self.mirrored = self.symmetric and not self.broken
+        done = line.close(p)
+        some, A, omega = slice(p, p + done), line.A, line.omega
+        y = self._coefficients(
+            line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]
+        )
+        finished, even = self._turned(y, omega[some]) / A[some, None], _even(y)
+        for q in range(p, p + done):
+            self.kinds, self.still = int(line.kinds[q]), bool(line.still[q])
+            name = self._name(y[q - p, 1], even[q - p], line.ends[q, :, self.row], line.miss[q])
+            if name in ("stuck", "free"):  # these need a second look
+                line.symmetrical = False
+                return q - p
+            harmonics[row[q], column[q]] = finished[q - p]
+            regime[row[q], column[q]], residual[row[q], column[q]] = _CODE[name], line.miss[q]
+        if line.symmetrical:
+            self.broken = False
+        return done
 
     def solve_from(self, state, A: float, omega: float, orders: int):
         """`solve`, from a state of the caller's, or from rest (None), whatever was solved before."""
@@ -231,16 +247,19 @@ class OrbitSolver(OrbitSearch):
 
     def _answer(self, orders):
         """Coefficients Y_k, regime and residual at the present aim."""
-        self.mirrored, self.simple = self.symmetric, True
+        broken = self.broken and self.previous is not None
+        self.mirrored, self.simple, self.broken = self.symmetric and not broken, True, False
         state = self._given or self.previous or self._start(self.A)
         if self._given is not None:
             self._resize(self.A)
         state = state.copy()
         orbit = self._periodic(state, orders=orders) if self.previous is not None else None
         if orbit is None:
-            orbit = self._periodic(self._follow(state, self.transient), orders=orders)
+            state = self._follow(state, self.transient)
+            orbit = self._periodic(state, orders=orders)
         if orbit is None:
-            state = self._follow(state, LATER)
+            orbit = self._followed(state, max(LATER - self.transient, 1), orders)
+        if orbit is None:
             trail = self._trail(state, 5)
             orbit = self._periodic(state, orders=orders)
             if orbit is None and self.symmetric and self._alternates(trail):
@@ -251,8 +270,8 @@ class OrbitSolver(OrbitSearch):
                 orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
         if orbit is None and self.symmetric:
             self.mirrored = False
-            state = self._follow(self._nudged(state), LATEST)
-            orbit = self._periodic(state, orders=orders)
+            state = self._nudged(state)
+            orbit = self._followed(state, LATEST, orders)
         if self.gap and orbit is not None and not self.kinds & TOUCH and self._given is None:
             mirrored, within = self.mirrored, orbit[0]
             touching, state = self._touching(orders)
@@ -265,7 +284,11 @@ class OrbitSolver(OrbitSearch):
             return self._unperiodic(state, orders)
         self.previous = orbit[0]
         y = self._coefficients(self.integrals, self.ends, 1, self.mirrored)
-        return y, self._name(y, self.ends, orbit[1]), orbit[1]
+        if self.symmetric and not self.mirrored:
+            self.broken = bool(_even(y) > EVEN_LEAST)
+            if not self.broken:
+                self.shot.jacobian[:] = np.nan  # it is of shots twice as long
+        return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
 
     def _unperiodic(self, state, orders):
         """Look for a longer period; else follow the motion until it is steady, and average."""
@@ -292,7 +315,7 @@ class OrbitSolver(OrbitSearch):
         if orbit is not None:
             self.previous, self.simple = orbit[0], True
             y = self._coefficients(self.integrals, self.ends, 1, False)
-            return y, self._name(y, self.ends, orbit[1]), orbit[1]
+            return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
         self.previous = state
         mean = means.mean(axis=0)
         if self.gap and not self.touched:
@@ -334,7 +357,11 @@ class OrbitSolver(OrbitSearch):
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1
                     c = self._coefficients(self.integrals, self.ends, periods, False)
-                    name = f"subharmonic {periods}" if periods > 1 else self._name(c, self.ends, orbit[1])
+                    name = (
+                        f"subharmonic {periods}"
+                        if periods > 1
+                        else self._name(c[1], _even(c), self.ends, orbit[1])
+                    )
                     return c, name, orbit[1]
         return None
 
@@ -360,7 +387,7 @@ class OrbitSolver(OrbitSearch):
     def _finished(self, y, name):
         return np.full(len(y), np.nan + 0j) if name == "stuck" else self._turned(y) / self.A
 
-    def _name(self, y, ends, miss):
+    def _name(self, fundamental, even, ends, miss):
         """Regime of a motion of one period."""
         s, kinds = self.symmetries, self.kinds
         if self.still and not kinds & ~(BIT["corner"] | BIT["switch"]):
@@ -368,10 +395,9 @@ class OrbitSolver(OrbitSearch):
         if self.gap and not kinds & TOUCH:
             return "free"
         drift = abs(ends[1] - ends[0]) if not self.mirrored else 0.0
-        if drift > TRAVEL * abs(y[1]) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
+        if drift > TRAVEL * abs(fundamental) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
             return "drifting"
-        even = np.max(np.abs(y[2::2]), initial=0.0)
-        if self.symmetric and even > max(EVEN_LEAST, EVEN_MISS * miss) * abs(y[1]):
+        if self.symmetric and even > max(EVEN_LEAST, EVEN_MISS * miss):
             return "asymmetric"
         rigid = kinds & (BIT["impact"] | BIT["stop"])
         if kinds & BIT["stop contact"] or (kinds & BIT["contact"] and not self._elastic()):

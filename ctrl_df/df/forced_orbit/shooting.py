@@ -24,6 +24,7 @@ from ...simulate.kernel.driver import copy
 from ..thresholds import (
     EXPECTED,
     FAR_OFF,
+    JACOBIANS,
     NEUTRAL_SHOT,
     NOISE,
     PIVOT,
@@ -32,12 +33,13 @@ from ..thresholds import (
     SHARPER,
     SHRINKS,
     SHRINKS_FIRST,
-    SIZE_KEPT,
     SQUARINGS,
+    STALE,
     STILL,
     TOLERANCE,
+    TOO_FAR,
 )
-from .shot import coordinates, place, shot_at
+from .shot import coordinates, mismatch, place, shot_at
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
@@ -117,7 +119,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             return SPENT, best
         coordinates(shot, x, y1)
         copy(y1, end)
-        miss = _mismatch(shot, y0, y1)
+        miss = mismatch(shot, y0, y1)
         best = min(best, miss)
         rests = False  # a body at rest at the end of the shot is at rest, not nearly so
         for f in range(nf):
@@ -134,7 +136,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                 error = 0.0
                 for f in range(nf):
                     error = max(error, abs(change[f]) / shot.size[shot.free[f]])
-        stale = miss > 0.5 * previous
+        stale = miss > STALE * previous
         if not rests and (
             error < TOLERANCE
             or (take and stale and error < NOISE * rtol)
@@ -160,7 +162,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
         if nf == 0:
             return OPEN, miss
         if not known or (stale and not fresh_jacobian):
-            if jacobians == 3:
+            if jacobians >= JACOBIANS:
                 return OPEN, best
             if not _differentiate(
                 shot, at, drive, time, x0, m0, y1, mirrored, tolerance, atol, hmax, budget, first
@@ -178,7 +180,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             return OPEN, best
         too_far = False
         for f in range(nf):
-            if not abs(change[f]) <= 3.0 * shot.size[shot.free[f]]:
+            if not abs(change[f]) <= TOO_FAR * shot.size[shot.free[f]]:
                 too_far = True
         if too_far:
             # far from an orbit the motion itself is the better guide: x holds the end of the shot
@@ -373,27 +375,3 @@ def spectral_radius(shot, jacobian):
 @part
 def _attracts(shot, jacobian):
     return spectral_radius(shot, jacobian) < 1.0 + NEUTRAL_SHOT
-
-
-@part
-def _mismatch(shot, y0, y1):
-    """Return the closing error relative to the sizes of the coordinates; leave the step itself in y1."""
-    n = y0.shape[0]
-    seen = shot.space.size
-    for i in range(n):
-        size = max(abs(y0[i]), abs(y1[i]))
-        if shot.lower[i] > -math.inf:
-            size = shot.upper[i] - shot.lower[i]
-        elif shot.transform[i, i] == 1.0:
-            size = max(size, seen[i])
-        shot.size[i] = max(size, SIZE_KEPT * shot.size[i])
-    worst = 0.0
-    for i in range(n):
-        y1[i] -= y0[i]
-        if shot.wrap[i] > 0.0:
-            y1[i] -= shot.wrap[i] * round(y1[i] / shot.wrap[i])
-    for f in range(shot.free.shape[0]):
-        i = shot.free[f]
-        if y1[i] != 0.0:
-            worst = max(worst, abs(y1[i]) / shot.size[i])
-    return worst

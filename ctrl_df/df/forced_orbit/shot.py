@@ -9,6 +9,7 @@ A `Shot` holds what stays the same from shot to shot, so that compiled code allo
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +22,19 @@ from ...simulate.dynamics.flow import combine, refresh
 from ...simulate.dynamics.modes import settle
 from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
+from ...simulate.kernel.driver import copy
 from ...simulate.kernel.space import Space
 from ...simulate.program import layout as L
 from ...simulate.thresholds import HEIGHT
-from ..thresholds import CHATTER_ROOM, FIRST_STALE, SHOT_EVENTS, SIZE_FORGOTTEN, TOUCHING
+from ..thresholds import (
+    CHATTER_ROOM,
+    EVENS,
+    FIRST_STALE,
+    SHOT_EVENTS,
+    SIZE_FORGOTTEN,
+    SIZE_KEPT,
+    TOUCHING,
+)
 
 
 class Shot(NamedTuple):
@@ -120,17 +130,28 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
 
 
 @njit(error_model="numpy", nogil=True)
-def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget, trail):
+def follow(
+    shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget, trail, settled, twice_settled
+):
     """`take` one shot after another, as many as `trail` has rows, which receive the coordinates before each.
 
-    A step that another run has left behind is `step` [s] if it is no use here. Returns why the last one ended
-    and how many integration steps all took.
+    The motion is left as soon as it repeats within `settled`, relative to its size, after one shot, or after
+    two and not after one. A step that another run has left behind is `step` [s] if it is no use here. Returns
+    why the last shot ended, how many integration steps all took, how many shots there were, and after how
+    many the motion repeats (0: it does not yet).
     """
     at, shot = shot, shot_at(shot)
     drive, x, mode, trail = lean(drive), lean(x), lean(mode), lean(trail)
     reason, spent = driver.DONE, 0
     for k in range(trail.shape[0]):
         coordinates(shot, x, trail[k])
+        if k > 1:
+            once = _changes(shot, trail, k, 1)
+            if once < settled:
+                return reason, spent, k, 1
+            twice = _changes(shot, trail, k, 2)
+            if twice < twice_settled and twice < EVENS * once:
+                return reason, spent, k, 2
         if not 0.0 < shot.clock[2] <= FIRST_STALE * step:
             shot.clock[2] = step
         reason = call_native(
@@ -141,8 +162,16 @@ def follow(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget,
         )  # fmt: skip
         spent += int(shot.clock[3])
         if reason != driver.DONE or spent >= budget:
-            break
-    return reason, spent
+            return reason, spent, k + 1, 0
+    return reason, spent, trail.shape[0], 0
+
+
+@part
+def _changes(shot, trail, k, shots):
+    """Change of the coordinates to row k of a trail over so many shots, relative to their sizes."""
+    step = shot.trial[0]
+    copy(trail[k], step)
+    return mismatch(shot, trail[k - shots], step)
 
 
 @apart
@@ -292,3 +321,27 @@ def place(shot, y, x, mode):
                 driven = first + 2 * (prog.ints[prog.nodes[k, L.AUX]] - 1)
                 if (x[driven] != shot.low[driven] and x[driven] != shot.high[driven]) or x[driven + 1] != 0.0:
                     mode[at + L.WALL] = 0
+
+
+@part
+def mismatch(shot, y0, y1):
+    """Return the closing error relative to the sizes of the coordinates; leave the step itself in y1."""
+    n = y0.shape[0]
+    seen = shot.space.size
+    for i in range(n):
+        size = max(abs(y0[i]), abs(y1[i]))
+        if shot.lower[i] > -math.inf:
+            size = shot.upper[i] - shot.lower[i]
+        elif shot.transform[i, i] == 1.0:
+            size = max(size, seen[i])
+        shot.size[i] = max(size, SIZE_KEPT * shot.size[i])
+    worst = 0.0
+    for i in range(n):
+        y1[i] -= y0[i]
+        if shot.wrap[i] > 0.0:
+            y1[i] -= shot.wrap[i] * round(y1[i] / shot.wrap[i])
+    for f in range(shot.free.shape[0]):
+        i = shot.free[f]
+        if y1[i] != 0.0:
+            worst = max(worst, abs(y1[i]) / shot.size[i])
+    return worst

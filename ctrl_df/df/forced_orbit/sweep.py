@@ -12,7 +12,7 @@ from ...simulate.compiler.views import lean
 from ...simulate.kernel.driver import copy
 from ...simulate.program import layout as L
 from ...simulate.program.layout import Drive
-from ..thresholds import FIRST_LONGEST, SHOTS
+from ..thresholds import EVEN_LEAST, FIRST_LONGEST, SHOTS
 from .shooting import CLOSED
 from .shot import coordinates, place, shot_at
 
@@ -20,14 +20,14 @@ from .shot import coordinates, place, shot_at
 @njit(error_model="numpy", nogil=True)
 def sweep(
     close, shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
-    rtol, hmax, budget, out, ends, miss, kinds, still,
+    broken, rtol, hmax, budget, out, ends, miss, kinds, still,
 ):  # fmt: skip
     """Close the orbits of consecutive points, each started from those before; stop where one does not close.
 
     `past` (4, n): scaled states of the points before, newest first, `known` of them, and the step size
     relative to the period in ``past[3, 0]``; `past_mode` the newest modes. `coefficients`: (1, nh) scratch
-    of the drive; `close`: address of `shooting.close`. Returns points done, outcome of the last, points
-    known.
+    of the drive; `close`: address of `shooting.close`. With `broken` an orbit without even harmonics is the
+    last. Returns points done, points known, whether the last one is such an orbit.
     """
     at, shot = shot, shot_at(shot)
     samples, coefficients, amplitudes, omegas = (
@@ -67,7 +67,7 @@ def sweep(
         miss[p] = shot.error[0]
         past[3, 0] = min(shot.clock[2] / period, FIRST_LONGEST)
         if outcome != CLOSED:
-            return p, outcome, known
+            return p, known, False
         eager = shot.tally[0] <= 2
         kinds[p] = shot.tally[2]
         still[p] = shot.tally[5]
@@ -82,7 +82,21 @@ def sweep(
         if kinds[p] != before:
             known = 1
         before = kinds[p]
-    return amplitudes.shape[0], CLOSED, known
+        if broken and evenless(out[p, out.shape[1] - 1]):
+            for r in range(shot.jacobian.shape[0]):
+                for c in range(shot.jacobian.shape[1]):
+                    shot.jacobian[r, c] = math.nan  # it is of shots twice as long
+            return p + 1, known, True
+    return amplitudes.shape[0], known, False
+
+
+@part
+def evenless(integrals):
+    """Whether an output has no even harmonics, its mean left aside."""
+    even = 0.0
+    for k in range(2, integrals.shape[0], 2):
+        even = max(even, abs(integrals[k]))
+    return even <= EVEN_LEAST * abs(integrals[1])
 
 
 @part

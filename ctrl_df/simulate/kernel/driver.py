@@ -55,6 +55,7 @@ from ..thresholds import (
     STEP_SAFETY,
     STEP_SHRINK,
     UNSETTLED,
+    WAVE_ROUGH,
     ZENO,
 )
 from .affine import crossing, forced, recall, series, shrink
@@ -390,9 +391,13 @@ def advance(
                 if rank == 8:
                     prepare8(prog, drive, segment, t, length, x, x1, mode, work, k, dx, poly)
                     rough = roughness(size, grain, length, rtol, atol, poly)
+                    if not (suspect or inner or delays):
+                        rough /= WAVE_ROUGH
                     if rough > 1.0:
                         h = length * max(STEP_KEPT, STEP_SAFETY * rough ** (-0.125))
                         continue
+                    if spectrum.shape[1] > 0 and rough > GROWS_8:  # the next one is integrated as well
+                        h_next = min(h_next, length * min(STEP_GROWTH, STEP_SAFETY * rough ** (-0.125)))
                 else:
                     terms = prepare(rank, length, k, poly)
             if suspect:

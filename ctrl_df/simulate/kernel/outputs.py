@@ -13,11 +13,14 @@ from ..dynamics import history
 from ..dynamics.flow import combine, external, node_input, refresh, signals
 from ..dynamics.modes import advance_state, answers_at_once, hold, settle
 from ..program.layout import DELAY, FEED, H_DELAYS, H_NS, H_NY, H_OUT, KIND, NIN, NOUT, NX, PAR, SAMPLED
-from ..thresholds import GAUSS, TICK
+from ..thresholds import GAUSS, GAUSS_FEW, GAUSS_REACH_FEW, TICK
 from .stepper import inside
 
-NODES, WEIGHTS = (a / 2 for a in np.polynomial.legendre.leggauss(GAUSS))
-NODES = NODES + 0.5
+NODES, WEIGHTS = np.zeros((2, GAUSS)), np.zeros((2, GAUSS))
+"""Of the quadrature over a step, from zero to one, by few nodes and by many."""
+for _row, _count in enumerate((GAUSS_FEW, GAUSS)):
+    _nodes, _weights = np.polynomial.legendre.leggauss(_count)
+    NODES[_row, :_count], WEIGHTS[_row, :_count] = 0.5 + _nodes / 2, _weights / 2
 
 
 @part
@@ -98,29 +101,32 @@ def accumulate(prog, drive, segment, t, length, theta, x, mode, work, terms, pol
 
     The nodes lie in pairs about the middle of the step, and so do the phases of the waves there.
     """
-    w, last, driven = work[0], NODES.shape[0] - 1, _driven(prog)
+    w, driven = work[0], _driven(prog)
+    row, count = 1, GAUSS
+    if spectrum.shape[1] * omega * theta * length < GAUSS_REACH_FEW:
+        row, count = 0, GAUSS_FEW
     middle = omega * (t + 0.5 * theta * length)
     center, aside = complex(math.cos(middle), -math.sin(middle)), complex(1.0, 0.0)
-    for step in range(NODES.shape[0]):
-        i = step // 2 if step % 2 == 0 else last - step // 2
-        at = theta * NODES[i]
+    for step in range(count):
+        i = step // 2 if step % 2 == 0 else count - 1 - step // 2
+        at = theta * NODES[row, i]
         time = t + at * length
         inside(terms, at, x, poly, xi)
         if driven:
             external(prog, drive, time, segment, w)
         signals(prog, time, xi, mode, w)
-        share = theta * length * WEIGHTS[i]
+        share = theta * length * WEIGHTS[row, i]
         if step % 2 == 0:
-            angle = omega * (NODES[i] - 0.5) * theta * length
+            angle = omega * (NODES[row, i] - 0.5) * theta * length
             aside = complex(math.cos(angle), -math.sin(angle))
         else:
             aside = aside.conjugate()
         turn = center * aside
-        for row in range(spectrum.shape[0]):
-            value = share * combine(prog, prog.ints[prog.ints[H_OUT] + row], w)
+        for output in range(spectrum.shape[0]):
+            value = share * combine(prog, prog.ints[prog.ints[H_OUT] + output], w)
             rotation = complex(1.0, 0.0)
             for harmonic in range(spectrum.shape[1]):
-                spectrum[row, harmonic] += value * rotation
+                spectrum[output, harmonic] += value * rotation
                 rotation *= turn
 
 
