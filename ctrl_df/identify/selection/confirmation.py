@@ -161,25 +161,40 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     near = over(middle, fits, short, floor)
     far = over(longest, near, near, floor)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
-    pairs = zip(near, far, strict=True)
-    far = side_by_side(lambda pair: _begun_about(longest, pair[0], pair[1], likely), pairs)
-    return [short, near, far], floor
+    both = side_by_side(
+        lambda pair: _begun_again(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
+    )
+    return [short, [n for n, _ in both], [f for _, f in both]], floor
 
 
-def _begun_about(
-    longer: SegmentedData, near: FitResult | None, far: FitResult | None, likely: float
-) -> FitResult | None:
-    """Return the fit of a model in longer segments, begun all about what shorter ones say of its parameters.
+def _begun_again(
+    shorter: SegmentedData,
+    longer: SegmentedData,
+    near: FitResult | None,
+    far: FitResult | None,
+    likely: float,
+):
+    """Return the fits of a model in shorter and in longer segments, begun again where they do not agree.
 
     Of laws with events the cost over long segments has many minima, the right one within what shorter
-    segments leave open. Where long segments show no more error than short ones it is found; `likely`: the
-    error over long ones beyond which a model is behind for other reasons.
+    segments leave open; if it is not there these have missed it, and the fit over long ones may be nearer.
+    Where long segments show no more error than short ones both are right; `likely`: the error over long ones
+    beyond which a model is behind for other reasons.
     """
     if near is None or far is None or not far.model.nonsmooth:
-        return far
-    if far.rmse <= FLOOR * near.rmse or far.rmse > likely:
-        return far
-    models = [near.model.with_parameters(feasible(near.model, values)) for values in near.sigma_points]
+        return near, far
+    if FLOOR * near.rmse < far.rmse <= likely:
+        far = _about(near, longer, far)
+    if FLOOR * near.rmse < far.rmse <= likely:
+        back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
+        near, far = min(near, back, key=lambda f: f.rmse), _about(back, longer, far)
+    return near, far
+
+
+def _about(near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
+    """Return the best of a fit in longer segments and of those begun all about one in shorter ones."""
+    points = [near.parameters, *near.sigma_points]
+    models = [near.model.with_parameters(feasible(near.model, values)) for values in points]
     begun = side_by_side(
         lambda model: longer.moved(replace(near, model=model), iterations=2, hopeless=HOPELESS * far.rmse),
         models,

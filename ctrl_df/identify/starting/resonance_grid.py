@@ -29,9 +29,7 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
             found.append(screen.data.fit(block, (), iterations=1, hopeless=hopeless))
     near = sorted(found, key=lambda f: f.rmse)[:JOINTS_TRIED]
     again = [
-        screen.data.fit(
-            f.model, (), starts=f.starts, iterations=2, tolerance=JOINT_GAIN, hopeless=hopeless
-        )
+        screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=JOINT_GAIN, hopeless=hopeless)
         for f in near
     ]
     return sorted(again, key=lambda f: f.rmse)[:count]
