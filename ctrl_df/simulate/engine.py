@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -73,7 +73,10 @@ class State:
         """Return an independent copy."""
         scale = None if self.scale is None else self.scale.copy()
         # a history is written by no one once it stands in a state
-        return replace(self, x=self.x.copy(), mode=self.mode.copy(), scale=scale)
+        return State(
+            self.time, self.x.copy(), self.mode.copy(), self.step, self.segment, self.on_section, self.fresh,
+            scale, self.history,
+        )  # fmt: skip
 
 
 @dataclass

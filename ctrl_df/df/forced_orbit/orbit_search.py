@@ -427,7 +427,7 @@ class OrbitSearch:
         period, k = 2 * np.pi / omega, np.arange(integrals.shape[-1])
         if mirrored:
             y = 4 / period * integrals
-            center = ends.mean(axis=-1)
+            center = 0.5 * (ends[..., 0] + ends[..., 1])
             # the integral of a constant over half a period is 2 / (j k omega)
             y[..., 1::2] -= 4 / period * 2 * center[..., None] / (1j * k[1::2] * omega)
             y[..., 0::2] = 0.0
@@ -444,7 +444,7 @@ class OrbitSearch:
     def _turned(self, y, omega=None):
         """Delays turn the phase of every harmonic."""
         omega = np.asarray(self.omega if omega is None else omega)[..., None]
-        y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay)
+        y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay) if self.delay else y.copy()
         y[..., 0] += 0.0 if self.free_row else self.offset
         return y
 

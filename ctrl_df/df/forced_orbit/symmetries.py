@@ -93,8 +93,9 @@ class Sizes:
 
     def near(self, other: Sizes, factor: float) -> bool:
         """Whether all sizes agree within a factor."""
-        ratios = np.append(self.states / other.states, (self.force / other.force, self.rate / other.rate))
-        return bool(ratios.max() <= factor and ratios.min() >= 1 / factor)
+        ratios = (self.states / other.states).tolist()
+        ratios += [self.force / other.force, self.rate / other.rate]
+        return max(ratios) <= factor and min(ratios) >= 1 / factor
 
 
 class Samples(NamedTuple):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from ...simulate.crew import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.thresholds import RESTARTS_KEPT
 from ..starting.screen import Screen
 from ..thresholds import BY_CHANCE, GROWTH
 from .attempts import tried
@@ -80,7 +81,7 @@ class FirstLook:
     def rivals(self, at: Standing, model, names) -> list[CandidateFit]:
         """Return effects that may do what the model of one effect more does, with evidence over it."""
         data = at.data.sampled
-        known = data.fit(model, names, iterations=4)
+        known = data.fit(model, names, iterations=4, followed=RESTARTS_KEPT)
         _, found = self._tried(at, data, reached=known.rmse)
         more = len(names) - len(self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]

@@ -9,6 +9,7 @@ from functools import partial
 from ..course import Course
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
+from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.sensed import POSITION, sensed
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT, UNMOVED
 from .attempts import own_names
@@ -182,7 +183,7 @@ class StructureSearch(Search):
 
     def fitted(self, block, names, iterations):
         """Return a block with these parameters fitted, and run over the segments held out."""
-        found = self.at.data.fit(block, names, iterations=iterations)
+        found = self.at.data.fit(block, names, iterations=iterations, followed=RESTARTS_KEPT)
         return self.at.data.validate(
             CandidateFit(block.newest if block.effects else "", found, extra=len(names))
         )
