@@ -128,6 +128,17 @@ class FitResult:
             return self.by_segment(signals)
         return [x[b] for w, x in zip(self.segments, signals, strict=True) for b in w.blocks]
 
+    def with_errors(self, errors: Mapping[str, float]) -> FitResult:
+        """Return the same with standard errors of some parameters known otherwise, where it has any."""
+        if not len(self.covariance):
+            return self
+        covariance = self.covariance.copy()
+        for name, error in errors.items():
+            i = self.names.index(name)
+            covariance[i, :] = covariance[:, i] = 0.0
+            covariance[i, i] = error**2
+        return replace(self, covariance=covariance)
+
     @property
     def segment_of(self) -> list[np.ndarray]:
         """Of every sample of `residual_pieces` the number of its segment, counted over all records."""

@@ -166,10 +166,16 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
 
 
 def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
-    """Choose thresholds by the segments to validate on, within what the segments fitted leave open."""
-    table = tried.block.parameters
+    """Choose thresholds by the segments to validate on, within what the segments fitted leave open.
+
+    What is left open is their error: single samples pass a static level, and slopes know nothing of it.
+    """
+    table, spreads = tried.block.parameters, {}
     for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = _open_range(tried.train, data.fit, name)
+        # nothing nearer was tried; the spread of a uniform distribution
+        least = 2 * OPEN_RANGE[0] * tried.train.parameters[name]
+        spreads[name] = max(high - low, least) / math.sqrt(12)
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, 7)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
@@ -177,9 +183,8 @@ def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit
             if runs[i].validation_rmse < tried.validation_rmse:
                 tried = runs[i]
             low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
-        tried = replace(
-            tried, train=data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
-        )
+        train = data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
+        tried = replace(tried, train=train.with_errors(spreads))
     return tried
 
 
