@@ -431,7 +431,7 @@ def test_other_threads_of_python_go_on():
         beats.append(time.perf_counter())
         time.sleep(1e-3)
     # one that waits for the call beats at its two ends alone
-    assert len(beats) > 20 and max(np.diff(beats)) < 0.5 * (beats[-1] - beats[0])
+    assert len(beats) > 3 and max(np.diff(beats)) < 0.5 * (beats[-1] - beats[0])
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no POSIX signals")

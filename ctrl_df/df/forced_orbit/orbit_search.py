@@ -278,11 +278,12 @@ class OrbitSearch:
             if repeats == 0 and left > 0 and ahead > 0:
                 continue
             alternates = repeats == 2
-            if settled[alternates] > 0:
+            if repeats > 0 and settled[alternates] > 0:
                 settled[alternates] *= SETTLED_BETTER if settled[alternates] > SETTLED_AT_LAST else 0.0
             if alternates and not self.mirrored:
                 continue
-            wait = ahead = 2 * wait
+            if ahead == 0:
+                wait = ahead = 2 * wait
             self.mirrored = self.mirrored and not alternates
             orbit = self._periodic(state, orders=orders)
             if orbit is not None:

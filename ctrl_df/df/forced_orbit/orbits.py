@@ -262,7 +262,7 @@ class OrbitSolver(OrbitSearch):
         if orbit is None:
             trail = self._trail(state, 5)
             orbit = self._periodic(state, orders=orders)
-            if orbit is None and self.symmetric and self._alternates(trail):
+            if orbit is None and self.mirrored and self._alternates(trail):
                 self.mirrored = False
                 orbit = self._periodic(state, orders=orders)
                 self.mirrored = orbit is None
@@ -284,11 +284,18 @@ class OrbitSolver(OrbitSearch):
             return self._unperiodic(state, orders)
         self.previous = orbit[0]
         y = self._coefficients(self.integrals, self.ends, 1, self.mirrored)
+        self._remember_symmetry(y)
+        return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
+
+    def _remember_symmetry(self, y):
+        """Keep whether the orbit has lost the symmetry of half periods: the next one begins as it does.
+
+        Without even harmonics asked for that is not known.
+        """
         if self.symmetric and not self.mirrored:
-            self.broken = bool(_even(y) > EVEN_LEAST)
+            self.broken = len(y) < 3 or bool(_even(y) > EVEN_LEAST)
             if not self.broken:
                 self.shot.jacobian[:] = np.nan  # it is of shots twice as long
-        return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
 
     def _unperiodic(self, state, orders):
         """Look for a longer period; else follow the motion until it is steady, and average."""
@@ -315,6 +322,7 @@ class OrbitSolver(OrbitSearch):
         if orbit is not None:
             self.previous, self.simple = orbit[0], True
             y = self._coefficients(self.integrals, self.ends, 1, False)
+            self._remember_symmetry(y)
             return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
         self.previous = state
         mean = means.mean(axis=0)
@@ -357,6 +365,8 @@ class OrbitSolver(OrbitSearch):
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1
                     c = self._coefficients(self.integrals, self.ends, periods, False)
+                    if self.simple:
+                        self._remember_symmetry(c)
                     name = (
                         f"subharmonic {periods}"
                         if periods > 1

@@ -92,7 +92,9 @@ def sweep(
 
 @part
 def evenless(integrals):
-    """Whether an output has no even harmonics, its mean left aside."""
+    """Whether an output has no even harmonics, its mean left aside; not where none were asked for."""
+    if integrals.shape[0] < 3:
+        return False
     even = 0.0
     for k in range(2, integrals.shape[0], 2):
         even = max(even, abs(integrals[k]))

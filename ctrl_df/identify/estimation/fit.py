@@ -20,7 +20,7 @@ from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import Problem
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, step_of_sensor
-from ..thresholds import RTOL
+from ..thresholds import NOTHING, RTOL
 from .covariance import covariance_of
 from .sensitivity import OutputSensitivity
 from .sigma_points import sigma_points
@@ -102,7 +102,7 @@ class FitResult:
         if self.sensitivity is None or self.about is None:
             return []
         slopes = np.concatenate(self.sensitivity.parameters)
-        return self.about(slopes.T @ slopes, self.rmse**2)
+        return self.about(slopes.T @ slopes, max((self.rmse * self.unit) ** 2, NOTHING))
 
     def __getstate__(self):
         # what works them out stays behind with the simulations of the fit
@@ -402,5 +402,5 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         starts=found.states.values,
         segments=stage.segments,
         linear=linear,
-        about=partial(sigma_points, problem.variables, theta, problem.about, problem.precision),
+        about=partial(sigma_points, problem.variables, theta, problem.precision),
     )

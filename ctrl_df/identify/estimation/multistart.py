@@ -203,7 +203,7 @@ def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> t
             moved = _moved(found.model, name, value)
             if fit(moved, (), starts=found.starts, iterations=2).rmse > SAME * found.rmse:
                 break
-            edge = value
+            edge = moved.parameters[name].value
         edges.append(edge)
     return edges[0], edges[1]
 

@@ -10,7 +10,7 @@ from ..shooting.variables import Variable
 
 
 def sigma_points(
-    variables: Sequence[Variable], theta, about, precision, curvature, variance: float
+    variables: Sequence[Variable], theta, precision, curvature, variance: float
 ) -> list[dict[str, float]]:
     """Return the values one standard deviation off an estimate, to both sides along every principal axis.
 
@@ -20,8 +20,8 @@ def sigma_points(
         p of them.
     theta : (p,) array
         The estimate, scaled.
-    about, precision : (p,) arrays
-        What is known beforehand (see `beforehand`).
+    precision : (p,) array
+        Of what is known beforehand (see `beforehand`).
     curvature : (p, p) array
         Of half the squared error: ``J.T @ J`` of the outputs' derivatives by scaled parameters.
     variance : float
@@ -30,7 +30,7 @@ def sigma_points(
     Returns
     -------
     list of dict
-        2 p of them, within the bounds, and no farther than a factor of e.
+        2 p of them, within the bounds, and no farther than a factor of e, or (of what may be zero) its scale.
 
     References
     ----------

@@ -82,7 +82,8 @@ class CandidateEffect(Predicting):
         Error of the block with this effect on training and on held-out data, over the rms of the centred
         output.
     evidence : float
-        Log likelihood ratio [nats] over the refitted baseline, less the price of its parameters (Schwarz).
+        Log likelihood ratio [nats] over the refitted baseline, less the price of its parameters (Schwarz). Of
+        several segments held out the one that speaks most for the effect does not count.
     probability : float
         Among all candidates and "nothing missing", equal before the data.
     parameters : dict
@@ -92,7 +93,7 @@ class CandidateEffect(Predicting):
     model : block
         The refitted block with the effect.
     evidence_holdout : float
-        Log likelihood ratio [nats] on the held-out data alone.
+        Log likelihood ratio [nats] on the held-out data alone, without the same segment.
     confirmed : bool
         Whether it was refitted at the full rate and tried on held-out data (the best few are).
     errors : dict

@@ -184,16 +184,16 @@ def _begun_again(
     if near is None or far is None or not far.model.nonsmooth:
         return near, far
     if FLOOR * near.rmse < far.rmse <= likely:
-        far = _about(near, longer, far)
+        far = _about(near.sigma_points, near, longer, far)
     if FLOOR * near.rmse < far.rmse <= likely:
         back = shorter.fit(far.model, far.names, followed=RESTARTS_KEPT)
-        near, far = min(near, back, key=lambda f: f.rmse), _about(back, longer, far)
+        points = [back.parameters, *back.sigma_points]
+        near, far = min(near, back, key=lambda f: f.rmse), _about(points, back, longer, far)
     return near, far
 
 
-def _about(near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
-    """Return the best of a fit in longer segments and of those begun all about one in shorter ones."""
-    points = [near.parameters, *near.sigma_points]
+def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
+    """Return the best of a fit in longer segments and of those begun at points about one in shorter ones."""
     models = [near.model.with_parameters(feasible(near.model, values)) for values in points]
     begun = side_by_side(
         lambda model: longer.moved(replace(near, model=model), iterations=2, hopeless=HOPELESS * far.rmse),

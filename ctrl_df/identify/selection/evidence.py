@@ -13,6 +13,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
+from ..thresholds import NOTHING
 from .rounding import rounding_evidence
 from .thresholds import REFUTED
 
@@ -80,28 +81,27 @@ def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
 
 
 def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
-    """Return the log likelihood ratio of all segments, and of those held out, the one most for it left out.
+    """Return the log likelihood ratio of all segments, and of those held out, less the one most for it.
 
     Held out a model may follow, or fail, in a single segment by luck, with an error that outweighs all
     others: no effect may rest on one.
     """
     (power, n), (power_t, _) = before.fitted, after.fitted
-    held = list(zip(before.without, after.without, strict=True))
-    return (
-        min(_gain((power + p, n + k), power_t + q) for (p, k), (q, _) in held),
-        min(_gain(b, q) for b, (q, _) in held),
+    return min(
+        (_gain(power + p, n + k, power_t + q), _gain(p, k, q))
+        for (p, k), (q, _) in zip(before.without, after.without, strict=True)
     )
 
 
-def _gain(before: tuple[float, int], power: float) -> float:
-    return 0.5 * before[1] * math.log(before[0] / power) if before[1] else 0.0
+def _gain(power: float, number: int, power_t: float) -> float:
+    return 0.5 * number * math.log(max(power, NOTHING) / max(power_t, NOTHING))
 
 
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
     """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
     step = _step(tried)
     powers = _powers(base, prediction_error_filter(base.residuals, None, base.train.outputs))
-    # a sample counts little for rounding, whatever the model does: luck is where the baseline errs most
+    # where a model errs by more than a step a sample counts as stray: luck is where the baseline errs most
     lucky = min(range(len(powers.without)), key=lambda i: powers.without[i][0])
     left_out = lucky if len(powers.without) > 1 else -1
     gains = []
@@ -109,7 +109,7 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
         (base.train, powers.fitted, -1),
         (base.validation, powers.without[lucky], left_out),
     ):
-        if fit is None:
+        if fit is None or not plain[1]:
             gains.append(0.0)
             continue
         kept = [segment != out for segment in fit.segment_of]
@@ -117,6 +117,6 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
         measured = [y + e[k] for y, e, k in zip(simulated, fit.residual_pieces, kept, strict=True)]
         # for as many samples as the rounding is judged by: a density has a unit, a ratio of two has none
         samples = sum(map(len, measured))
-        likelihood = -0.5 * samples * math.log(2 * math.pi * math.e * plain[0] / plain[1])
+        likelihood = -0.5 * samples * math.log(2 * math.pi * math.e * max(plain[0], NOTHING) / plain[1])
         gains.append(rounding_evidence(measured, simulated, step) - likelihood)
     return sum(gains), gains[1]
