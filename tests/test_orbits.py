@@ -442,3 +442,13 @@ def test_unfit_blocks_and_arguments_are_refused():
         one(sampled(ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1)), 1.0, 1.0)
     with pytest.raises(TypeError, match="unrecognized keyword"):
         one(friction_mass(9, 5), 20.0, 5.0, order=3)
+
+
+def test_harmonics_asked_for_do_not_change_the_orbits():
+    # symmetry is lost on this family, and comes back: one harmonic alone does not show it
+    block = (
+        cdf.friction_mass(9, 5, 0.5).with_effect(cdf.LinearSpring(200.0)).with_effect(cdf.CubicSpring(1e5))
+    )
+    A, omega = np.geomspace(8, 60, 8), np.geomspace(2, 30, 8)
+    one, five = (np.array(cdf.describing_function_family(block, A, omega, orders=k).N) for k in (1, 5))
+    assert np.max(np.abs(one - five) / np.abs(five)) < 1e-8  # measured 4e-10
