@@ -48,7 +48,8 @@ def test_it_separates_on_the_true_plant(hidden, other, seed, closed, asked):
     force, stroke = 1.2 * np.max(np.abs(record.u)), 1.5 * np.max(np.abs(record.y - record.y[0]))
     plan = next_experiment(left_open(before), force=force, stroke=stroke, loop=loop, **asked)
     assert set(plan.candidates) == {hidden, other}
-    # seen 0.4 to 120; over 10,000 samples a fifth of the noise is hundreds of nats
+    # seen 0.37 to 120: stiction is a limit of Stribeck friction, and both fits come to the truth;
+    # over 10,000 samples a fifth of the noise is hundreds of nats
     assert plan.separation > 0.2
     assert all(name.replace("_", " ") in plan.reason for name in plan.candidates)
 

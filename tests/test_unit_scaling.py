@@ -20,7 +20,8 @@ def first(hidden, *rivals):
     return diagnosed(hidden, (candidate(hidden), *rivals))
 
 
-def test_rivals_are_ranked_alike(scale=SCALES[2]):
+@pytest.mark.parametrize("scale", SCALES)
+def test_rivals_are_ranked_alike(scale):
     before = first("linear_spring", *RIVALS)
     after = diagnosed("linear_spring", ("linear_spring", *RIVALS), *scale)
     assert [c.id for c in after.ranking] == [c.id for c in before.ranking]

@@ -201,6 +201,8 @@ class OrbitSolver(OrbitSearch):
         """Close points of a line from `p` on by compiled code; return how many need no second look."""
         self.mirrored = self.symmetric and not self.broken
         done = line.close(p)
+        if line.symmetrical:
+            self.shot.jacobian[:] = np.nan  # it is of shots twice as long
         some, A, omega = slice(p, p + done), line.A, line.omega
         y = self._coefficients(
             line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]

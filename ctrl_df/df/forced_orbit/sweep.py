@@ -83,9 +83,6 @@ def sweep(
             known = 1
         before = kinds[p]
         if broken and evenless(out[p, out.shape[1] - 1]):
-            for r in range(shot.jacobian.shape[0]):
-                for c in range(shot.jacobian.shape[1]):
-                    shot.jacobian[r, c] = math.nan  # it is of shots twice as long
             return p + 1, known, True
     return amplitudes.shape[0], known, False
 
