@@ -14,6 +14,7 @@ import numpy as np
 from numba.core import config
 
 _here = threading.local()
+_at_work: set[int] = set()  # threads that have a job
 
 
 class Stopped(Exception):  # noqa: N818 - not an error: the thread that waits was interrupted
@@ -87,6 +88,11 @@ def pool(process: int, threads: int, purpose: str) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix=f"ctrl_df {purpose}")
 
 
+def spare() -> int:
+    """Return how many processors have no job of this process now."""
+    return max(processors() - len(_at_work), 0)
+
+
 def flag() -> np.ndarray | None:
     """Return what asks the jobs of this thread to stop (not zero), (1,); None: it has no such jobs."""
     return getattr(_here, "flag", None)
@@ -119,12 +125,14 @@ def side_by_side(function: Callable, items: Iterable, executor: Executor | None 
 
     def job(item):
         _here.flag = stop
+        _at_work.add(threading.get_ident())
         try:
             if stop[0]:
                 raise Stopped
             return function(item)
         finally:
             _here.flag = None
+            _at_work.discard(threading.get_ident())
 
     check()
     if executor is None:

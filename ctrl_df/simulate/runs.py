@@ -195,13 +195,10 @@ class _Work:
         self.failed: dict[int, Exception] = {}
 
     def on_threads(self, threads: int) -> None:
-        """Make all runs, so many at once; in this thread where others have their own."""
+        """Make all runs, so many at once; a job makes its own, with the processors that have no job."""
         flag = crew.flag()
         if flag is not None:
-            self.stop = flag
-            self._work(deque((group, group.runs.astype(np.int64)) for group in self.groups))
-            if flag[0]:
-                raise crew.Stopped
+            self._as_job(flag)
             return
         todo = deque(self._parts(threads))
         threads = max(min(threads, len(todo)), 1)
@@ -222,6 +219,19 @@ class _Work:
             self.stop[0] = 1
             wait(workers)
             raise
+
+    def _as_job(self, flag) -> None:
+        """Make all runs in this thread, and in those of processors that have no job."""
+        self.stop, others = flag, crew.spare()
+        todo = deque(self._parts(1 + others) if others else self._whole())
+        threads = crew.pool(os.getpid(), crew.processors(), "runs")
+        helpers = [threads.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
+        self._work(todo)
+        for helper in helpers:
+            if not helper.cancel():
+                helper.result()
+        if flag[0]:
+            raise crew.Stopped
 
     def one_by_one(self) -> None:
         """Make all runs in this thread: they call functions back that nobody knows to be safe elsewhere."""
@@ -254,6 +264,11 @@ class _Work:
         run, time, node, kind = (np.concatenate(column) for column in zip(*self.log, strict=True))
         order = np.argsort(run, kind="stable")
         return run[order], time[order], node[order], kind[order]
+
+    def _whole(self):
+        """Yield (group, runs) of every group."""
+        for group in self.groups:
+            yield group, group.runs.astype(np.int64)
 
     def _parts(self, threads):
         """Yield (group, runs) in parts small enough to be shared out evenly."""
