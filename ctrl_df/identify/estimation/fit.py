@@ -295,7 +295,7 @@ def fit_segments(
     starts : sequence of arrays or None
         Initial states to begin with.
     iterations, tolerance, robust
-        As for `fit_records`.
+        As for `fit_records`; with no iterations the model stays as it is, and is made linear there.
     limits : mapping or None
         Least and largest values of some parameters, within their ranges.
     about : mapping or None
@@ -326,6 +326,9 @@ def fit_segments(
     )  # fmt: skip
     stage = Stage(problem, list(segments), thin, starts, rtol)
     found = stage.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
+    if names and found.slopes is None:
+        base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
+        found = replace(found, slopes=stage.jacobian(found.theta, found.states, base))
     if step_of_sensor(problem.block) is not None:
         found = replace(found, residual=stage.rounded(found.theta, found.states.values))
     return _outcome(stage, found, errors)

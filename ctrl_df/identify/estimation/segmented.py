@@ -287,6 +287,11 @@ class SegmentedData:
             hopeless=hopeless,
         )  # fmt: skip
 
+    def as_it_is(self, found: FitResult) -> FitResult:
+        """Return a model found over other segments over these, with initial states of its own alone."""
+        states = self.states_of(found.model, starts=same_begins(found, self.train.segments))
+        return self.fit(found.model, found.names, starts=states.starts, iterations=0)
+
     def reached(self, found: FitResult, hopeless=math.inf) -> FitResult:
         """As `moved`, and begun once more where the error grows: the model may have left its minimum.
 

@@ -84,6 +84,14 @@ def falls_behind(first, long) -> str:
     )
 
 
+def grows(error: float, seconds: float) -> str:
+    """Return that a model which follows short segments does not follow long ones, refitted to these."""
+    return (
+        f"It follows short segments within the noise, but not long ones: refitted to {seconds:.3g} s each it "
+        f"errs by {error:.2%}."
+    )
+
+
 def undetermined(first) -> str:
     """Return which parameters of an effect the data do not determine."""
     names = " and ".join(k.replace("_", " ") for k in first.undetermined)

@@ -300,11 +300,13 @@ def _from(start: Start, screen: Screen, shortest: SegmentedData, free) -> Attemp
         return None
     added = own_names(block)
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
+    begin = None if start.values else screen.starts(block)
     if start.effect.multimodal:
         # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
         bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
-        return Attempt(key, block, names, shortest, *(EFFORT_BENT if bent else EFFORT_TRIED), len(added))
-    begin = None if start.values else screen.starts(block)
+        begin = begin if shortest is screen.data else None
+        effort = EFFORT_BENT if bent else EFFORT_TRIED
+        return Attempt(key, block, names, shortest, *effort, len(added), begin)
     return Attempt(key, block, names, screen.data, *EFFORT_TRIED, len(added), begin)
 
 

@@ -70,7 +70,7 @@ def confirmed(
     # what contains the baseline never errs more where both are fitted as well
     base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
     chosen, noise = ranked(base, others)
-    at = replace(at, data=data, base=base, noise=noise, floor=floor)
+    at = replace(at, data=data, base=base, noise=noise, floor=floor, farthest=fits[-1][0])
     if not chosen:
         return at, []
     told(at, chosen)
@@ -103,7 +103,9 @@ def _judged(
     if averaged:
         best = len(stages) - 1
     judged = _validated(levels[best], tried, stages[best])
-    while best and not averaged and _held_out_by_luck(judged, levels[best - 1], stages[best - 1]):
+    while best and not averaged and not _shows_less(*_least(stages), best - 1, best):
+        if not _held_out_by_luck(judged, levels[best], levels[best - 1], stages[best - 1]):
+            break
         best -= 1
         judged = _validated(levels[best], tried, stages[best])
     return levels[best], judged
@@ -124,20 +126,22 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
     return side_by_side(at_full_rate, zip(tried, fits, strict=True))
 
 
-def _held_out_by_luck(judged, shorter: SegmentedData, fits) -> bool:
+def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
     """Whether the nearest model's error grows from shorter segments where they are held out, but not fitted.
 
     Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
     it is luck whether a model does, and no merit.
 
-    Where it leaves a small share of the baseline's error all the same, luck decides nothing.
+    Where it leaves a small share of the baseline's error all the same, luck decides nothing. What fits leave
+    open of static levels is chosen first: to the last sample before a break it is no luck.
 
-    `judged`: models in these segments, the baseline first; `shorter`, `fits`: the next shorter ones, and the
-    fits there.
+    `judged`: models in these segments, `data`, the baseline first; `shorter`, `fits`: the next shorter ones,
+    and the fits there.
     """
     nearest, fit = min(
         ((t, f) for t, f in zip(judged, fits, strict=True) if t is not None), key=lambda p: p[0].train.rmse
     )
+    nearest = thresholds_refined(nearest, data.fine)
     if nearest.validation_rmse <= LITTLE_LUCK * judged[0].validation_rmse:
         return False
     fitted = max(nearest.train.rmse / max(fit.rmse, NOTHING), 1.0)
@@ -235,18 +239,23 @@ def _longest_coherent(stages: Stages) -> int:
     machine, an effect outside the library) short segments are clearer, provided that they show what is
     missing as well as long ones do.
     """
-    errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]
-    base, best = [e[0] for e in errors], [min(e) for e in errors]
+    base, best = _least(stages)
     at = 0
-    while at + 1 < len(errors) and best[at + 1] <= GROWTH * best[at]:
+    while at + 1 < len(stages) and best[at + 1] <= GROWTH * best[at]:
         at += 1
-    if (
-        at + 1 < len(errors)
-        and best[at] > EXPLAINS_LITTLE * base[at]
-        and _left(base, best, at) > _left(base, best, -1)
-    ):
-        return len(errors) - 1
-    return at
+    last = len(stages) - 1
+    return last if at < last and _shows_less(base, best, at, last) else at
+
+
+def _least(stages: Stages) -> tuple[list[float], list[float]]:
+    """Return the errors of the baseline and of the best model in segments of every length."""
+    errors = [[math.inf if f is None else f.rmse for f in stage] for stage in stages]
+    return [e[0] for e in errors], [min(e) for e in errors]
+
+
+def _shows_less(base, best, at, than) -> bool:
+    """Whether segments of one length show little of what is missing, and less than those of another."""
+    return best[at] > EXPLAINS_LITTLE * base[at] and _left(base, best, at) > _left(base, best, than)
 
 
 def _left(base, best, at) -> float:

@@ -54,24 +54,29 @@ class FirstLook:
             Hears in words what is done.
         """
         stage(f"{len(self.classes)} effects tried over short segments")
-        begun = at
-        base, found = self._over(at, at.data.sampled, lambda screened: told(begun, screened))
+        begun, data = at, at.data.sampled
+        base = data.moved(at.base.train, 3)
+        short = self._short(at, data)
+        found = self._over(at, data, base, base, short, lambda screened: told(begun, screened))
         told(at, found)
         if self._disturbed(at, found):
             at = at.by_accelerations(self.free)
             stage("the same by accelerations: disturbance forces outweigh the noise")
-            base, found = self._over(at, at.data.sampled)
+            data = at.data.sampled
+            base = data.moved(at.base.train, 3)
+            found = self._over(at, data, base, base, self._short(at, data))
             told(at, found)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
-        if there.rmse > GROWTH * base.rmse:
+        if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
             stage("the same over long segments")
             far = replace(at, base=CandidateFit("", there))
             moved = _over_long_segments(far, base.rmse, found)
             if moved is not None:
-                base, again = self._over(far, longest)
-                found = _best_of(base, [*moved, *again])
+                # Fitted over them the model bends to what it lacks; short ones tell what its parameters are.
+                again = self._over(far, longest, there, longest.as_it_is(base), longest)
+                found = _best_of(there, [*moved, *again])
                 told(far, found)
             # what it is compared with from here on errs over these segments
             back = CandidateFit("", at.data.moved(there))
@@ -82,31 +87,49 @@ class FirstLook:
         """Return effects that may do what the model of one effect more does, with evidence over it."""
         data = at.data.sampled
         known = data.fit(model, names, iterations=4, followed=RESTARTS_KEPT)
-        _, found = self._tried(at, data, reached=known.rmse)
+        about = data.moved(at.base.train, 3)
+        found = self._tried(at, data, about, self._short(at, data), reached=known.rmse)
         more = len(names) - len(self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
-    def _over(self, at: Standing, data: SegmentedData, screened: Callable | None = None):
-        """Fit every effect over one set of segments; return baseline and effects there, best first.
+    def _over(
+        self,
+        at: Standing,
+        data: SegmentedData,
+        base: FitResult,
+        about: FitResult,
+        short: SegmentedData,
+        screened=None,
+    ) -> list[CandidateFit]:
+        """Fit every effect over one set of segments; return them with evidence over `base`, best first.
 
-        `screened` takes the effects before they are fitted.
+        `about`: the model about which starts are sought; `short`: the segments in which fits of effects with
+        many minima begin; `screened` takes the effects before they are fitted.
         """
-        base, found = self._tried(at, data, screened)
-        return base, ranked(CandidateFit("", base), found)[0]
+        return ranked(CandidateFit("", base), self._tried(at, data, about, short, screened))[0]
 
     def _tried(
-        self, at: Standing, data: SegmentedData, screened: Callable | None = None, reached: float = math.inf
-    ) -> tuple[FitResult, list[CandidateFit]]:
-        base = data.moved(at.base.train, 3)
+        self,
+        at: Standing,
+        data: SegmentedData,
+        about: FitResult,
+        short: SegmentedData,
+        screened=None,
+        reached: float = math.inf,
+    ) -> list[CandidateFit]:
         if not self.classes:
-            return base, []
-        screen = Screen(base, data)
+            return []
+        screen = Screen(about, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        # where short segments show noise alone (its rms, but for chance) no minimum is right
+        return tried(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
+
+    @staticmethod
+    def _short(at: Standing, data: SegmentedData) -> SegmentedData:
+        """Return the segments in which fits of effects with many minima begin: short ones, or `data`."""
+        # where short ones show noise alone (its rms, but for chance) no minimum is right
         most = (1 + BY_CHANCE / math.sqrt(2 * at.nearest.count)) * at.data.noise
         shows = at.nearest.rmse > most or at.data.disturbed
-        short = at.segmentations[0].sampled if shows else data
-        return base, tried(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
+        return at.segmentations[0].sampled if shows else data
 
     def _disturbed(self, at: Standing, found) -> bool:
         """Whether forces disturb the machine that no effect accounts for.

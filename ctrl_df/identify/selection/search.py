@@ -39,12 +39,15 @@ class Remainder:
         Whether that is too much for the best candidate to be the answer.
     about : object
         What the data know besides, for `Search.located`.
+    doubt : str
+        Where it shows, in a sentence, if not in these numbers.
     """
 
     noise: float
     structure: float
     unexplained: bool
     about: Any = None
+    doubt: str = ""
 
 
 @dataclass(frozen=True)

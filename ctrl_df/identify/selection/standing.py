@@ -12,6 +12,7 @@ from ..prediction.simulator import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from .evidence import ranked
+from .thresholds import GROWN
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,8 @@ class Standing:
         Of the best model's residual.
     floor : float
         Error that a fit can come down to at best; 0 where it is not known yet.
+    farthest : FitResult or None
+        The model refitted over the longest segments that may judge; None: not known yet.
     """
 
     segmentations: Sequence[SegmentedData]
@@ -40,6 +43,12 @@ class Standing:
     nearest: FitResult
     noise: NoiseModel
     floor: float = 0.0
+    farthest: FitResult | None = None
+
+    @property
+    def grows(self) -> bool:
+        """Whether the model, refitted, errs over longer segments by more than noise does."""
+        return self.farthest is not None and self.farthest.rmse > GROWN * self.nearest.rmse
 
     def by_accelerations(self, free: tuple[str, ...]) -> Standing:
         """Return the same where disturbance forces drown all else over longer segments.

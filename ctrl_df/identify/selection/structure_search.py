@@ -6,11 +6,15 @@ import math
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from ..course import Course
 from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, sensed
+from ..results.explain import grows
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT, UNMOVED
 from .attempts import own_names
 from .confirmation import confirmed, stages
@@ -172,7 +176,21 @@ class StructureSearch(Search):
         if self.at.data.disturbed and not significant and self.at.nearest.nrmse > UNMOVED:
             # accelerations that are mostly noise do not speak for a model that does not even move
             return replace(left, unexplained=True)
+        if not significant and self.at.grows:
+            return self._growing(left)
         return left
+
+    def _growing(self, left: Remainder) -> Remainder:
+        """Return what a model leaves that errs over short segments by noise alone, but not over long ones."""
+        farthest = self.at.farthest
+        assert farthest is not None
+        error = math.sqrt(farthest.rmse**2 - self.at.nearest.rmse**2)
+        seconds = max(
+            float(np.max(w.ends - w.begins)) * facts(r).dt
+            for r, w in zip(self.at.data.train.records, farthest.segments, strict=True)
+        )
+        doubt = grows(farthest.nrmse, seconds)
+        return replace(left, structure=max(left.structure, error), unexplained=True, doubt=doubt)
 
     def located(self, best, remainder, unknown):
         """Return where the error is."""

@@ -100,7 +100,7 @@ class _Asked:
         else:
             open_ones = rivals(ranking)
             verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
-        base, doubts = self._base(), ()
+        base, doubts = self._base(), (remainder.doubt,) if verdict == UNKNOWN and remainder.doubt else ()
         if verdict == EFFECT:
             course.stage("free prediction over long stretches")
             verdict, ranking, doubts = doubted(ranking, base, search.significant)
