@@ -129,8 +129,9 @@ def tried(
         return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
+    places = _Places.of(screen, shortest, nominal)
     joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
-    begun = run(_begin, [(c, screen, shortest, free, nominal, known) for c in kinds])
+    begun = run(_begin, [(c, screen, places, free, known) for c in kinds])
     if screened is not None:
         screened(_screened(begun, screen))
     resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
@@ -144,6 +145,47 @@ def tried(
     again = [a for a in attempts if a.key in later and best.promises(later[a.key].id, screen.base.rmse)]
     best = rounds.fitted(again, best)
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where fits begin: the segments, and the model without an effect there, whose initial states they take.
+
+    Attributes
+    ----------
+    own, nominal : pairs of FitResult
+        The model as refitted, and as the user has it: over the segments of the screen, and over short ones.
+    data : pair of SegmentedData
+        Those segments.
+    values : tuple of (str, float)
+        As the user has them.
+    """
+
+    own: tuple[FitResult, FitResult]
+    nominal: tuple[FitResult, FitResult]
+    data: tuple[SegmentedData, SegmentedData]
+    values: tuple[tuple[str, float], ...]
+
+    @classmethod
+    def of(cls, screen: Screen, shortest: SegmentedData, nominal) -> _Places:
+        """Return the places of a screen."""
+        data = screen.data, shortest
+        user = screen.block.with_parameters(feasible(screen.block, dict(nominal)))
+        asked = [(screen.data, user), (shortest, user)]
+        if shortest is not screen.data:
+            asked.append((shortest, screen.block))
+        far, near, *own = side_by_side(lambda pair: pair[0].states_of(pair[1]), asked)
+        return cls((screen.base, own[0] if own else screen.base), (far, near), data, tuple(nominal.items()))
+
+    def starts(self, block, values, short: bool) -> list[np.ndarray] | None:
+        """Return the initial states of the model without an effect as those of a block with one.
+
+        `values`: of the model where the block has others than as refitted; None if they are not the user's.
+        """
+        if values and values != self.values:
+            return None
+        data, base = self.data[short], (self.nominal if values else self.own)[short]
+        return data.starts_as(block, data.train.records, base)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,45 +311,42 @@ def _begin_joint(job) -> list[Attempt]:
 
 def _begin(job) -> tuple[list[Start], list[Attempt]]:
     """Return the starts of one effect class, and where fits begin there."""
-    cls, screen, shortest, free, nominal, known = job
+    cls, screen, places, free, known = job
     found, starts = [], starts_for(cls, screen)
     if known:
         # with the other parameters as the model has them, or as they are without the effect
         best = starts[: 1 + cls.multimodal]
-        own = [replace(s, values=tuple(nominal.items())) for s in best[:1]]
-        begun = [_from(s, screen, shortest, free) for s in (*own, *best)]
+        own = [replace(s, values=places.values) for s in best[:1]]
+        begun = [_from(s, screen, places, free) for s in (*own, *best)]
         return starts, [a for a in begun if a is not None]
     for i, start in enumerate(starts):
         share, beyond = ANOTHER_START
         if i and not starts[0].values and start.left > share * starts[0].left + beyond:
             break
-        found.append(_from(start, screen, shortest, free))
+        found.append(_from(start, screen, places, free))
     if cls.multimodal or screen.block.core.bodies == 2:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user
         # does. What changes in proportion to its size finds that within a step.
         several = cls.multimodal or not cls.proportional
         for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies if several else 1):
-            attempt = _from(Start(effect, 0.0, tuple(nominal.items())), screen, shortest, free)
+            attempt = _from(Start(effect, 0.0, places.values), screen, places, free)
             found.append(attempt and replace(attempt, nominal=True))
     return starts, [a for a in found if a is not None]
 
 
-def _from(start: Start, screen: Screen, shortest: SegmentedData, free) -> Attempt | None:
+def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:
     """Return the attempt that begins at a start; None where the effect contradicts the block."""
     base = screen.block.with_parameters(feasible(screen.block, dict(start.values)))
     block, key = extended(base, start.effect), start.effect.id
     if block is None:
         return None
-    added = own_names(block)
+    added, short = own_names(block), start.effect.multimodal
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
-    begin = None if start.values else screen.starts(block)
-    if start.effect.multimodal:
-        # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
-        bent = start.effect.role in ("contact", "coupling") or start.effect.side == "load"
-        begin = begin if shortest is screen.data else None
-        effort = EFFORT_BENT if bent else EFFORT_TRIED
-        return Attempt(key, block, names, shortest, *effort, len(added), begin)
-    return Attempt(key, block, names, screen.data, *EFFORT_TRIED, len(added), begin)
+    # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
+    bent = short and (start.effect.role in ("contact", "coupling") or start.effect.side == "load")
+    begin = places.starts(block, start.values, short)
+    effort = EFFORT_BENT if bent else EFFORT_TRIED
+    return Attempt(key, block, names, places.data[short], *effort, len(added), begin)
 
 
 def _first(job) -> Attempt:

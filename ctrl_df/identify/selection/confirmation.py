@@ -127,10 +127,11 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
 
 
 def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
-    """Whether the nearest model's error grows from shorter segments where they are held out, but not fitted.
+    """Whether errors of the nearest models grow from shorter segments where they are held out, not fitted.
 
     Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
-    it is luck whether a model does, and no merit.
+    it is luck whether a model does, and no merit. Where one of those that fit best follows all that is held
+    out as well that is no luck.
 
     Where it leaves a small share of the baseline's error all the same, luck decides nothing. What fits leave
     open of static levels is chosen first: to the last sample before a break it is no luck.
@@ -138,10 +139,10 @@ def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits)
     `judged`: models in these segments, `data`, the baseline first; `shorter`, `fits`: the next shorter ones,
     and the fits there.
     """
-    nearest, fit = min(
-        ((t, f) for t, f in zip(judged, fits, strict=True) if t is not None), key=lambda p: p[0].train.rmse
-    )
-    nearest = thresholds_refined(nearest, data.fine)
+    pairs = [(t, f) for t, f in zip(judged, fits, strict=True) if t is not None]
+    least = min(t.train.rmse for t, _ in pairs)
+    near = [(thresholds_refined(t, data.fine), f) for t, f in pairs if t.train.rmse <= GROWTH * least]
+    nearest, fit = min(near, key=lambda p: p[0].validation_rmse)
     if nearest.validation_rmse <= LITTLE_LUCK * judged[0].validation_rmse:
         return False
     fitted = max(nearest.train.rmse / max(fit.rmse, NOTHING), 1.0)
