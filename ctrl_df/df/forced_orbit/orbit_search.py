@@ -225,6 +225,11 @@ class OrbitSearch:
         self.shot.scale[:] = 0.0
         self.shot.jacobian[:] = np.nan
 
+    def _forget_flight(self):
+        """Forget what states that Newton's method tried have grown to, where the last one ran away."""
+        if self.shot.tally[4] != driver.DONE:
+            self._resize(self.A)
+
     def _state(self, y, mode=None):
         """State at coordinates y."""
         x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
@@ -337,8 +342,9 @@ class OrbitSearch:
         self.budget -= int(shot.clock[3]) * 4
         go_on()
         self._raise_if_raised()
-        if outcome == SPENT or outcome == shooting.FAILED:
-            raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
+        if outcome == SPENT:
+            raise self._stopped(driver.STEPS, state)
+        self._forget_flight()
         if outcome != CLOSED and not (repelling and outcome == UNSTABLE):
             return None
         if not self.mirrored:

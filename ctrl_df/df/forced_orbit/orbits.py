@@ -201,6 +201,7 @@ class OrbitSolver(OrbitSearch):
         """Close points of a line from `p` on by compiled code; return how many need no second look."""
         self.mirrored = self.symmetric and not self.broken
         done = line.close(p)
+        self._forget_flight()
         if line.symmetrical:
             self.shot.jacobian[:] = np.nan  # it is of shots twice as long
         some, A, omega = slice(p, p + done), line.A, line.omega
