@@ -292,6 +292,19 @@ def test_dry_compositions_repeat_and_agree(seed):
         assert disagreement(y, reference) < 1e-8, regime  # measured 8.8e-10 over 25 seeds
 
 
+def test_trial_states_that_run_away_leave_nothing_behind():
+    # beyond 0.7 m this spring pushes away; Newton's method tries such states on its way
+    soft = block(
+        Mass(1.0), cdf.Viscous(0.6), cdf.Coulomb(0.5), cdf.LinearSpring(100.0), cdf.CubicSpring(-200.0)
+    )
+    A, omega = np.linspace(1, 6, 8), np.array([9.3])
+    y, regime, _ = orbit_family(soft, A, omega)
+    assert {ORBIT_REGIMES[code] for code in regime.flat} == {"slip"}
+    for k in range(2):
+        alone, _, _ = OrbitSolver(soft).solve(A[k], omega[0], 9)
+        assert abs(alone[1] / y[k, 0, 1] - 1) < 2e-9  # measured 1e-11, beside these frequencies 5e-10
+
+
 # --- channels -----------------------------------------------------------------------------------------------
 
 

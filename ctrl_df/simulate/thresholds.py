@@ -168,8 +168,9 @@ TOUCH_HALVINGS = 50
 BOTTOM_HALVINGS = 40
 """Halvings toward the bottom of a margin, which is flat there: to 2^-40."""
 
-ROOT_STEPS = 100
-"""Steps to a root at most: every fifth or eighth halves, and fifty halvings are all there is."""
+ROOT_STEPS, BISECTED = 100, 10
+"""Steps to a root at most, and which of them halve (every eighth of affine modes): four or so do, and fifty
+halvings are all there is."""
 
 PROBED = (0.0, 1.0, 10.0)
 """Sizes of random inputs by which a system's output is asked whether it reads them."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import control as ct
 import numpy as np
 
@@ -124,7 +126,7 @@ class OrbitSearch:
         """
         if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), FAMILIAR):
             return
-        about = tuple(BINS * np.round(np.log10([A, omega]) / BINS))
+        about = tuple(BINS * round(math.log10(size) / BINS) for size in (A, omega))
         if about == self._about:
             return
         self._about = about
@@ -178,7 +180,7 @@ class OrbitSearch:
     def forget(self):
         """Start the next point from rest."""
         self.previous = self.first = None
-        self.broken = False
+        self.broken = self.repels = False
         self.shot.jacobian[:] = np.nan
         self.shot.size[:] = 0.0
         self.shot.clock[:] = 0.0  # the step of the last run: a line must not depend on the one before
@@ -223,6 +225,11 @@ class OrbitSearch:
         self.shot.scale[:] = 0.0
         self.shot.jacobian[:] = np.nan
 
+    def _forget_flight(self):
+        """Forget what states that Newton's method tried have grown to, where the last one ran away."""
+        if self.shot.tally[4] != driver.DONE:
+            self._resize(self.A)
+
     def _state(self, y, mode=None):
         """State at coordinates y."""
         x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
@@ -264,9 +271,9 @@ class OrbitSearch:
     def _followed(self, state, periods, orders):
         """Follow the state, in place, for some periods, and close its orbit where it seems to have settled.
 
-        It is tried as well each time the motion has been followed twice as long as before. Returns state and
-        mismatch of an attracting orbit, or None. A motion that repeats after two half periods, and not after
-        one, is closed as what it is; `mirrored` then says so.
+        It is tried as well each time the motion has been followed twice as long as before, unless the last
+        orbit closed repels. Returns state and mismatch of an attracting orbit, or None. A motion that repeats
+        after two half periods, and not after one, is closed as what it is; `mirrored` then says so.
         """
         settled, shots = [SETTLED_AT_FIRST] * 2, 2 if self.mirrored else 1
         left, wait = shots * periods, shots * max(self.transient, 1)
@@ -284,6 +291,8 @@ class OrbitSearch:
                 continue
             if ahead == 0:
                 wait = ahead = 2 * wait
+                if self.repels and repeats == 0 and left > 0:
+                    continue  # there is an orbit here that the motion leaves: it has to settle first
             self.mirrored = self.mirrored and not alternates
             orbit = self._periodic(state, orders=orders)
             if orbit is not None:
@@ -329,11 +338,13 @@ class OrbitSearch:
             self.mirrored, RTOL, self.atol, self._hmax(orders) * self.period, spectrum,
             self.budget, SHOTS_ALONE, False,
         )  # fmt: skip
+        self.repels = outcome == UNSTABLE
         self.budget -= int(shot.clock[3]) * 4
         go_on()
         self._raise_if_raised()
-        if outcome == SPENT or outcome == shooting.FAILED:
-            raise self._stopped(driver.STEPS if outcome == SPENT else int(shot.tally[4]), state)
+        if outcome == SPENT:
+            raise self._stopped(driver.STEPS, state)
+        self._forget_flight()
         if outcome != CLOSED and not (repelling and outcome == UNSTABLE):
             return None
         if not self.mirrored:
@@ -430,7 +441,7 @@ class OrbitSearch:
             y = 4 / period * integrals
             center = 0.5 * (ends[..., 0] + ends[..., 1])
             # the integral of a constant over half a period is 2 / (j k omega)
-            y[..., 1::2] -= 4 / period * 2 * center[..., None] / (1j * k[1::2] * omega)
+            y[..., 1::2] -= center[..., None] * (4 / np.pi / (1j * k[1::2]))
             y[..., 0::2] = 0.0
             y[..., 0] = center
         else:

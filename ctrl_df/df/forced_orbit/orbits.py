@@ -201,6 +201,7 @@ class OrbitSolver(OrbitSearch):
         """Close points of a line from `p` on by compiled code; return how many need no second look."""
         self.mirrored = self.symmetric and not self.broken
         done = line.close(p)
+        self._forget_flight()
         if line.symmetrical:
             self.shot.jacobian[:] = np.nan  # it is of shots twice as long
         some, A, omega = slice(p, p + done), line.A, line.omega
@@ -249,7 +250,7 @@ class OrbitSolver(OrbitSearch):
 
     def _answer(self, orders):
         """Coefficients Y_k, regime and residual at the present aim."""
-        broken = self.broken and self.previous is not None
+        broken, self.repels = self.broken and self.previous is not None, False
         self.mirrored, self.simple, self.broken = self.symmetric and not broken, True, False
         state = self._given or self.previous or self._start(self.A)
         if self._given is not None:
@@ -258,7 +259,7 @@ class OrbitSolver(OrbitSearch):
         orbit = self._periodic(state, orders=orders) if self.previous is not None else None
         if orbit is None:
             state = self._follow(state, self.transient)
-            orbit = self._periodic(state, orders=orders)
+            orbit = None if self.repels else self._periodic(state, orders=orders)
         if orbit is None:
             orbit = self._followed(state, max(LATER - self.transient, 1), orders)
         if orbit is None:
@@ -271,7 +272,7 @@ class OrbitSolver(OrbitSearch):
             if orbit is None:
                 orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
         if orbit is None and self.symmetric:
-            self.mirrored = False
+            self.mirrored = self.repels = False
             state = self._nudged(state)
             orbit = self._followed(state, LATEST, orders)
         if self.gap and orbit is not None and not self.kinds & TOUCH and self._given is None:

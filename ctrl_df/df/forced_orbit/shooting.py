@@ -2,7 +2,7 @@
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
 """Forced periodic orbits by Newton's method on the shots of `shot`, all in compiled code.
 
-The Jacobian of the shot is kept from point to point of a sweep and corrected by Broyden's formula, the
+The Jacobian of the shot is kept from point to point of a sweep and corrected by what each step shows, the
 start is extrapolated from the points before, and the last shot integrates the harmonics along the way: most
 points cost three or four shots, the first of them coarse.
 """
@@ -22,6 +22,7 @@ from ...simulate.engine import harmonic_drive
 from ...simulate.kernel import driver
 from ...simulate.kernel.driver import copy
 from ..thresholds import (
+    ASIDE,
     EXPECTED,
     FAR_OFF,
     JACOBIANS,
@@ -33,6 +34,7 @@ from ..thresholds import (
     SHARPER,
     SHRINKS,
     SHRINKS_FIRST,
+    SOON,
     SQUARINGS,
     STALE,
     STILL,
@@ -71,7 +73,7 @@ def close_orbit(
 
 @apart
 def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager):
-    """Close an orbit from (x, mode), in place, by chord and Broyden steps.
+    """Close an orbit from (x, mode), in place, by secant steps.
 
     The integrals of the closed shot go to `spectrum`. `shots` bounds the shots, `budget` the integration
     steps; with `eager` the first shot takes integrals already. Returns the outcome, and leaves the error of
@@ -96,6 +98,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
     moved = False  # `change` is the step that led to the present point, `last` the closing error before it
     previous, best = math.inf, math.inf
     jacobians = sharp = 0
+    steps = 0  # that the Jacobian was corrected by since it was differenced
     take, centered = eager, False
     expected = EXPECTED  # closing error of the shot to come
     for _ in range(shots):
@@ -127,7 +130,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             if end[i] == 0.0 and y0[i] != 0.0:
                 rests = True
         if moved:
-            _broyden(shot, jacobian, change, last, y1)
+            steps = _broyden(shot, jacobian, change, last, y1, steps)
         error = miss  # of the state: what Newton's step would still change
         known = nf > 0 and not math.isnan(jacobian[0, 0])
         if known and miss > 0.0:
@@ -169,6 +172,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
             ):
                 return FAILED, best
             jacobians += 1
+            steps = 0
             if tolerance == rtol:
                 sharp += 1
             fresh_jacobian = True
@@ -209,7 +213,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                 moved = False  # clipped
         # errors shrink by the same ratio once more, or faster
         ratio = min(miss / previous, SHRINKS) if previous < math.inf else SHRINKS_FIRST
-        take = take or ratio * miss < TOLERANCE
+        take = take or ratio * miss < SOON * TOLERANCE
         expected = miss * min(ratio, SHRINKS_FIRST)
         previous = miss
     return OPEN, best
@@ -235,15 +239,32 @@ def _center(shot, step, x):
 
 
 @part
-def _broyden(shot, jacobian, change, before, after):
-    """Correct the Jacobian of the shot by what the last step did to the closing error (before, after)."""
+def _broyden(shot, jacobian, change, before, after, count):
+    """Correct the Jacobian of the shot by what the last step did to the closing error (before, after).
+
+    What the steps before it did stays known: the Jacobian changes along what is new in this one alone
+    (Gay and Schnabel's projected updates). ``shot.matrix[3]`` has `count` of those, newest first; returns how
+    many it has now.
+    """
     nf = shot.free.shape[0]
-    total = 0.0
+    steps, known, new = shot.matrix[3], shot.matrix[2], shot.matrix[1, 0]
     for f in range(nf):
-        scaled = change[f] / shot.size[shot.free[f]]
-        total += scaled * scaled
+        new[f] = change[f] / shot.size[shot.free[f]]
+    total = _product(new, new)
     if total < STILL:
-        return
+        return count
+    rest = total
+    for k in range(min(count, nf - 1)):
+        copy(steps[k], known[k])
+        for q in range(k):
+            _take_off(known[q], known[k])
+        length = _product(known[k], known[k])
+        if not length > 0.0 or rest - _product(known[k], new) ** 2 / length < ASIDE * total:
+            break
+        for f in range(nf):
+            known[k, f] /= math.sqrt(length)
+        _take_off(known[k], new)
+        rest = _product(new, new)
     for r in range(nf):
         i = shot.free[r]
         # d(closing) = (J - 1) change
@@ -251,8 +272,28 @@ def _broyden(shot, jacobian, change, before, after):
         for c in range(nf):
             value -= jacobian[r, c] * change[c]
         for c in range(nf):
-            size = shot.size[shot.free[c]]
-            jacobian[r, c] += value * change[c] / (size * size) / total
+            jacobian[r, c] += value * new[c] / (shot.size[shot.free[c]] * rest)
+    for k in range(nf - 1, 0, -1):
+        copy(steps[k - 1], steps[k])
+    for f in range(nf):
+        steps[0, f] = change[f] / shot.size[shot.free[f]]
+    return min(count + 1, nf)
+
+
+@part(inline=True)
+def _product(a, b):
+    value = 0.0
+    for f in range(a.shape[0]):
+        value += a[f] * b[f]
+    return value
+
+
+@part(inline=True)
+def _take_off(unit, vector):
+    """Take from a vector its part along a unit vector."""
+    along = _product(unit, vector)
+    for f in range(unit.shape[0]):
+        vector[f] -= along * unit[f]
 
 
 @part

@@ -97,7 +97,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
         np.full((nf, nf), np.nan), np.zeros((14, max(n, 1))), np.zeros((4, len(modes)), np.int64),
-        np.zeros((3, nf, nf)),
+        np.zeros((4, nf, nf)),
         np.array(s.shifts, float).reshape(len(s.shifts), n), np.zeros((2, rows)), np.zeros(1),
         np.zeros(6, np.int64), _NONE, 0,
     )  # fmt: skip

@@ -41,6 +41,7 @@ from ..program.layout import (
     X,
 )
 from ..thresholds import (
+    BISECTED,
     BUMP_REACH,
     GRAIN,
     LOOKS,
@@ -306,14 +307,16 @@ def locate_event(
                 break
             right, value_right, at = theta, value, index
     weight_left, weight_right, side = value_left, value_right, 0
+    least = 0.5 * max(ROOT, RESOLUTION * max(abs(t), length) / length)
     for iteration in range(ROOT_STEPS):
         width = right - left
         if width * length <= RESOLUTION * max(abs(t), length) or width < ROOT or value_right > -ROOT:
             break
-        # Illinois: a secant that cannot hang on one side, with a bisection now and then
+        # Anderson and Bjorck: a secant that cannot hang on one side, with a bisection now and then
         theta = left + width * weight_left / (weight_left - weight_right)
-        if iteration % 5 == 4 or not left < theta < right:
+        if iteration % BISECTED == BISECTED - 1 or not left <= theta <= right:
             theta = 0.5 * (left + right)
+        theta = min(max(theta, left + least), right - least)
         inside(terms, theta, x, poly, xi)
         margins(
             prog,
@@ -332,13 +335,20 @@ def locate_event(
         )
         value, index = worst(g, gtol, scale, blocked)
         if value < 0.0:
-            right, value_right, weight_right, at = theta, value, value, index
             if side < 0:
-                weight_left *= 0.5
+                weight_left *= _share(value, weight_right)
+            right, value_right, weight_right, at = theta, value, value, index
             side = -1
         else:
-            left, weight_left = theta, value
             if side > 0:
-                weight_right *= 0.5
+                weight_right *= _share(value, weight_left)
+            left, weight_left = theta, value
             side = 1
     return right, at
+
+
+@part(inline=True)
+def _share(value, before):
+    """Share that the weight of one side keeps where the other side's value has changed once more."""
+    share = 1.0 - value / before
+    return share if share > 0.0 else 0.5
