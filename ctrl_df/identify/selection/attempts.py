@@ -95,7 +95,7 @@ class Attempt:
 def tried(
     classes,
     screen: Screen,
-    shortest: SegmentedData,
+    short: SegmentedData | None,
     free,
     nominal,
     executor=None,
@@ -108,8 +108,9 @@ def tried(
     ----------
     classes : sequence of effect classes
     screen : Screen
-    shortest : SegmentedData
-        In short segments, where fits of effects with many minima begin.
+    short : SegmentedData or None
+        In short segments, where fits of effects with many minima begin; None: in those of the screen, with
+        the initial states of the model without them.
     free : tuple of str
         Parameters of the baseline that are refitted.
     nominal : mapping
@@ -129,7 +130,8 @@ def tried(
         return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    places = _Places.of(screen, shortest, nominal)
+    user = screen.block.with_parameters(feasible(screen.block, dict(nominal)))
+    places = _Places(screen, short, screen.data.states_of(user), tuple(nominal.items()))
     joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
     begun = run(_begin, [(c, screen, places, free, known) for c in kinds])
     if screened is not None:
@@ -149,43 +151,38 @@ def tried(
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Where fits begin: the segments, and the model without an effect there, whose initial states they take.
+    """Where fits begin.
 
     Attributes
     ----------
-    own, nominal : pairs of FitResult
-        The model as refitted, and as the user has it: over the segments of the screen, and over short ones.
-    data : pair of SegmentedData
-        Those segments.
+    screen : Screen
+    short : SegmentedData or None
+        Where those of effects with many minima do; None: where all others do.
+    user : FitResult
+        The model without an effect as the user has it, over the segments of the screen.
     values : tuple of (str, float)
-        As the user has them.
+        What the user has.
     """
 
-    own: tuple[FitResult, FitResult]
-    nominal: tuple[FitResult, FitResult]
-    data: tuple[SegmentedData, SegmentedData]
+    screen: Screen
+    short: SegmentedData | None
+    user: FitResult
     values: tuple[tuple[str, float], ...]
 
-    @classmethod
-    def of(cls, screen: Screen, shortest: SegmentedData, nominal) -> _Places:
-        """Return the places of a screen."""
-        data = screen.data, shortest
-        user = screen.block.with_parameters(feasible(screen.block, dict(nominal)))
-        asked = [(screen.data, user), (shortest, user)]
-        if shortest is not screen.data:
-            asked.append((shortest, screen.block))
-        far, near, *own = side_by_side(lambda pair: pair[0].states_of(pair[1]), asked)
-        return cls((screen.base, own[0] if own else screen.base), (far, near), data, tuple(nominal.items()))
+    def data(self, multimodal: bool) -> SegmentedData:
+        """Return the segments in which a fit begins."""
+        return self.screen.data if self.short is None or not multimodal else self.short
 
-    def starts(self, block, values, short: bool) -> list[np.ndarray] | None:
+    def starts(self, block, values, multimodal: bool) -> list[np.ndarray] | None:
         """Return the initial states of the model without an effect as those of a block with one.
 
-        `values`: of the model where the block has others than as refitted; None if they are not the user's.
+        None where fits begin with what is measured. `values`: of the model, where the block has not those of
+        the screen.
         """
-        if values and values != self.values:
+        if (self.short is not None and multimodal) or (values and values != self.values):
             return None
-        data, base = self.data[short], (self.nominal if values else self.own)[short]
-        return data.starts_as(block, data.train.records, base)
+        data = self.screen.data
+        return data.starts_as(block, data.train.records, self.user if values else self.screen.base)
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,13 +337,13 @@ def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None
     block, key = extended(base, start.effect), start.effect.id
     if block is None:
         return None
-    added, short = own_names(block), start.effect.multimodal
+    added, many = own_names(block), start.effect.multimodal
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
     # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
-    bent = short and (start.effect.role in ("contact", "coupling") or start.effect.side == "load")
-    begin = places.starts(block, start.values, short)
+    bent = many and (start.effect.role in ("contact", "coupling") or start.effect.side == "load")
+    begin = places.starts(block, start.values, many)
     effort = EFFORT_BENT if bent else EFFORT_TRIED
-    return Attempt(key, block, names, places.data[short], *effort, len(added), begin)
+    return Attempt(key, block, names, places.data(many), *effort, len(added), begin)
 
 
 def _first(job) -> Attempt:

@@ -75,7 +75,7 @@ class FirstLook:
             moved = _over_long_segments(far, base.rmse, found)
             if moved is not None:
                 # Fitted over them the model bends to what it lacks; short ones tell what its parameters are.
-                again = self._over(far, longest, there, longest.as_it_is(base), longest)
+                again = self._over(far, longest, there, longest.as_it_is(base), None)
                 found = _best_of(there, [*moved, *again])
                 told(far, found)
             # what it is compared with from here on errs over these segments
@@ -98,13 +98,12 @@ class FirstLook:
         data: SegmentedData,
         base: FitResult,
         about: FitResult,
-        short: SegmentedData,
+        short: SegmentedData | None,
         screened=None,
     ) -> list[CandidateFit]:
         """Fit every effect over one set of segments; return them with evidence over `base`, best first.
 
-        `about`: the model about which starts are sought; `short`: the segments in which fits of effects with
-        many minima begin; `screened` takes the effects before they are fitted.
+        `about`: the model about which starts are sought; `short`, `screened`: see `tried`.
         """
         return ranked(CandidateFit("", base), self._tried(at, data, about, short, screened))[0]
 
@@ -113,7 +112,7 @@ class FirstLook:
         at: Standing,
         data: SegmentedData,
         about: FitResult,
-        short: SegmentedData,
+        short: SegmentedData | None,
         screened=None,
         reached: float = math.inf,
     ) -> list[CandidateFit]:
