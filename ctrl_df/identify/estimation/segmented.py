@@ -304,9 +304,12 @@ class SegmentedData:
         again = self.fit(found.model, found.names, followed=RESTARTS_KEPT, hopeless=there.rmse)
         return min(there, again, key=lambda f: f.rmse)
 
-    def validate(self, tried: CandidateFit) -> CandidateFit:
-        """Run a fitted model over the segments to validate on, from initial states of their own."""
-        return replace(tried, validation=self._ran(tried.block, "validation"))
+    def validate(self, tried: CandidateFit, hopeless: float = math.inf) -> CandidateFit:
+        """Run a fitted model over the segments to validate on, from initial states of their own.
+
+        These are not sought to the last where the error would stay above `hopeless`.
+        """
+        return replace(tried, validation=self._ran(tried.block, "validation", hopeless))
 
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""
@@ -319,7 +322,7 @@ class SegmentedData:
         """Return nrmse of a model as it is, over the segments fitted and those held out."""
         return self._ran(model, "train").nrmse, self._ran(model, "validation").nrmse
 
-    def _ran(self, model, name) -> FitResult:
+    def _ran(self, model, name, hopeless: float = math.inf) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""
         thin = self.step or self.thin
         rough, view = self.coarse(thin, thin), getattr(self, name)
@@ -334,7 +337,7 @@ class SegmentedData:
         for data in (rough, self):
             near = data.states_of(
                 model, view=getattr(data, name), starts=same_begins(near, view.segments),
-                effort=EFFORT_ALONE, followed=RESTARTS_KEPT,
+                effort=EFFORT_ALONE, followed=RESTARTS_KEPT, hopeless=hopeless,
             )  # fmt: skip
         return near
 

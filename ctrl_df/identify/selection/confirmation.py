@@ -114,16 +114,29 @@ def _judged(
 def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
     """Return models at the full rate, from their fits in some segments, and run on what is held out.
 
-    None stands for those that have no fit there.
+    The baseline and the best first: what errs far more than these needs no last step. None stands for those
+    that have no fit there.
     """
     fine = data.fine
 
-    def at_full_rate(pair):
-        t, fit = pair
-        train = fit and fine.moved(fit, *EFFORT_CONFIRMED)
-        return train and fine.validate(replace(t, train=train, confirmed=True))
+    def at_full_rate(i, fitted=math.inf, held_out=math.inf):
+        train = fine.moved(fits[i], *EFFORT_CONFIRMED, fitted)
+        return fine.validate(replace(tried[i], train=train, confirmed=True), held_out)
 
-    return side_by_side(at_full_rate, zip(tried, fits, strict=True))
+    there = sorted((i for i, f in enumerate(fits) if f is not None), key=lambda i: fits[i].rmse)
+    first = list(dict.fromkeys([0, *(i for i in there if i)][:2]))
+    found: list[CandidateFit | None] = [None] * len(fits)
+    for i, t in zip(first, side_by_side(at_full_rate, first), strict=True):
+        found[i] = t
+    known = [t for t in found if t is not None]
+    bounds = (
+        HOPELESS * min(t.train.rmse for t in known),
+        HOPELESS * min(t.validation_rmse for t in known),
+    )
+    rest = [i for i in there if i not in first]
+    for i, t in zip(rest, side_by_side(lambda i: at_full_rate(i, *bounds), rest), strict=True):
+        found[i] = t
+    return found
 
 
 def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
