@@ -104,6 +104,9 @@ class _Asked:
         if verdict == EFFECT:
             course.stage("free prediction over long stretches")
             verdict, ranking, doubts = doubted(ranking, base, search.significant)
+            if verdict == UNKNOWN:
+                # refuted: what is missing is what the model leaves without it
+                best, remainder = search.base, search.remainder(search.base, False)
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         return Diagnosed(replace(result, explanation=explain(result, search.words) + note), search)
 
