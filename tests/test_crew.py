@@ -12,7 +12,7 @@ import rigs
 import ctrl_df as cdf
 from ctrl_df.identify.prediction.segments import cut
 from ctrl_df.identify.prediction.simulator import Simulator
-from ctrl_df.simulate import crew
+from ctrl_df.simulate import crew, runs
 
 T = 1e-3 * np.arange(2000)
 RECORD = cdf.Measurement(T, np.sin(9 * T), 0.01 * np.sin(9 * T) + 1e-5 * np.cos(777 * T))
@@ -35,6 +35,20 @@ def test_numbers_are_those_of_one_thread_and_in_order():
     for a, b, mass in zip(first, second, masses, strict=True):
         assert np.array_equal(a, b)
         assert np.array_equal(a, output(mass))
+
+
+def test_a_job_that_is_the_last_has_its_runs_made_by_processors_without_one(monkeypatch):
+    alone, threads, work = output(1.5), set(), runs._Work._work
+
+    def seen(self, todo):
+        threads.add(threading.current_thread().name)
+        work(self, todo)
+
+    monkeypatch.setattr(runs._Work, "_work", seen)
+    monkeypatch.setattr(crew, "spare", lambda: 1)
+    many = crew.side_by_side(output, [1.5, 2.5])
+    assert np.array_equal(many[0], alone) and np.array_equal(many[1], output(2.5))
+    assert {name.rpartition("_")[0] for name in threads} == {"ctrl_df jobs", "ctrl_df runs"}
 
 
 def test_a_diagnosis_repeats_itself_to_the_last_bit(monkeypatch):
