@@ -1,4 +1,4 @@
-"""Jobs in Python side by side, each with all its runs in a thread of its own; all end at Ctrl-C."""
+"""Jobs in Python side by side, each in a thread of its own, with its runs; all end at Ctrl-C."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from numba.core import config
 
 _here = threading.local()
 _at_work: set[int] = set()  # threads that have a job
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_at_work.clear)
 
 
 class Stopped(Exception):  # noqa: N818 - not an error: the thread that waits was interrupted

@@ -198,7 +198,7 @@ class _Work:
         """Make all runs, so many at once; a job makes its own, with the processors that have no job."""
         flag = crew.flag()
         if flag is not None:
-            self._as_job(flag)
+            self._as_job(flag, threads)
             return
         todo = deque(self._parts(threads))
         threads = max(min(threads, len(todo)), 1)
@@ -220,16 +220,20 @@ class _Work:
             wait(workers)
             raise
 
-    def _as_job(self, flag) -> None:
+    def _as_job(self, flag, threads: int) -> None:
         """Make all runs in this thread, and in those of processors that have no job."""
-        self.stop, others = flag, crew.spare()
+        self.stop, others = flag, min(crew.spare(), threads - 1)
         todo = deque(self._parts(1 + others) if others else self._whole())
-        threads = crew.pool(os.getpid(), crew.processors(), "runs")
-        helpers = [threads.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
-        self._work(todo)
-        for helper in helpers:
-            if not helper.cancel():
-                helper.result()
+        pool = crew.pool(os.getpid(), crew.processors(), "runs")
+        helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
+        try:
+            self._work(todo)
+        finally:
+            todo.clear()
+            begun = [helper for helper in helpers if not helper.cancel()]
+            wait(begun)
+        for helper in begun:
+            helper.result()
         if flag[0]:
             raise crew.Stopped
 

@@ -28,6 +28,7 @@ from ..thresholds import (
     KNOCKS,
     LINEAR,
     NAN_AHEAD,
+    NOTHING,
     NUDGE,
     NUDGED,
     PUSHED,
@@ -126,7 +127,7 @@ class OrbitSearch:
         """
         if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), FAMILIAR):
             return
-        about = tuple(BINS * round(math.log10(size) / BINS) for size in (A, omega))
+        about = tuple(BINS * round(math.log10(max(size, NOTHING)) / BINS) for size in (A, omega))
         if about == self._about:
             return
         self._about = about

@@ -325,7 +325,9 @@ def fit_segments(
         followed,
     )  # fmt: skip
     stage = Stage(problem, list(segments), thin, starts, rtol)
-    found = stage.solve(problem.start(), iterations=iterations, tolerance=tolerance, robust=robust)
+    found = stage.solve(
+        problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
+    )
     if names and found.slopes is None:
         base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
         found = replace(found, slopes=stage.jacobian(found.theta, found.states, base))

@@ -165,7 +165,8 @@ class Diagnosis:
     baseline : Baseline
         The refitted model without any of them: `model`, `nrmse`, `nrmse_holdout`, `error_by_horizon`.
     noise, structure : float
-        Of the best candidate's residual: rms of noise and of what the model still misses [unit of `measure`].
+        Of the best candidate's residual (of the refitted model's where that is refuted): rms of noise and of
+        what the model still misses [unit of `measure`].
     measure : {'output', 'acceleration', 'N'}
         What all errors are of: the output, or (where disturbance forces, such as friction that drifts,
         outweigh the noise of the sensor) its acceleration, averaged over some samples.

@@ -84,11 +84,11 @@ def falls_behind(first, long) -> str:
     )
 
 
-def grows(error: float, seconds: float) -> str:
+def grows(short: float, error: float, seconds: float) -> str:
     """Return that a model which follows short segments does not follow long ones, refitted to these."""
     return (
-        f"It follows short segments within the noise, but not long ones: refitted to {seconds:.3g} s each it "
-        f"errs by {error:.2%}."
+        f"The refitted model follows short segments to {short:.2%}, but not long ones: over {seconds:.3g} s "
+        f"each, refitted to these, it errs by {error:.2%}."
     )
 
 

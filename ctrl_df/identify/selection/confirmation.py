@@ -71,6 +71,8 @@ def confirmed(
     base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
     chosen, noise = ranked(base, others)
     at = replace(at, data=data, base=base, noise=noise, floor=floor, farthest=fits[-1][0])
+    if at.grows:
+        at = replace(at, farthest=_farthest(at, fits[-1]))
     if not chosen:
         return at, []
     told(at, chosen)
@@ -79,6 +81,13 @@ def confirmed(
     span = max(float(np.ptp(facts(r).place)) for r in data.train.records)
     chosen, noise = ranked(base, [t for t in chosen if itself(t, span)])
     return replace(at, noise=noise), chosen
+
+
+def _farthest(at: Standing, fits: Sequence[FitResult | None]) -> FitResult:
+    """Return the baseline over the longest segments, begun again as the nearest model there."""
+    base, *others = [CandidateFit("", f) for f in fits if f is not None]
+    nearest = min([base, *others], key=lambda t: t.train.rmse)
+    return begun_as(base, nearest, at.segmentations[-1]).train
 
 
 def _judged(
@@ -154,8 +163,11 @@ def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits)
     """
     pairs = [(t, f) for t, f in zip(judged, fits, strict=True) if t is not None]
     least = min(t.train.rmse for t, _ in pairs)
-    near = [(thresholds_refined(t, data.fine), f) for t, f in pairs if t.train.rmse <= GROWTH * least]
-    nearest, fit = min(near, key=lambda p: p[0].validation_rmse)
+    near = [(t, f) for t, f in pairs if t.train.rmse <= GROWTH * least]
+    refined = side_by_side(lambda pair: thresholds_refined(pair[0], data.fine), near)
+    nearest, fit = min(
+        zip(refined, (f for _, f in near), strict=True), key=lambda pair: pair[0].validation_rmse
+    )
     if nearest.validation_rmse <= LITTLE_LUCK * judged[0].validation_rmse:
         return False
     fitted = max(nearest.train.rmse / max(fit.rmse, NOTHING), 1.0)

@@ -47,8 +47,10 @@ class Standing:
 
     @property
     def grows(self) -> bool:
-        """Whether the model, refitted, errs over longer segments by more than noise does."""
-        return self.farthest is not None and self.farthest.rmse > GROWN * self.nearest.rmse
+        """Whether the model, refitted, errs over longer segments by more than slow noise does."""
+        if self.data.disturbed or self.farthest is None:
+            return False
+        return self.farthest.rmse > GROWN * self.nearest.rmse
 
     def by_accelerations(self, free: tuple[str, ...]) -> Standing:
         """Return the same where disturbance forces drown all else over longer segments.

@@ -171,7 +171,7 @@ class StructureSearch(Search):
     def remainder(self, best, significant):
         """Return what the best model leaves."""
         left = remainder(
-            self.at.base, best, self.at.data.fine, self.at.noise, self.at.floor, self.significant
+            self.at.base, best, self.at.data.fine, self._noise(best), self.at.floor, self.significant
         )
         if self.at.data.disturbed and not significant and self.at.nearest.nrmse > UNMOVED:
             # accelerations that are mostly noise do not speak for a model that does not even move
@@ -180,8 +180,12 @@ class StructureSearch(Search):
             return self._growing(left)
         return left
 
+    def _noise(self, judged):
+        """Return the noise of the residual of the best candidate, or of the model without it."""
+        return ranked(judged, ())[1] if judged is self.at.base else self.at.noise
+
     def _growing(self, left: Remainder) -> Remainder:
-        """Return what a model leaves that errs over short segments by noise alone, but not over long ones."""
+        """Return what a model leaves whose error grows with the length of segments."""
         farthest = self.at.farthest
         assert farthest is not None
         error = math.sqrt(farthest.rmse**2 - self.at.nearest.rmse**2)
@@ -189,7 +193,7 @@ class StructureSearch(Search):
             float(np.max(w.ends - w.begins)) * facts(r).dt
             for r, w in zip(self.at.data.train.records, farthest.segments, strict=True)
         )
-        doubt = grows(farthest.nrmse, seconds)
+        doubt = grows(self.at.nearest.nrmse, farthest.nrmse, seconds)
         return replace(left, structure=max(left.structure, error), unexplained=True, doubt=doubt)
 
     def located(self, best, remainder, unknown):
