@@ -34,7 +34,8 @@ def play(rig, plan, seed):
 
 
 CASES = [
-    ("stiction", "stribeck", 15, True, dict(duration=1.2)),
+    # a shorter one leaves both fits beside their minimum with some BLAS kernels, and the two alike
+    ("stiction", "stribeck", 15, True, dict(duration=1.6)),
     ("linear_spring", "cubic_spring", 3, False, {}),
 ]
 
