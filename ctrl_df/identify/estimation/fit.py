@@ -254,9 +254,7 @@ def fit_records(
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
     if names:
-        # about the solution
-        base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
-        found = replace(found, slopes=stage.jacobian(found.theta, found.states, base, central))
+        found = _with_slopes(stage, found, central)
     return _outcome(stage, found, errors=True)
 
 
@@ -329,8 +327,7 @@ def fit_segments(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
     )
     if names and found.slopes is None:
-        base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
-        found = replace(found, slopes=stage.jacobian(found.theta, found.states, base))
+        found = _with_slopes(stage, found)
     if step_of_sensor(problem.block) is not None:
         found = replace(found, residual=stage.rounded(found.theta, found.states.values))
     return _outcome(stage, found, errors)
@@ -364,6 +361,12 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
 
 
 # --- the answer -----------------------------------------------------------------------------------
+
+
+def _with_slopes(stage: Stage, found: Solution, central: bool = False) -> Solution:
+    """Return a solution with derivatives about itself, in place of those before its last step."""
+    base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
+    return replace(found, slopes=stage.jacobian(found.theta, found.states, base, central))
 
 
 def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:

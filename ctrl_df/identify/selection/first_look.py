@@ -54,17 +54,13 @@ class FirstLook:
             Hears in words what is done.
         """
         stage(f"{len(self.classes)} effects tried over short segments")
-        begun, data = at, at.data.sampled
-        base = data.moved(at.base.train, 3)
-        short = self._short(at, data)
-        found = self._over(at, data, base, base, short, lambda screened: told(begun, screened))
+        begun = at
+        base, found = self._sampled(at, lambda screened: told(begun, screened))
         told(at, found)
         if self._disturbed(at, found):
             at = at.by_accelerations(self.free)
             stage("the same by accelerations: disturbance forces outweigh the noise")
-            data = at.data.sampled
-            base = data.moved(at.base.train, 3)
-            found = self._over(at, data, base, base, self._short(at, data))
+            base, found = self._sampled(at)
             told(at, found)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
@@ -91,6 +87,12 @@ class FirstLook:
         found = self._tried(at, data, about, self._short(at, data), reached=known.rmse)
         more = len(names) - len(self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
+
+    def _sampled(self, at: Standing, screened=None) -> tuple[FitResult, list[CandidateFit]]:
+        """Return the model and every effect fitted over every second of the segments that judge."""
+        data = at.data.sampled
+        base = data.moved(at.base.train, 3)
+        return base, self._over(at, data, base, base, self._short(at, data), screened)
 
     def _over(
         self,
