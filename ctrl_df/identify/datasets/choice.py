@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..arguments import check_held_out
-from ..data.as_data import as_records, as_tables, has_tables
+from ..data.as_data import as_records, as_tables, distinguished, has_tables
 from ..data.imposed import imposes_motion
 from .dataset import Dataset
 from .imposed import ImposedDataset
@@ -25,6 +25,8 @@ def dataset_of(data, holdout=None, name: str = "data") -> Dataset:
     records = of(data, name)
     validation = () if holdout is None else of(holdout, "holdout")
     check_held_out(records, validation)
-    if kind is TimeDataset and any(imposes_motion(r) for r in (*records, *validation)):  # pyright: ignore[reportArgumentType]
-        kind = ImposedDataset
-    return kind(records, validation)
+    if kind is TableDataset:
+        return kind(records, validation)
+    named = distinguished((*records, *validation))
+    kind = ImposedDataset if any(map(imposes_motion, named)) else TimeDataset
+    return kind(named[: len(records)], named[len(records) :])

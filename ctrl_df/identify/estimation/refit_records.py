@@ -13,7 +13,7 @@ from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
 from ..data.measurement import Measurement
 from ..prediction.segments import facts
-from ..prediction.simulators import simulator_of
+from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SEGMENT_LEAST
 from ..shooting.variables import step_of_sensor
 from ..thresholds import PROCESS_NOISE, TAKES_PART
@@ -46,7 +46,7 @@ def refit_records(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=tolerance, central=True, polish=6
     )
     # short segments lead from far off; from nearby they may lead away, into another minimum
-    ways = [True, False] if start is None and _many_minima(model, records) else [start is None]
+    ways = [True, False] if start is None and _many_minima(model) else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
     found = min(fits, key=lambda f: f.rmse)
     shown = None
@@ -88,9 +88,9 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
     return float(np.median(np.concatenate(spans)))
 
 
-def _many_minima(model, records) -> bool:
+def _many_minima(model) -> bool:
     """Whether the error of a model has many minima over its parameters."""
-    effects = getattr(simulator_of(model, records[0]).block, "effects", ())
+    effects = getattr(block_of(model), "effects", ())
     return any(e.nonsmooth or e.multimodal for e in effects)
 
 
@@ -109,14 +109,13 @@ class _Beside:
 
 def _with_step(found: FitResult, records, names, whole) -> FitResult:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
-    first = simulator_of(found.model, records[0])
-    key = step_of_sensor(first.block)
+    key = step_of_sensor(block_of(found.model))
     if key is None or not (whole or key in names):
         return found
     steps = [step_of((r.outputs or {}).get("position", np.zeros(0))) for r in records]
     if min(steps) == 0:
         return found
-    return replace(found, model=first.with_values({key: float(np.median(steps))}))
+    return replace(found, model=with_values(found.model, {key: float(np.median(steps))}))
 
 
 def blurred(found: FitResult) -> set[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..shooting.variables import Variable
 
 
 def sigma_points(
-    variables: Sequence[Variable], theta, precision, curvature, variance: float
+    variables: Sequence[Variable], named: Callable, theta, precision, curvature, variance: float
 ) -> list[dict[str, float]]:
     """Return the values one standard deviation off an estimate, to both sides along every principal axis.
 
@@ -18,6 +18,8 @@ def sigma_points(
     ----------
     variables : sequence of Variable
         p of them.
+    named : callable
+        ``named(theta)``, values by name.
     theta : (p,) array
         The estimate, scaled.
     precision : (p,) array
@@ -42,5 +44,6 @@ def sigma_points(
     for e, axis in zip(eigen, axes.T, strict=True):
         for sign in (-1, 1):
             step = sign * axis / np.sqrt(max(float(e), 1.0))
-            found.append({v.name: v.p(v.clip(q + d)) for v, q, d in zip(variables, theta, step, strict=True)})
+            point = [v.clip(q + d) for v, q, d in zip(variables, theta, step, strict=True)]
+            found.append(named(np.array(point)))
     return found

@@ -17,7 +17,7 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
 from ..starting.regression import Start

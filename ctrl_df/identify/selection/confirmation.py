@@ -23,7 +23,7 @@ from ..estimation.multistart import (
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .attempts import itself
 from .evidence import ranked, rounds

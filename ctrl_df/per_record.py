@@ -1,0 +1,45 @@
+"""A number that every record has for itself, in the place of one number."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Mapping
+from types import MappingProxyType
+
+
+class PerRecord(float):
+    """Value of a parameter that differs from record to record; as a number, what it is for one not known.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        By name of the record.
+    """
+
+    values: Mapping[str, float]
+
+    def __new__(cls, usual: float, values: Mapping[str, float] | None = None):
+        """Take the value of a record not known, and those of others."""
+        self = super().__new__(cls, usual)
+        self.values = MappingProxyType(dict(values or {}))
+        return self
+
+    @classmethod
+    def over(cls, values: Mapping[str, float], angle: bool = False) -> PerRecord:
+        """Return these values; a record not known has their mean, of angles the direction of it."""
+        if angle:
+            return cls(cmath.phase(sum(cmath.rect(1.0, v) for v in values.values())), values)
+        return cls(sum(values.values()) / len(values), values)
+
+    def of(self, record: str) -> float:
+        """Return the value of the record of that name."""
+        return self.values.get(record, float(self))
+
+    def __eq__(self, other) -> bool:
+        same = super().__eq__(other)
+        return same and self.values == other.values if isinstance(other, PerRecord) else same
+
+    __hash__ = float.__hash__
+
+    def __reduce__(self):
+        return PerRecord, (float(self), dict(self.values))
