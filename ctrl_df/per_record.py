@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 
@@ -26,10 +27,16 @@ class PerRecord(float):
 
     @classmethod
     def over(cls, values: Mapping[str, float], angle: bool = False) -> PerRecord:
-        """Return these values; a record not known has their mean, of angles the direction of it."""
+        """Return these values; a record not known has their mean, of angles its direction."""
         if angle:
+            values = {k: math.remainder(v, 2 * math.pi) for k, v in values.items()}
             return cls(cmath.phase(sum(cmath.rect(1.0, v) for v in values.values())), values)
         return cls(sum(values.values()) / len(values), values)
+
+    @classmethod
+    def angles(cls, records: Sequence[str], values: Sequence[float]) -> float:
+        """Return one angle a record: of one record alone that angle."""
+        return values[0] if len(values) == 1 else cls.over(dict(zip(records, values, strict=True)), True)
 
     def of(self, record: str) -> float:
         """Return the value of the record of that name."""

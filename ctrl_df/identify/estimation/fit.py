@@ -37,6 +37,8 @@ class FitResult:
     ----------
     model : block
         With the parameters found.
+    records : tuple of str
+        Names of the records.
     names, values : tuple of str, tuple of float
         The free parameters. Of those that every record has for itself (`PerRecord`) what follows is of their
         mean over the records.
@@ -76,6 +78,7 @@ class FitResult:
     """
 
     model: Any
+    records: tuple[str, ...]
     names: tuple[str, ...]
     values: tuple[float, ...]
     covariance: np.ndarray
@@ -123,6 +126,15 @@ class FitResult:
     def simulated_pieces(self) -> list[np.ndarray]:
         """The simulated output, as `residual_pieces`."""
         return self._pieces(self.simulated)
+
+    @property
+    def squares(self) -> list[float]:
+        """Per record, the sum of squares of what the cost sees."""
+        seen = self.residual
+        if self.error_filter is not None:
+            filtered = self.error_filter.filtered
+            seen = [filtered(x, w.slices) for x, w in zip(self.residual, self.segments, strict=True)]
+        return [float(e @ e) for e in seen]
 
     @property
     def outputs(self) -> int:
@@ -393,6 +405,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     spread, _ = stage.power([w.centred(y) for w, y in zip(stage.segments, stage.measured, strict=True)])
     return FitResult(
         model=with_values(problem.model, values),
+        records=tuple(r.name for r in problem.records),
         names=problem.names,
         values=tuple(values[k] for k in problem.names),
         covariance=merged(problem, covariance),
@@ -408,7 +421,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         at_bound=tuple(strongest(problem, at_bound)),
         null=[(size, np.array(strongest(problem, direction))) for size, direction in null],
         scale=np.array(strongest(problem, scale)),
-        own=own_values(problem, theta, covariance, null, at_bound, scale),
+        own=own_values(problem, values, covariance, null, at_bound, scale),
         starts=found.states.values,
         segments=stage.segments,
         linear=linear,

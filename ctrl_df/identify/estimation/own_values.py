@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..prediction.values import in_record
 from ..shooting.problem import Problem
 from ..thresholds import TAKES_PART
 
@@ -31,17 +32,19 @@ class OwnValue:
     determined: bool
 
 
-def own_values(problem: Problem, theta, covariance, null, at_bound, scale) -> dict[str, dict[str, OwnValue]]:
-    """Return them by name, then by record; the arrays are of all variables of the problem."""
-    unknown = np.full(len(theta), math.nan)
+def own_values(problem: Problem, named, covariance, null, at_bound, scale) -> dict[str, dict[str, OwnValue]]:
+    """Return them by name, then by record.
+
+    `named`: values as `Problem.named` has them; the arrays are of all variables of the problem.
+    """
+    unknown = np.full(len(scale), math.nan)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0)) if len(covariance) else unknown
-    open_ = [i for i in range(len(theta)) if any(abs(d[i]) > TAKES_PART for _, d in null)]
+    open_ = [i for i in range(len(scale)) if any(abs(d[i]) > TAKES_PART for _, d in null)]
     found: dict[str, dict[str, OwnValue]] = {name: {} for name in problem.names if name in problem.own}
     for k, record in enumerate(problem.records):
-        values = problem.values(theta, k) or {}
         for name, i in zip(problem.names, problem.of_record[k], strict=True):
             if name in found:
-                value, error = float(values[name]), float(errors[i])
+                value, error = in_record(named[name], record.name), float(errors[i])
                 known = i not in open_ and error <= max(abs(value), scale[i])
                 found[name][record.name] = OwnValue(value, error, at_bound[i], known)
     return found

@@ -12,13 +12,14 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
 from ..data.measurement import Measurement
-from ..prediction.segments import facts
+from ..prediction.segments import facts, make_segments
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SEGMENT_LEAST
 from ..shooting.variables import step_of_sensor
 from ..thresholds import PROCESS_NOISE, TAKES_PART
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
+from .per_record import begun_with_angles
 from .segmented import prepare
 from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS
 
@@ -45,6 +46,7 @@ def refit_records(
     settings: dict[str, Any] = dict(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=tolerance, central=True, polish=6
     )
+    model = _with_angles(model, records, names)
     # short segments lead from far off; from nearby they may lead away, into another minimum
     ways = [True, False] if start is None and _many_minima(model) else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
@@ -67,6 +69,16 @@ def refit_records(
     # a model that errs over brief segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
+
+
+def _with_angles(model, records: Sequence[Measurement], names):
+    """Return the model with the angles that every record has for itself, sought over half strokes."""
+    segments = [make_segments(r, max(0.5 * facts(r).swing, SEGMENT_LEAST * facts(r).dt)) for r in records]
+
+    def fit(trial, moved, starts, iterations) -> FitResult:
+        return fit_segments(trial, records, segments, moved, starts=starts, iterations=iterations)
+
+    return begun_with_angles(model, names, records, None, fit)[0]
 
 
 def _short_segment(model, records: Sequence[Measurement]) -> float | None:
