@@ -46,6 +46,9 @@ class PerRecord(float):
         same = super().__eq__(other)
         return same and self.values == other.values if isinstance(other, PerRecord) else same
 
+    def __ne__(self, other) -> bool:
+        return not self == other
+
     __hash__ = float.__hash__
 
     def __reduce__(self):

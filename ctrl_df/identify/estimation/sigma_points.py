@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,16 +10,14 @@ from ..shooting.variables import Variable
 
 
 def sigma_points(
-    variables: Sequence[Variable], named: Callable, theta, precision, curvature, variance: float
-) -> list[dict[str, float]]:
-    """Return the values one standard deviation off an estimate, to both sides along every principal axis.
+    variables: Sequence[Variable], theta, precision, curvature, variance: float
+) -> list[np.ndarray]:
+    """Return the points one standard deviation off an estimate, to both sides along every principal axis.
 
     Parameters
     ----------
     variables : sequence of Variable
         p of them.
-    named : callable
-        ``named(theta)``, values by name.
     theta : (p,) array
         The estimate, scaled.
     precision : (p,) array
@@ -31,8 +29,9 @@ def sigma_points(
 
     Returns
     -------
-    list of dict
-        2 p of them, within the bounds, and no farther than a factor of e, or (of what may be zero) its scale.
+    list of (p,) array
+        2 p of them, scaled, within the bounds, and no farther than a factor of e, or (of what may be zero)
+        its scale.
 
     References
     ----------
@@ -44,6 +43,5 @@ def sigma_points(
     for e, axis in zip(eigen, axes.T, strict=True):
         for sign in (-1, 1):
             step = sign * axis / np.sqrt(max(float(e), 1.0))
-            point = [v.clip(q + d) for v, q, d in zip(variables, theta, step, strict=True)]
-            found.append(named(np.array(point)))
+            found.append(np.array([v.clip(q + d) for v, q, d in zip(variables, theta, step, strict=True)]))
     return found

@@ -8,8 +8,8 @@ equation of motion is integrated twice,
 
 which is linear in all but k. Of several records each has a and b of its own. Second differences take x0 and
 v0 out. What is left over has noise of two kinds, of the sensor and of forces; each frequency weighs by what
-is left at and around it (Whittle's likelihood), so that either may prevail. Then k is scanned, from the stroke
-down to what the smoothed position resolves.
+is left at and around it (Whittle's likelihood), so that either may prevail. Then k is scanned, from the
+stroke down to what the smoothed position resolves.
 """
 
 from __future__ import annotations
