@@ -6,7 +6,7 @@ from operator import attrgetter
 
 from ..checks import executor as checked_executor
 from ..checks import unknown_keywords
-from .arguments import check_limits, check_quantities, effect_classes, free_parameters, mechanism_of
+from .arguments import check_limits, check_quantities, effect_classes, mechanism_of
 from .course import Course
 from .datasets.choice import dataset_of
 from .results.diagnosis import Diagnosis
@@ -92,10 +92,10 @@ def diagnose(
     check_limits(limits)
     classes = effect_classes(candidates)
     course = Course("diagnose", progress, callback, budget)
-    dataset = dataset_of(data, holdout)
+    dataset = dataset_of(model, data, holdout)
     block = mechanism_of(model)
     check_quantities(block, (*dataset.records, *dataset.validation))
-    names = free_parameters(block, free)
+    names = dataset.free_parameters(block, free)
 
     def work():
         course.stage("the model refitted")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
-from .arguments import check_quantities, effect_classes, free_parameters, mechanism_of
+from .arguments import check_quantities, effect_classes, mechanism_of
 from .course import Course
 from .datasets.choice import dataset_of
 from .ladder.climb import Climb
@@ -77,13 +77,13 @@ def improve(
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     course = Course("improve", progress, callback, budget)
-    dataset = dataset_of(train, holdout, "train")
+    dataset = dataset_of(model, train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
-    kept = frozenset(start.parameters) - set(free_parameters(start, free))
+    kept = frozenset(start.parameters) - set(dataset.free_parameters(start, free))
 
     def free_of(block) -> list[str]:
-        return [k for k in free_parameters(block) if k not in kept]
+        return [k for k in dataset.free_parameters(block) if k not in kept]
 
     climb = Climb(dataset, start, classes, free_of, max_effects, executor, course)
     return course.run(climb.to_the_end)

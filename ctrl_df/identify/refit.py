@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..checks import unknown_keywords
-from .arguments import check_fit, check_quantities, free_parameters, parametric
+from .arguments import check_fit, check_quantities, parametric
 from .datasets.choice import dataset_of
 from .results.fit import Fit, FittedParameter
 
@@ -80,11 +80,11 @@ def refit(
     {'mass': 2.2, 'coulomb.level': 3.0, 'viscous.coefficient': 6.0}
     """
     unknown_keywords(keywords)
-    dataset = dataset_of(data)
+    dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)
     block: Any = parametric(dataset.block_of(model))
-    names = free_parameters(block, free)
+    names = dataset.free_parameters(block, free)
     check_fit(block, start, robust, budget)
     found = dataset.fit(
         model, names, start, whole=free is None, mode=mode, window=window, robust=robust, budget=budget
