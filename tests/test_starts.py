@@ -14,6 +14,7 @@ from ctrl_df.identify.selection.rounding import rounding_evidence
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
+from ctrl_df.identify.starting.like_another import like_another
 from ctrl_df.identify.starting.regression import force_fit, motion_of, regressed
 from ctrl_df.identify.starting.resonance_grid import resonating
 from ctrl_df.identify.starting.screen import Screen
@@ -118,7 +119,7 @@ def test_a_pendulum_starts_from_its_own_inertia():
     data = prepare(bare, [run]).segmentations[0]
     screen = Screen(data.fit(bare, default_free(bare)), data)
     begun = next(s for s in regressed(cdf.Gravity, screen))
-    assert begun.effect.torque == pytest.approx(0.5, rel=0.05)
+    assert begun.effect.values[0] == pytest.approx(0.5, rel=0.05)
     assert dict(begun.values)["inertia"] == pytest.approx(0.01, rel=0.15)
 
     # the laws that a model has already take their share of the force
@@ -142,3 +143,18 @@ def test_a_true_model_follows_what_is_held_out():
         found = data.validate(CandidateFit("", data.fit(true, (), iterations=1)))
         # 1.2, 1.1, 1.6 times the noise; with one damping for all segments 15, 5, 52
         assert found.validation_rmse < 3 * noise
+
+
+def test_a_law_in_the_place_of_another():
+    t = np.linspace(0.0, 10.0, 2000)
+    x, v = 3.0 * np.sin(t), 3.0 * np.cos(t)
+    # a pendulum is a ripple as long as a turn: -T sin(x - a) = A sin(2 pi x / L + p)
+    ripple = cdf.PositionRipple(0.55, 2 * np.pi, 2.81)
+    pendulum = like_another(cdf.Gravity(0.4, 0.2), ripple, x, v)
+    assert pendulum is not None and pendulum.values == pytest.approx((0.55, np.pi - 2.81), rel=1e-6)
+    # at no speed does it grow with the place, and a spring over a small stroke is a pendulum
+    assert like_another(cdf.Viscous(1.0), ripple, x, v) is None
+    spring = like_another(cdf.LinearSpring(1.0), cdf.Gravity(2.0), 0.1 * x, v)
+    assert spring is not None and spring.values[0] == pytest.approx(2.0, rel=0.02)
+    # motion alone does not tell what friction does, or what has states
+    assert like_another(cdf.Coulomb(1.0), ripple, x, v) is None

@@ -45,6 +45,6 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     (True, False)
     """
     unknown_keywords(keywords)
-    dataset = dataset_of(data)
+    dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     return dataset.compare(model, mode, window)

@@ -10,7 +10,6 @@ from .arguments import (
     check_limits,
     check_quantities,
     effect_classes,
-    free_parameters,
     mechanism_of,
     own_parameters,
     with_those,
@@ -104,11 +103,11 @@ def diagnose(
     check_limits(limits)
     classes = effect_classes(candidates)
     course = Course("diagnose", progress, callback, budget)
-    dataset = dataset_of(data, holdout)
+    dataset = dataset_of(model, data, holdout)
     block = mechanism_of(model)
     check_quantities(block, (*dataset.records, *dataset.validation))
     own = own_parameters(block, own)
-    names = with_those(free_parameters(block, free), own)
+    names = with_those(dataset.free_parameters(block, free), own)
     block = dataset.with_own(block, own)
 
     def work():

@@ -46,6 +46,6 @@ def next_experiment(
     models = [diagnosis.model] if len(remaining) == 1 else []
     models += [c.model for c in remaining]
     names = tuple(c.id for c in remaining)
-    return dataset_of(diagnosis.train).plan(
+    return dataset_of(diagnosis.model, diagnosis.train).plan(
         diagnosis, models, names, force=force, stroke=stroke, duration=duration, dt=dt, loop=loop
     )

@@ -7,7 +7,6 @@ from ..checks import executor as checked_executor
 from .arguments import (
     check_quantities,
     effect_classes,
-    free_parameters,
     mechanism_of,
     own_parameters,
     with_those,
@@ -85,15 +84,15 @@ def improve(
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     course = Course("improve", progress, callback, budget)
-    dataset = dataset_of(train, holdout, "train")
+    dataset = dataset_of(model, train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
     own = own_parameters(start, own)
-    kept = frozenset(start.parameters) - set(with_those(free_parameters(start, free), own))
+    kept = frozenset(start.parameters) - set(with_those(dataset.free_parameters(start, free), own))
     start = dataset.with_own(start, own)
 
     def free_of(block) -> list[str]:
-        return [k for k in free_parameters(block) if k not in kept]
+        return [k for k in dataset.free_parameters(block) if k not in kept]
 
     climb = Climb(dataset, start, classes, free_of, max_effects, executor, course)
     return course.run(climb.to_the_end)

@@ -12,7 +12,6 @@ from ..checks import unknown_keywords
 from .arguments import (
     check_fit,
     check_quantities,
-    free_parameters,
     own_parameters,
     parametric,
     with_those,
@@ -96,12 +95,12 @@ def refit(
     {'mass': 2.2, 'coulomb.level': 3.0, 'viscous.coefficient': 6.0}
     """
     unknown_keywords(keywords)
-    dataset = dataset_of(data)
+    dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)
     block: Any = parametric(dataset.block_of(model))
     own = own_parameters(block, own)
-    names = with_those(free_parameters(block, free), own)
+    names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
     found = dataset.fit(
         dataset.with_own(model, own),

@@ -20,7 +20,8 @@ def as_channel(owner: str, name: str, values, length: int | None = None) -> np.n
     if len(masked):
         raise ValueError(
             f"{owner} needs every sample; {name} has {len(masked)} masked, the first at sample {masked[0]}. "
-            "Take the parts between them as records of their own, or fill them yourself where that is honest."
+            "Take the parts between them as records of their own (Measurement.in_parts), or fill them "
+            "yourself where that is honest."
         )
     try:
         raw = np.asarray(values)
@@ -57,7 +58,8 @@ def as_channel(owner: str, name: str, values, length: int | None = None) -> np.n
         raise ValueError(
             f"{owner} needs finite numbers; {name} has {len(bad)} NaN or infinite, the first at "
             f"sample {bad[0]}. "
-            "Cut them off, or interpolate them yourself where that is honest."
+            "Take the parts between them as records of their own (Measurement.in_parts), or interpolate them "
+            "yourself where that is honest."
         )
     return array
 
@@ -79,19 +81,24 @@ def check_times(owner: str, t: np.ndarray) -> None:
             f"({count} repetitions in all). "
             "Drop the repeated rows, or write the times with more digits."
         )
+    missing = holes(t)
+    if len(missing):
+        i, middle = int(missing[0]), float(np.median(steps))
+        raise ValueError(
+            f"{owner} needs gapless sampling; {len(missing)} gap(s) in a regular {middle:.6g} s grid, "
+            f"the first from {t[i]:.9g} to {t[i + 1]:.9g} s ({steps[i] / middle:.3g} intervals). "
+            "Give the parts as separate records: Measurement.in_parts."
+        )
+
+
+def holes(t: np.ndarray) -> np.ndarray:
+    """Return the samples after which others are missing in an otherwise regular sampling."""
+    steps = np.diff(t)
     middle = float(np.median(steps))
     low, high = np.quantile(steps, USUAL_STEPS)
     if high > 1.5 * low:
-        return  # irregular on purpose: every interval is as good as another
-    limit = max(1.5 * middle, 1.5 * high)
-    holes = np.flatnonzero(steps > limit)
-    if len(holes):
-        i = int(holes[0])
-        raise ValueError(
-            f"{owner} needs gapless sampling; {len(holes)} gap(s) in a regular {middle:.6g} s grid, "
-            f"the first from {t[i]:.9g} to {t[i + 1]:.9g} s ({steps[i] / middle:.3g} intervals). "
-            "Give the parts as separate records."
-        )
+        return np.zeros(0, int)  # irregular on purpose: every interval is as good as another
+    return np.flatnonzero(steps > max(1.5 * middle, 1.5 * high))
 
 
 def check_input(owner: str, u: np.ndarray) -> None:
@@ -113,7 +120,19 @@ def check_output(owner: str, y: np.ndarray) -> None:
 
 
 def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
-    """Check that a measured place does not leap, as it does where an encoder is reset or an angle wraps.
+    """Check that a measured place does not leap."""
+    found = leaps(x)
+    if len(found):
+        i = int(found[0])
+        raise ValueError(
+            f"{owner} needs a position without leaps; it has {len(found)}, the first from {x[i]:.6g} to "
+            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Was the encoder reset? Give the parts as "
+            "separate records: Measurement.in_parts (an angle that wraps: np.unwrap first)."
+        )
+
+
+def leaps(x: np.ndarray) -> np.ndarray:
+    """Return the samples after which a place leaps, as it does where an encoder is reset or an angle wraps.
 
     A leap is a step between two samples that is far larger than those around it, than any other in the
     record, and than noise and rounding: no machine is that fast for one sample alone.
@@ -123,17 +142,11 @@ def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
     for lag in range(1, BESIDE + 1):
         around[lag:] = np.maximum(around[lag:], steps[:-lag])
         around[:-lag] = np.maximum(around[:-lag], steps[lag:])
-    alone = steps > LEAP * np.maximum(around, max(step_of(x), grain(x)))
-    leaps = np.flatnonzero(alone & (steps > FAST * np.max(steps[~alone], initial=0.0)))
+    seen = LEAP * max(step_of(x), grain(x))
+    alone = steps > np.maximum(LEAP * around, seen)
+    found = np.flatnonzero(alone & (steps > FAST * np.max(steps[~alone], initial=0.0)))
     jumps = np.zeros(len(steps))
-    jumps[leaps] = np.diff(x)[leaps]
+    jumps[found] = np.diff(x)[found]
     between = x[1:] - np.cumsum(jumps)
-    # a coarse sensor that rounds moves by its steps alone
-    leaps = leaps[steps[leaps] <= np.ptp(between)]
-    if len(leaps):
-        i = int(leaps[0])
-        raise ValueError(
-            f"{owner} needs a position without leaps; it has {len(leaps)}, the first from {x[i]:.6g} to "
-            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Was the encoder reset? Give the parts as "
-            "separate records (an angle that wraps: np.unwrap first)."
-        )
+    # a coarse sensor that rounds moves by its steps alone: nothing is seen between them
+    return found[np.minimum(steps[found], seen) < np.ptp(between)]

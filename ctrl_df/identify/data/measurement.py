@@ -16,6 +16,7 @@ from ..thresholds import ON_SAMPLE
 from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
+from .parts import in_parts
 from .thresholds import MINIMUM, REGULAR
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
@@ -135,7 +136,7 @@ class Measurement:
         values["velocity_unit"], values["time_unit"] = velocity_unit, "s"
         extra = {}
         for key, given in (self.channels or {}).items():
-            array, unit = _with_unit(given)
+            array, unit = quantities.with_unit(given)
             extra[key] = to_si(as_channel(owner, f"channel {key!r}", array, n), unit or "")[0]
         values["channels"] = MappingProxyType({k: _frozen(v) for k, v in extra.items()})
         for key, value in values.items():
@@ -156,7 +157,7 @@ class Measurement:
             )
         found: dict[str, tuple[np.ndarray, float, str]] = {}
         for word, channel in given.items():
-            array, unit = _with_unit(channel)
+            array, unit = quantities.with_unit(channel)
             quantity, scale, unit = quantities.stated("output", word, unit, "")
             if quantity in found:
                 raise ValueError(
@@ -265,6 +266,42 @@ class Measurement:
         keywords.setdefault("input_hold", "linear")
         keywords.setdefault("name", getattr(response, "sysname", None) or "response")
         return cls(t, u, **({"y": y} if outputs is None else {"outputs": y}), **keywords)
+
+    @classmethod
+    def in_parts(cls, t, u, y=None, **keywords) -> tuple[Measurement, ...]:
+        """Take a run that has breaks as several records, which share the parameters of a model.
+
+        A break is where the recorder paused or dropped samples (a hole in a regular sampling, NaN, None or
+        masked samples in any channel), where times begin anew, and where a position leaps (an encoder was
+        reset; places are then counted from elsewhere). Nothing is filled in. Parts that are too short to
+        teach anything (under 10 samples, input or output constant) are left out, and a warning says how many
+        samples that were.
+
+        Parameters
+        ----------
+        t, u, y : array_like, shape (n,)
+            As for `Measurement`; each may be a masked array.
+        **keywords
+            As for `Measurement`; every part has the `name` and its number.
+
+        Returns
+        -------
+        tuple of Measurement
+
+        Raises
+        ------
+        ValueError
+            As for `Measurement`; no part that can be used.
+
+        Examples
+        --------
+        >>> t = np.arange(0, 6, 0.01)
+        >>> u, y = np.sin(3 * t), np.cos(3 * t)
+        >>> [len(part) for part in cdf.Measurement.in_parts(t, u, y + 5 * (t > 2.495))]  # reset at 2.5 s
+        [250, 350]
+        """
+        cls._check_keywords(keywords)
+        return in_parts(cls, t, u, y, keywords)
 
     @classmethod
     def _check_keywords(cls, keywords):
@@ -460,13 +497,6 @@ class Measurement:
             f"Measurement({self.name!r}: {len(self)} samples, {self.t[0]:g} to {self.t[-1]:g} s, {rate}, "
             f"input [{self.input_unit}] {self.input_hold}, output [{', '.join(self.units.values())}]{extra})"
         )
-
-
-def _with_unit(channel) -> tuple[Any, str | None]:
-    """Return array and unit of a channel given as an array or as a pair of both."""
-    if isinstance(channel, tuple | list) and len(channel) == 2 and isinstance(channel[1], str):
-        return channel[0], channel[1]
-    return channel, None
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from ...checks import choice, shown
 from ...units import dimension, si_unit
@@ -68,6 +69,13 @@ def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tupl
             "State the unit as it was recorded, or another quantity."
         )
     return found, *si_unit(unit)
+
+
+def with_unit(channel) -> tuple[Any, str | None]:
+    """Return array and unit of a channel given as an array or as a pair of both."""
+    if isinstance(channel, tuple | list) and len(channel) == 2 and isinstance(channel[1], str):
+        return channel[0], channel[1]
+    return channel, None
 
 
 def leading(outputs: Mapping[str, object]) -> str:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..arguments import check_held_out
 from ..data.as_data import as_records, as_tables, distinguished, has_tables
 from ..data.imposed import imposes_motion
+from ..data.moving_base import moves_base, seen_from_base
 from .dataset import Dataset
 from .imposed import ImposedDataset
+from .moving_base import MovingBaseDataset
 from .over_time import TimeDataset
 from .tables import TableDataset
 
 
-def dataset_of(data, holdout=None, name: str = "data") -> Dataset:
+def dataset_of(model, data, holdout=None, name: str = "data") -> Dataset:
     """Return records over time, or tables N(A, omega), as what a model can be fitted to.
+
+    Of a base that moves and the mass on it, the record as it is seen from the base.
 
     Raises
     ------
@@ -22,11 +28,15 @@ def dataset_of(data, holdout=None, name: str = "data") -> Dataset:
         A record both fitted and held out.
     """
     of, kind = (as_tables, TableDataset) if has_tables(data) else (as_records, TimeDataset)
-    records = of(data, name)
-    validation = () if holdout is None else of(holdout, "holdout")
+    records: Any = of(data, name)
+    validation: Any = () if holdout is None else of(holdout, "holdout")
     check_held_out(records, validation)
     if kind is TableDataset:
         return kind(records, validation)
     named = distinguished((*records, *validation))
-    kind = ImposedDataset if any(map(imposes_motion, named)) else TimeDataset
+    kind = TimeDataset
+    if any(map(imposes_motion, named)):
+        kind = ImposedDataset
+    elif any(moves_base(model, r) for r in named):
+        kind, named = MovingBaseDataset, tuple(seen_from_base(model, r) for r in named)
     return kind(named[: len(records)], named[len(records) :])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import shown
+from ..arguments import free_parameters
 from ..estimation.own_values import OwnValue
 from ..residuals.comparison_base import ComparisonBase
 from ..results.experiment import Experiment
@@ -65,6 +66,10 @@ class Dataset(ABC):
 
     records: tuple
     validation: tuple
+
+    def free_parameters(self, block, free=None) -> tuple[str, ...]:
+        """Return the parameters that a fit to these data moves (see `arguments.free_parameters`)."""
+        return free_parameters(block, free)
 
     def check_segments(self, mode, window) -> None:
         """Check how records are to be cut; tables are not."""

@@ -11,6 +11,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -122,11 +123,14 @@ def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> Fi
     return restarted(found, data.fit, own(found), hopeless)
 
 
-def cross_started(tried: CandidateFit, best: CandidateFit, data: SegmentedData) -> CandidateFit | None:
+def cross_started(
+    tried: CandidateFit, best: CandidateFit, data: SegmentedData, like: Any = None
+) -> CandidateFit | None:
     """Fit a candidate again from where the best one ended, of which it may be a limit.
 
     Stiction is that of a narrow Stribeck bump. The cost of stick and slip is nonsmooth: of two fits of one
-    law each may end in its own minimum.
+    law each may end in its own minimum. `like`: the effect of the candidate such that it acts like the best
+    one's (see `like_another`); None: it cannot.
     """
     table, mine, its = tried.block.parameters, tried.block.newest, best.block.newest
     values = {}
@@ -135,7 +139,9 @@ def cross_started(tried: CandidateFit, best: CandidateFit, data: SegmentedData) 
         if name in table and table[name].unit == p.unit:
             values[name] = p.value
     frictions = {t.block.effects[-1].role for t in (tried, best)} == {"friction"}
-    if not frictions or not any(name.startswith(f"{mine}.") for name in values):
+    if like is not None:
+        values |= {f"{mine}.{k}": p.value for k, p in like.parameters.items()}
+    elif not frictions or not any(name.startswith(f"{mine}.") for name in values):
         return None
     block = tried.block.with_parameters(feasible(tried.block, values))
     near = data.fit(block, (), starts=best.train.starts, iterations=4)

@@ -24,6 +24,8 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import feasible
+from ..starting.like_another import like_another
+from ..starting.regression import motion_of
 from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .attempts import itself
 from .evidence import ranked, rounds
@@ -323,8 +325,15 @@ def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> Ca
 def _again(at: Standing, chosen, those) -> list[CandidateFit]:
     """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
     fine = at.data.fine
+    motion = motion_of(fine.train, fine.thin, at.base.block)
+
+    def begun_there(pair):
+        tried, best = pair
+        like = like_another(tried.block.effects[-1], best.block.effects[-1], motion.x, motion.v)
+        return cross_started(tried, best, fine, like)
+
     pairs = [(t, best) for best in those for t in chosen if t is not best]
-    begun = side_by_side(lambda pair: cross_started(pair[0], pair[1], fine), pairs)
+    begun = side_by_side(begun_there, pairs)
     judged, _ = ranked(at.base, [*chosen, *(t for t in begun if t is not None)])
     return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
 

@@ -27,9 +27,9 @@ class ImposedSearch(StructureSearch):
         """Whether disturbance forces make an error of the output that hides all else: none does here."""
         return False
 
-    def candidates(self, classes, executor=None, course=None):
-        """Return every effect that answers a motion with a force, fitted, that of most evidence first."""
-        return super().candidates([c for c in classes if without_answer([c]) is None], executor, course)
+    def applies(self, effect) -> bool:
+        """Whether an effect answers a motion with a force."""
+        return super().applies(effect) and without_answer([effect]) is None
 
     @property
     def measure(self) -> str:

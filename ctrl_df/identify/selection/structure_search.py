@@ -83,6 +83,10 @@ class StructureSearch(Search):
         """Whether a sensor told the place."""
         return all(POSITION in sensed(r).columns for r in self.at.data.train.records)
 
+    def applies(self, effect) -> bool:
+        """Whether an effect (a class) can show in these records: those of sensors are of the place."""
+        return self.placed or effect.role != "output"
+
     @property
     def measure(self) -> str:
         """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
@@ -92,8 +96,6 @@ class StructureSearch(Search):
 
     def candidates(self, classes, executor=None, course=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
-        if not self.placed:  # sensors' effects are of the place
-            classes = [c for c in classes if c.role != "output"]
         course = course or Course()
         at, found = self._look(classes, executor).of(self.at, partial(self._told, course), course.stage)
         return self.after(at=at, first_look=found), found
@@ -110,6 +112,7 @@ class StructureSearch(Search):
 
     def _look(self, classes, executor) -> FirstLook:
         nominal = {k: p.value for k, p in self.block.parameters.items()}
+        classes = [c for c in classes if self.applies(c)]
         return FirstLook(classes, self.free, nominal, self.disturbs, executor)
 
     def _told(self, course: Course, at: Standing, found) -> None:

@@ -25,15 +25,15 @@ def own_columns(block, u, x, v) -> Columns:
     """
     found = []
     plain = (dry_level(block), viscous_slope(block))
-    load = -sum((_force(e, x, v) for e in block.effects if _tells(e)), np.zeros(len(v)))
+    load = -sum((force_of(e, x, v) for e in block.effects if tells(e)), np.zeros(len(v)))
     chain = sorted((e for e in block.effects if e.role == "friction"), key=lambda e: e.rank)
     for key, effect in block.named_effects.items():
         name = f"{key}.{next(iter(effect.parameters), '')}"
         if name in plain:
             continue
         one = unit_of(effect) if effect.proportional else effect
-        if _tells(effect):
-            column = -_force(one, x, v)
+        if tells(effect):
+            column = -force_of(one, x, v)
         elif effect.role == "friction":
             before = chain[: chain.index(effect)]
             column = np.sign(v) * (_level([*before, one], u, x, v, load) - _level(before, u, x, v, load))
@@ -53,12 +53,12 @@ def allowed(block, columns: Columns, weights) -> dict[str, float]:
     return values
 
 
-def _tells(effect) -> bool:
+def tells(effect) -> bool:
     """Whether the force of an effect is a function of the motion alone."""
     return effect.role == "force" and effect.states == 0
 
 
-def _force(effect, x, v) -> np.ndarray:
+def force_of(effect, x, v) -> np.ndarray:
     """Return the force of an effect along +x, (n,)."""
     law, p, none = type(effect).law, effect.values, np.zeros(1)
     return np.array([law(0.0, *at, none, p, none) for at in zip(x.tolist(), v.tolist(), strict=True)])

@@ -57,3 +57,7 @@ two of a wave)."""
 GRID_RANGE, GRID_STEPS, GRID_CONTRAST = (0.3, 3.0), (10, 4000), 0.9
 """Steps of a sensor that rounds: about the one whose error is the one seen, by half a decade; how many are
 tried (and samples asked), at least and at most; contrast over the largest from which a grid stands out."""
+
+LIKE_LEFT, LIKE_SAMPLES = 0.1, 300
+"""Share of the power of one law's force that another may leave to begin a fit in its place: beyond, its error
+is no longer near the other's. Samples of a motion that tell it: more than enough for a few parameters."""

@@ -1,0 +1,97 @@
+"""Records of a base that moves and of the mass on it: the same, as it is seen from the base.
+
+There the mass is at rest but for the force of inertia: ``m z'' + f(z, z') = -m a``, z its motion relative to
+the base and a the acceleration of the base. All else is as for a force that is applied.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from ...blocks.mechanism import Mechanism
+from ...checks import shown
+from ...units import dimension
+from . import derivatives
+from .measurement import Measurement
+from .quantities import quantity_of
+
+_DERIVATIVES = ("position", "velocity", "acceleration")  # each of the one before
+
+
+def moves_base(model, record) -> bool:
+    """Return whether a record holds the motion of a base as input and that of the mass on it as output."""
+    outputs = getattr(record, "units", None)
+    if not isinstance(model, Mechanism) or not outputs:
+        return False
+    return quantity_of(record.input_unit) in _DERIVATIVES and all(q in _DERIVATIVES for q in outputs)
+
+
+def seen_from_base(model, record: Measurement) -> Measurement:
+    """Return a record with the force of inertia as input, and outputs relative to the base.
+
+    The force is that on the mass of the model as it is: a record of motion tells forces per mass only.
+
+    Raises
+    ------
+    ValueError
+        A model of two bodies or without a mass, units of another kind of motion than the model's, an output
+        that the motion of the base does not tell.
+    """
+    mass, moves = _inertia(model), model.coordinates
+    given = _DERIVATIVES.index(quantity_of(record.input_unit))
+    turns = dimension(record.input_unit).get("rad", 0) == 1
+    if turns != (moves.unit == "rad"):
+        raise ValueError(
+            f"this model moves in {moves.unit}; the base of {record.name!r} moves in {record.input_unit}. "
+            "Take Inertia for a base that turns, Mass for one that does not, or state input_unit=."
+        )
+    cutoff = derivatives.automatic_cutoff(*_regular(record.t, record.u)) if given < 2 else 0.0
+    path = None
+    if cutoff:
+        # of the fifth degree: central differences would err by (w dt)^2 / 6
+        path = make_interp_spline(record.t, derivatives.derivative(record.t, record.u, 0, cutoff), k=5)
+
+    def base(order) -> np.ndarray:
+        """Return the motion of the base: its position (0), velocity (1) or acceleration (2)."""
+        return record.u if path is None or order == given else path.derivative(order - given)(record.t)
+
+    outputs = {q: _relative(record, q, given, y, base) for q, y in record.outputs.items()}  # type: ignore[union-attr]
+    velocity = record.velocity
+    if velocity is not None and given < 2:
+        velocity = velocity - base(1)
+    how = f", its motion low-passed at {cutoff:.3g} Hz" if given < 2 else ""
+    seen = record.replaced(
+        u=-mass * base(2), input="force", input_unit=moves.force_unit, input_hold="linear", outputs=outputs,
+        velocity=velocity, name=f"{record.name}, seen from its base{how}",
+    )  # fmt: skip
+    # low-passed, the motion is not known at the very ends
+    ends = 1 / cutoff if cutoff else 0.0
+    return seen.slice(record.t[0] + ends, record.t[-1] - ends)
+
+
+def _inertia(model) -> float:
+    if len(model.core.masses) != 1 or not model.core.masses[0] > 0:
+        raise ValueError(
+            f"on a base that moves a model needs one body with a mass; got {shown(model)}. Give a Mass or an "
+            "Inertia without backlash and compliance, or record the force."
+        )
+    return model.core.masses[0]
+
+
+def _relative(record, quantity, given, y, base) -> np.ndarray:
+    order = _DERIVATIVES.index(quantity)
+    if given == 2:
+        return y  # an accelerometer knows no place: the other sensor sits on the base
+    if order < given:
+        raise ValueError(
+            f"the {_DERIVATIVES[given]} of a base does not tell its {quantity}, nor the {quantity} of "
+            f"{record.name!r} relative to it. Record the {quantity} of the base, or its acceleration and the "
+            f"{quantity} relative to it."
+        )
+    return y - base(order)
+
+
+def _regular(t, u):
+    dt, _, values = derivatives.uniform(t, u)
+    return values, dt

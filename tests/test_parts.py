@@ -1,0 +1,95 @@
+"""A run that has breaks, as several records."""
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+
+T = np.arange(0.0, 8.0, 0.004)
+U = 9 * np.sin(2 * np.pi * 0.5 * T) + 5 * np.sin(2 * np.pi * 1.7 * T)
+TRUE = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.QuadraticDrag(8.0))
+NOMINAL = cdf.friction_mass(2.0, 2.5, 5.0)
+
+
+@pytest.fixture(scope="module")
+def x():
+    clean = np.asarray(cdf.event_response(TRUE, T, U, input_hold="zoh").outputs)[0]
+    return clean + 2e-5 * np.random.default_rng(2).standard_normal(T.size)
+
+
+def lengths(*args, **keywords):
+    return [len(part) for part in cdf.Measurement.in_parts(*args, **keywords)]
+
+
+def test_a_run_without_a_break_is_one_record(x):
+    (part,) = cdf.Measurement.in_parts(T, U, x, name="run")
+    whole = cdf.Measurement(T, U, x)
+    assert part.name == "run [1]" and np.array_equal(part.y, whole.y) and np.array_equal(part.u, whole.u)
+
+
+def test_breaks_of_every_kind(x):
+    with pytest.warns(UserWarning, match="run': 55 of 2000 samples are left out"):
+        y, u = x.copy(), U.copy()
+        y[300:320], u[700:735] = np.nan, np.nan
+        assert lengths(T, u, y, name="run") == [300, 380, 1265]
+    kept = np.r_[0:500, 600:2000]  # a recorder that paused
+    assert lengths(T[kept], U[kept], x[kept]) == [500, 1400]
+    reset = x + 0.4 * (T > 3.0)  # an encoder that was reset
+    assert lengths(T, U, reset) == [751, 1249]
+    with pytest.warns(UserWarning, match="1 of 2000"):
+        assert lengths(T, U, np.ma.masked_where(T == T[900], x)) == [900, 1099]
+    twice = np.r_[T[:1000], T[:1000]]  # two runs in one file
+    assert lengths(twice, U, x) == [1000, 1000]
+    with pytest.warns(UserWarning, match="11 of 2000"):  # 9 samples between two that are missing
+        y = x.copy()
+        y[[400, 410]] = np.nan
+        assert lengths(T, U, y) == [400, 1589]
+    with pytest.warns(UserWarning, match="2 of 2000"):
+        y = x.astype(object)
+        y[[400, 1000]] = None
+        assert lengths(T, U, y, velocity=U) == [400, 599, 999]
+
+
+def test_channels_and_units_go_with_their_part(x):
+    speed = np.gradient(x, T)
+    speed[800] = np.nan
+    with pytest.warns(UserWarning, match="1 of 2000"):
+        first, second = cdf.Measurement.in_parts(
+            1e3 * T,
+            U,
+            time_unit="ms",
+            outputs={"x": (1e3 * x, "mm"), "v": speed},
+            channels={"temperature": (T, "s")},
+        )
+    assert (len(first), len(second)) == (800, 1199)
+    assert second.t[0] == pytest.approx(T[801])
+    assert np.allclose(second.outputs["position"], x[801:]) and np.allclose(
+        second.channels["temperature"], T[801:]
+    )
+
+
+def test_parts_are_fitted_and_diagnosed_together(x):
+    y = x.copy()
+    y[np.r_[400:405, 1100:1130, 1500]] = np.nan
+    with pytest.warns(UserWarning, match="36 of 2000"):
+        parts = cdf.Measurement.in_parts(T, U, y)
+    assert len(parts) == 4
+    fit = cdf.refit(TRUE.with_parameters({"quadratic_drag.coefficient": 5.0}), parts)
+    assert fit.parameters["quadratic_drag.coefficient"].value == pytest.approx(8.0, rel=0.02)
+    found = cdf.diagnose(
+        NOMINAL, parts, candidates=["quadratic_drag", "linear_spring", "stribeck", "constant_force"]
+    )
+    assert (found.verdict, found.best.id) == ("effect", "quadratic_drag")
+
+
+def test_what_cannot_be_used_is_refused(x):
+    with pytest.raises(ValueError, match="needs a part without a break of 10 samples or more"):
+        cdf.Measurement.in_parts(T, U, np.full(T.size, np.nan))
+    with pytest.raises(ValueError, match="arrays of equal length"):
+        cdf.Measurement.in_parts(T, U[1:], x)
+    with pytest.raises(TypeError, match="colour"):
+        cdf.Measurement.in_parts(T, U, x, colour=3)
+    with pytest.raises(ValueError, match="in_parts"):
+        cdf.Measurement(T, U, np.where(T > 3, np.nan, x))
+    with pytest.raises(ValueError, match="in_parts"):
+        cdf.Measurement(T, U, x + 0.4 * (T > 3.0))
