@@ -166,4 +166,8 @@ def doubts(found: FitResult) -> tuple[str, ...]:
         )
     for k in sorted(blurred(found) - named, key=found.names.index):
         lines.append(f"{k} is less certain than it is large: these data do not determine it.")
+    for k, values in found.own.items():
+        open_ = [record for record, own in values.items() if not own.determined]
+        if open_ and k not in named | blurred(found):
+            lines.append(f"{k} is not determined by {' and '.join(open_)}.")
     return tuple(lines)
