@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .column import Column
+from .per_record import PerRecord
 
 CHECK_VALUE = "Check the value and its unit (SI)."
 _SHOWN = 60  # characters of a value that an error repeats
@@ -57,7 +58,7 @@ def number(
 ) -> float:
     """Return one real number within its bounds; `lower` itself is excluded if `strict`.
 
-    A `Column` (one number for each of many runs) is one as well, and stays what it is.
+    A `Column` (one number for each of many runs) is one as well, and a `PerRecord`; both stay what they are.
     """
     if not is_number(value):
         kind = f"one real number [{unit}]" if unit else "one real number"
@@ -74,7 +75,7 @@ def number(
 
 
 def _as_float(value) -> Any:
-    if isinstance(value, Column):
+    if isinstance(value, Column | PerRecord):
         return value
     try:
         return float(value)

@@ -27,7 +27,7 @@ import numpy as np
 
 import ctrl_df as cdf
 
-t = np.arange(0, 8, 0.008)
+t = np.arange(0, 8, 0.016)
 waves = [(9, 0.31), (8, 0.73), (6, 1.27), (5, 2.11)]  # N, Hz
 force = sum(a * np.sin(2 * np.pi * f * t + k) for k, (a, f) in enumerate(waves))
 machine = cdf.friction_mass(2.2, 3.0, 6.0).with_effect(cdf.CubicSpring(60.0))

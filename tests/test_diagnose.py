@@ -10,7 +10,7 @@ import ctrl_df as cdf
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
-from ctrl_df.identify.prediction.simulator import feasible
+from ctrl_df.identify.prediction.values import feasible
 from ctrl_df.identify.residuals.missing_forces import missing_forces
 from ctrl_df.identify.shooting.noise_model import prediction_error_filter
 from ctrl_df.identify.shooting.variables import default_free

@@ -80,14 +80,14 @@ def test_sigma_points_are_a_standard_deviation_off():
     jacobian = np.random.default_rng(3).normal(size=(200, 3)) * (1.0, 20.0, 3.0)
     curvature = jacobian.T @ jacobian
     found = sigma_points(variables, theta, np.zeros(3), curvature, 0.01)
-    steps = np.array([[v.q(p[v.name]) for v in variables] for p in found]) - theta
+    steps = np.array(found) - theta
     assert len(found) == 6
     assert np.einsum("ij,jk,ik->i", steps, curvature / 0.01, steps) == pytest.approx(1, rel=1e-9)
     assert steps[::2] == pytest.approx(-steps[1::2])
     assert steps.T @ steps / 2 == pytest.approx(np.linalg.inv(curvature / 0.01), rel=1e-9)
     # what data do not determine, and nothing else is known of, moves by a factor of e at most
     loose = sigma_points(variables, theta, np.zeros(3), 0 * curvature, 0.01)
-    assert max(p["mass"] for p in loose) == pytest.approx(2.0 * np.e)
+    assert max(variables[0].p(q[0]) for q in loose) == pytest.approx(2.0 * np.e)
 
 
 def test_a_fit_has_the_sigma_points_of_its_covariance(fitted):

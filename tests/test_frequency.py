@@ -17,7 +17,8 @@ from ctrl_df.identify.tables.compare import FrequencyComparison, scatter
 TRUE = dict(MOTOR=9.0, COULOMB=5.0, VISCOUS=20.0)
 A = np.geomspace(9.0, 60.0, 5)
 OMEGA = np.geomspace(2.0, 40.0, 6)
-SMALL = (tuple(np.geomspace(9.0, 60.0, 4)), tuple(np.geomspace(2.0, 40.0, 4)))
+MIDDLE = (tuple(np.geomspace(9.0, 60.0, 4)), tuple(np.geomspace(2.0, 40.0, 5)))
+SMALL = (tuple(np.geomspace(9.0, 60.0, 3)), tuple(np.geomspace(2.0, 40.0, 4)))
 FEW = ("quadratic_drag", "linear_spring", "input_delay", "sensor_delay", "stribeck")
 
 
@@ -113,7 +114,9 @@ def test_what_leaves_no_trace_is_named():
 )
 def test_a_hidden_effect_is_named_from_its_print(name, added, rivals):
     known = []
-    found = diagnose(user_block(), table(**added), candidates=(name, *rivals), callback=known.append)
+    found = diagnose(
+        user_block(), table(grid=MIDDLE, **added), candidates=(name, *rivals), callback=known.append
+    )
     assert known and {d.status for d in known} == {"under way"} and found.status == "complete"
     assert found.verdict == "effect", found.explanation
     assert found.best.determined and found.best.error_by_horizon is None
@@ -152,7 +155,7 @@ def test_standing_still_is_told_by_zeros():
 
 
 def test_a_gap_is_named_although_one_point_is_of_another_motion():
-    grid = SMALL[0], tuple(OMEGA)
+    grid = MIDDLE[0], tuple(OMEGA)
     data = table(grid=grid, JOINT=physics.IMPACT, LOAD=4.0, GAP=2e-3, RESTITUTION=0.3)
     N = np.array(data.N)
     N[2, 4] *= 1.8 - 0.9j
@@ -177,9 +180,10 @@ def test_outside_the_candidates_is_unknown():
 
 
 def test_a_table_held_out():
-    found = diagnose(user_block(), table(DRAG=60.0), holdout=table(DRAG=60.0, seed=9), candidates=FEW[:2])
+    data, held = (table(grid=MIDDLE, DRAG=60.0, seed=seed) for seed in (0, 9))
+    found = diagnose(user_block(), data, holdout=held, candidates=FEW[:2])
     assert found.best.id == "quadratic_drag"
-    assert found.holdout[0] is table(DRAG=60.0, seed=9)
+    assert found.holdout[0] is held
     drawn = found.plot()
     assert drawn.axes.size == 3 and "quadratic drag" in drawn.axes.flat[2].get_title()
     plt.close(drawn.figure)

@@ -109,7 +109,7 @@ def test_a_saturation_cycles_above_the_critical_gain():
 )
 def test_elements_have_maps_as_well(element, plant, checks):
     found = cdf.limit_cycle_map(
-        element, kp=(0.5, 12), ki=(0.0, 0.5), plant=plant, tf=0.01, n=6, exact_check=checks
+        element, kp=(0.5, 12), ki=(0.0, 0.5), plant=plant, tf=0.05, n=6, exact_check=checks
     )
     assert found.verdict.shape == (6, 6) and not (found.verdict == "undecided").any()
     assert len(found.checks) == checks

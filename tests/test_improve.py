@@ -19,7 +19,7 @@ FEW = ("constant_force", "linear_spring", "input_delay")
 
 @pytest.fixture(scope="module")
 def study():
-    rig = rigs.draw(("linear_spring", "input_delay"), 21, snr_db=60, n=2500)
+    rig = rigs.draw(("linear_spring", "input_delay"), 21, snr_db=60, n=1500)
     return rig, improve(
         rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), candidates=FEW
     )
@@ -40,7 +40,7 @@ def test_both_effects_are_found(study):
 def test_an_effect_that_stood_in_for_two_gives_way():
     rig = rigs.draw(("coulomb", "quadratic_drag"), 1002, excitation="multisine", snr_db=60)
     free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
-    train, held = (record[0].measurement().slice(0, 5).decimate(4) for record in (rig.train, rig.holdout))
+    train, held = (record[0].measurement().slice(0, 4).decimate(5) for record in (rig.train, rig.holdout))
     found = improve(
         rig.baseline, train, held, free=free,
         candidates=("coulomb", "stribeck", "quadratic_drag"), max_effects=3,

@@ -65,7 +65,7 @@ cdf.event_response(user, [0, 1], 0, [1, 0])
 cdf.find_limit_cycle(L)
 answers = {}
 for name in CASES:
-    for delay in (0.15, 0.4):
+    for delay in (0.15, 0.3):
         sent = time.time() + delay
         child = subprocess.Popen(["/bin/sh", "-c", f"sleep {delay}; kill -INT {os.getpid()}"])
         outcome = "returned"

@@ -38,7 +38,7 @@ def pictures(record):
     seen = cdf.compare(base, record)
     fitted = cdf.refit(base, record).comparison
     names = ["constant_force", "quadratic_drag"]
-    study = cdf.improve(base, record, candidates=names)
+    study = cdf.improve(base, record, candidates=names, max_effects=1)
     A, w = np.geomspace(6, 50, 4), np.geomspace(3, 20, 4)
     N = cdf.describing_function_family(axis.with_effect(cdf.QuadraticDrag(30.0)), A, w).N
     table = cdf.FrequencyMeasurement(A, w, N)

@@ -16,6 +16,7 @@ from ctrl_df.model_file import EXAMPLE
 from ctrl_df.simulate.compiler import compiled
 
 PACKAGE = Path(ctrl_df.__file__).parent
+STICTION = "[effects.stiction]\nlevel = 5.75\n"  # what slides on for long is simulated for long
 NOWHERE = "/dev/null/nowhere"  # not even root can make it
 FRICTION = "import ctrl_df as cdf; print(cdf.describing_function(cdf.friction_mass(9, 5, .5), 10., 5.))"
 COUNTED = FRICTION + (
@@ -155,7 +156,7 @@ def test_damaged_machine_code_is_compiled_anew(tmp_path):
 
 def test_the_command_line_works_in_a_read_only_installation(tmp_path, request, capsys):
     model = tmp_path / "model.toml"
-    model.write_text(EXAMPLE)
+    model.write_text(EXAMPLE + STICTION)
     assert cli.main(["limit-cycles", str(model)]) == 0  # whatever it needs is compiled now
     here = capsys.readouterr().out
     done = run(request.getfixturevalue("warm"), "-m", "ctrl_df", "limit-cycles", str(model), locked=True)

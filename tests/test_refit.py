@@ -10,7 +10,7 @@ from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.pid import pid
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.estimation.fit import fit_records
-from ctrl_df.identify.prediction.simulator import feasible
+from ctrl_df.identify.prediction.values import feasible
 from ctrl_df.identify.refit import refit
 from ctrl_df.simulate.loop import closed_loop
 

@@ -125,7 +125,7 @@ def test_a_folder_that_is_not_there(study, tmp_path):
 
 
 def test_a_report_of_tables(tmp_path):
-    A, omega = np.geomspace(9, 60, 4), np.geomspace(2, 40, 5)
+    A, omega = np.geomspace(9, 60, 4), np.geomspace(2, 40, 3)
     true = cdf.friction_mass(mass=9, coulomb=5, viscous=20).with_effect(cdf.LinearSpring(150.0))
     N = cdf.describing_function(true, A[:, None], omega[None])
     rng = np.random.default_rng(2)

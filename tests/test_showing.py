@@ -13,11 +13,14 @@ import ctrl_df as cdf
 from ctrl_df.table import WIDEST, Table, frame, without_empty
 
 GAINS, DRIVE = cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5)
+STICKING = cdf.friction_mass(9, 5, 0.5, static=5.75)  # comes to its orbit soonest
 
 
 @pytest.fixture(scope="module")
 def response():
-    return cdf.describing_function_response(GAINS, DRIVE, np.linspace(5.2, 100, 20), np.linspace(4, 40, 30))
+    return cdf.describing_function_response(
+        GAINS, STICKING, np.linspace(5.8, 100, 20), np.linspace(4, 40, 30)
+    )
 
 
 @pytest.fixture(scope="module")

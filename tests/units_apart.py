@@ -28,7 +28,11 @@ NEARLY, OF_AN_ERROR, OPEN = 1.0, 0.1, 0.005
 a static level, which samples leave open (a stiction: 0.35 %, by which the evidence moves 0.05)."""
 
 SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow
-LENGTHS = {"hard_stop": 5000, "backlash": 1600, "sensor_offset": 2000}  # samples until they have been met
+LENGTHS = {
+    "hard_stop": 5000,
+    "sensor_offset": 2000,
+    **dict.fromkeys(("backlash", "compliance", "hysteresis", "sensor_quantization", "stiction"), 1200),
+}  # samples until they have been met, or are told well enough; 800 else
 
 PULLED = {"loose_linkage": cdf.LooseLinkage(5e4, 0.004), "maxwell_slip": cdf.MaxwellSlip(1e5, 30.0)}
 """Dampers on a test machine that imposes the motion."""
@@ -60,7 +64,7 @@ def rig_of(hidden):
             *records,
             ["coulomb.level", "viscous.coefficient"],
         )
-    seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 1200)
+    seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 800)
     rig = rigs.draw(hidden, seed, excitation="multisine", snr_db=60, n=n)
     free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
     return rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free

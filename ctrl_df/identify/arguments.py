@@ -23,15 +23,28 @@ MODES = ("auto", "free", "windows")
 
 def free_parameters(block, free=None) -> tuple[str, ...]:
     """Return the parameters that a fit moves: those named, all of an effect named by its id, or the usual."""
-    if free is None:
-        return default_free(block)
+    return default_free(block) if free is None else _parameters(block, "free", free)
+
+
+def own_parameters(block, own) -> tuple[str, ...]:
+    """Return the parameters that every record has for itself, named as `free` names them."""
+    return () if own is None else _parameters(block, "own", own)
+
+
+def with_those(free, own) -> tuple[str, ...]:
+    """Return all parameters that a fit moves: shared ones, and those that every record has for itself."""
+    return tuple(dict.fromkeys((*free, *own)))
+
+
+def _parameters(block, argument, given) -> tuple[str, ...]:
     table, chosen = block.parameters, []
-    for name in names("a fit", "free", free):
+    for name in names("a fit", argument, given):
         group = [k for k in table if k.startswith(f"{name}.")] if name not in table else [name]
         group = [k for k in group if table[k].free or k == name]
         if not group:
             raise ValueError(
-                f"free needs names out of {', '.join(table)}, or ids of the model's effects; got {name!r}."
+                f"{argument} needs names out of {', '.join(table)}, or ids of the model's effects; got "
+                f"{name!r}."
             )
         chosen += [k for k in group if k not in chosen]
     return tuple(chosen)

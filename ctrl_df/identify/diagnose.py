@@ -6,7 +6,14 @@ from operator import attrgetter
 
 from ..checks import executor as checked_executor
 from ..checks import unknown_keywords
-from .arguments import check_limits, check_quantities, effect_classes, mechanism_of
+from .arguments import (
+    check_limits,
+    check_quantities,
+    effect_classes,
+    mechanism_of,
+    own_parameters,
+    with_those,
+)
 from .course import Course
 from .datasets.choice import dataset_of
 from .results.diagnosis import Diagnosis
@@ -22,6 +29,7 @@ def diagnose(
     holdout=None,
     candidates=None,
     free=None,
+    own=None,
     executor=None,
     limits=None,
     progress=None,
@@ -49,6 +57,9 @@ def diagnose(
     free : sequence of str or None
         Parameters of the model that may be refitted, by name or by effect id, as for `refit`; None: all that
         are free.
+    own : sequence of str or None
+        Parameters of the model that every record has for itself, as for `refit`: they are estimated anew on
+        records held out.
     executor : concurrent.futures.Executor or None
         Runs candidates side by side; None: threads of this process do.
     limits : mapping or None
@@ -95,7 +106,9 @@ def diagnose(
     dataset = dataset_of(model, data, holdout)
     block = mechanism_of(model)
     check_quantities(block, (*dataset.records, *dataset.validation))
-    names = dataset.free_parameters(block, free)
+    own = own_parameters(block, own)
+    names = with_those(dataset.free_parameters(block, free), own)
+    block = dataset.with_own(block, own)
 
     def work():
         course.stage("the model refitted")

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from ..checks import count, unknown_keywords
 from ..checks import executor as checked_executor
-from .arguments import check_quantities, effect_classes, mechanism_of
+from .arguments import (
+    check_quantities,
+    effect_classes,
+    mechanism_of,
+    own_parameters,
+    with_those,
+)
 from .course import Course
 from .datasets.choice import dataset_of
 from .ladder.climb import Climb
@@ -21,6 +27,7 @@ def improve(
     *,
     candidates=None,
     free=None,
+    own=None,
     executor=None,
     progress=None,
     callback=None,
@@ -43,7 +50,7 @@ def improve(
         Records to confirm on; None: every third part of the training records, or point of the tables.
     max_effects : int
         Longest ladder, >= 0.
-    candidates, free, executor, progress
+    candidates, free, own, executor, progress
         As for `diagnose`.
     callback : callable or None
         Takes the `Study` as it stands, first within seconds. What it raises ends the ladder.
@@ -80,7 +87,9 @@ def improve(
     dataset = dataset_of(model, train, holdout, "train")
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
-    kept = frozenset(start.parameters) - set(dataset.free_parameters(start, free))
+    own = own_parameters(start, own)
+    kept = frozenset(start.parameters) - set(with_those(dataset.free_parameters(start, free), own))
+    start = dataset.with_own(start, own)
 
     def free_of(block) -> list[str]:
         return [k for k in dataset.free_parameters(block) if k not in kept]

@@ -6,9 +6,18 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from ..checks import unknown_keywords
-from .arguments import check_fit, check_quantities, parametric
+from .arguments import (
+    check_fit,
+    check_quantities,
+    own_parameters,
+    parametric,
+    with_those,
+)
 from .datasets.choice import dataset_of
+from .prediction.values import in_record, with_block
 from .results.fit import Fit, FittedParameter
 
 __all__ = ["Fit", "FittedParameter", "refit"]
@@ -19,6 +28,7 @@ def refit(
     data,
     free=None,
     *,
+    own=None,
     start: Mapping[str, float] | None = None,
     mode: str = "auto",
     window: float | None = None,
@@ -38,10 +48,15 @@ def refit(
     model : block or loop
         Its parameters are the start values; 30 % off will do.
     data : Measurement, FrequencyMeasurement or sequence of them
-        Records, or tables, that share the parameters.
+        Records, or tables, that share the parameters; records of one name are numbered.
     free : sequence of str or None
         Parameters to move, by name or by effect id; None: every parameter that is meant to be fitted
         (``parameter.free``).
+    own : sequence of str or None
+        Parameters that every one of several records has for itself (an offset, friction at another
+        temperature), by name or by effect id; they are moved, also where `free` does not name them. Those
+        that say so themselves (``parameter.per_record``: a ripple's phase), and those that the model has
+        from such a fit, always are.
     start : mapping or None
         Start values other than the model's; the short windows are then left out.
     mode, window
@@ -60,7 +75,7 @@ def refit(
     Raises
     ------
     ValueError
-        An unknown parameter name, a record that cannot be simulated.
+        An unknown parameter name, a record that cannot be simulated, `own` with tables.
     TypeError
         A model that is no block, unknown keywords.
 
@@ -84,21 +99,41 @@ def refit(
     check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)
     block: Any = parametric(dataset.block_of(model))
-    names = dataset.free_parameters(block, free)
+    own = own_parameters(block, own)
+    names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
     found = dataset.fit(
-        model, names, start, whole=free is None, mode=mode, window=window, robust=robust, budget=budget
+        dataset.with_own(model, own),
+        names,
+        start,
+        whole=free is None,
+        mode=mode,
+        window=window,
+        robust=robust,
+        budget=budget,
     )
     table = found.block.parameters
-    before = {k: float(p.value) for k, p in block.parameters.items()} | dict(start or {})
+    before = {k: p.value for k, p in block.parameters.items()} | dict(start or {})
     parameters = {
         k: FittedParameter(
             k, table[k].value, found.errors[k], table[k].unit, float(before[k]), at_bound,
             k not in found.blurred,
         )
-        for k, at_bound in zip(names, found.at_bound, strict=True)
+        for k, at_bound in zip(names, found.at_bound, strict=True) if k not in found.own
     }  # fmt: skip
+    by_record = {
+        k: MappingProxyType({
+            record: FittedParameter(
+                k, v.value, v.standard_error, table[k].unit, in_record(before[k], record), v.at_bound,
+                v.determined,
+            )
+            for record, v in values.items()
+        })
+        for k, values in found.own.items()
+    }  # fmt: skip
+    shared = [i for i, k in enumerate(names) if k in parameters]
     return Fit(
-        dataset.as_given(model, found.block), MappingProxyType(parameters), found.comparison,
-        found.covariance, found.doubts, found.converged, found.simulations,
+        with_block(model, found.block), MappingProxyType(parameters), found.comparison,
+        found.covariance[np.ix_(shared, shared)], found.doubts, found.converged, found.simulations,
+        MappingProxyType(by_record),
     )  # fmt: skip

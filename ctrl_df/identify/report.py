@@ -163,16 +163,22 @@ def _parameters(study, fit):
     rows = []
     for name, p in study.model.parameters.items():
         old = f"{before[name].value:.5g}" if name in before else "–"
-        known = fit.parameters.get(name) if fit else None
-        error, note = "–", ""
-        if known is not None:
-            error = f"± {known.standard_error:.2g}" if math.isfinite(known.standard_error) else "–"
-            note = " (at its bound)" if known.at_bound else "" if known.identifiable else " (not determined)"
-        rows.append(
-            [_words(name), old, f"{p.value:.5g}", error, p.unit.replace(" ", "\u00a0"), p.meaning + note]
-        )
+        unit = p.unit.replace(" ", "\u00a0")
+        error, note = _sureness(fit.parameters.get(name) if fit else None)
+        rows.append([_words(name), old, f"{p.value:.5g}", error, unit, p.meaning + note])
+        for record, own in (fit.own.get(name, {}) if fit else {}).items():
+            error, note = _sureness(own)
+            rows.append([f"\u2003in {record}", "", f"{own.value:.5g}", error, unit, note.strip()])
     head = ["Parameter", "Start", "Fitted", "Standard error", "Unit", "Meaning"]
     return _table(head, rows, numeric=(1, 2, 3))
+
+
+def _sureness(known) -> tuple[str, str]:
+    """Return the standard error of a fitted parameter, and what else is to be said of it."""
+    if known is None:
+        return "–", ""
+    error = f"± {known.standard_error:.2g}" if math.isfinite(known.standard_error) else "–"
+    return error, " (at its bound)" if known.at_bound else "" if known.identifiable else " (not determined)"
 
 
 def _words(name) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from .frequency_measurement import FrequencyMeasurement
@@ -40,3 +41,14 @@ def as_records(data, name: str = "data") -> tuple[Measurement, ...]:
             "arrays: ctrl_df.Measurement(t, u, y)."
         )
     return records
+
+
+def distinguished(records: tuple) -> tuple:
+    """Return records with names of their own: those of one name are numbered from 1."""
+    counts, seen, named = Counter(r.name for r in records), Counter(), []
+    for record in records:
+        if counts[record.name] > 1:
+            seen[record.name] += 1
+            record = record.replaced(name=f"{record.name} {seen[record.name]}")
+        named.append(record)
+    return tuple(named)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..arguments import check_held_out
-from ..data.as_data import as_records, as_tables, has_tables
+from ..data.as_data import as_records, as_tables, distinguished, has_tables
 from ..data.imposed import imposes_motion
 from ..data.moving_base import moves_base, seen_from_base
 from .dataset import Dataset
@@ -31,10 +31,12 @@ def dataset_of(model, data, holdout=None, name: str = "data") -> Dataset:
     records: Any = of(data, name)
     validation: Any = () if holdout is None else of(holdout, "holdout")
     check_held_out(records, validation)
-    every = (*records, *validation)
-    if kind is TimeDataset and any(imposes_motion(r) for r in every):
+    if kind is TableDataset:
+        return kind(records, validation)
+    named = distinguished((*records, *validation))
+    kind = TimeDataset
+    if any(map(imposes_motion, named)):
         kind = ImposedDataset
-    elif kind is TimeDataset and any(moves_base(model, r) for r in every):
-        kind = MovingBaseDataset
-        records, validation = (tuple(seen_from_base(model, r) for r in rs) for rs in (records, validation))
-    return kind(records, validation)
+    elif any(moves_base(model, r) for r in named):
+        kind, named = MovingBaseDataset, tuple(seen_from_base(model, r) for r in named)
+    return kind(named[: len(records)], named[len(records) :])

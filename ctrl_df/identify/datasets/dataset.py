@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from ...checks import shown
 from ..arguments import free_parameters
+from ..estimation.own_values import OwnValue
 from ..residuals.comparison_base import ComparisonBase
 from ..results.experiment import Experiment
 from ..selection.search import Search
@@ -36,6 +38,9 @@ class Estimate:
         The fitted model beside the data.
     converged : bool
     simulations : int
+    own : mapping of str to mapping of str to OwnValue
+        Of the parameters that every record has for itself: by name, then by record. What stands above is of
+        their mean.
     """
 
     block: Any
@@ -47,6 +52,7 @@ class Estimate:
     comparison: Any
     converged: bool
     simulations: int
+    own: Mapping[str, Mapping[str, OwnValue]] = field(default_factory=dict)
 
 
 class Dataset(ABC):
@@ -89,12 +95,11 @@ class Dataset(ABC):
     def plan(self, diagnosis, models: Sequence, names, **limits) -> Experiment:
         """Return the input that separates the models best."""
 
-    @staticmethod
-    def as_given(model, block):
-        """Return a fitted block as the model was given: within a loop of the same controller, or itself."""
-        parts = getattr(model, "parts", None)
-        if parts is None:
-            return block
-        from ...simulate.loop import closed_loop
-
-        return closed_loop(parts.controller, block, parts.dt)
+    def with_own(self, model, names):
+        """Return a model of which every record has these parameters for itself; tables share all of them."""
+        if names:
+            raise ValueError(
+                f"own needs records over time; got tables N(A, omega), and own={shown(list(names))}. Leave "
+                "own out, or refit the tables one after the other."
+            )
+        return model

@@ -23,6 +23,11 @@ class MovingBaseDataset(TimeDataset):
                 )
         return names
 
+    def with_own(self, model, names):
+        """Return the model marked so; the mass is no record's own either."""
+        self.free_parameters(self.block_of(model), names)
+        return super().with_own(model, names)
+
     def search(self, block, free):
         """Return the search among what acts between a base and a mass."""
         return MovingBaseSearch(block, self.records, self.validation, free)

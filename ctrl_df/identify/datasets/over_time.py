@@ -13,6 +13,7 @@ from ..prediction.prepared import REFERENCE
 from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
+from ..prediction.values import block_of, for_record, with_own
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
 from ..shooting.multiple_shooting import Stage
@@ -33,7 +34,11 @@ class TimeDataset(Dataset):
 
     def block_of(self, model):
         """Return the block itself, or that of a loop."""
-        return simulator_of(model, self.records[0]).block
+        return block_of(model)
+
+    def with_own(self, model, names):
+        """Return the model marked so; of one record alone it is as it was."""
+        return with_own(model, names) if len(self.records) + len(self.validation) > 1 else model
 
     def compare(self, model, mode, window):
         """Simulate the model over segments of the records, their initial states fitted."""
@@ -53,8 +58,14 @@ class TimeDataset(Dataset):
             beside = simulated[record.output]
             rows.append(
                 RecordComparison(
-                    record, beside, record.y - beside, w.edges, fitted, model, MappingProxyType(simulated)
-                )
+                    record,
+                    beside,
+                    record.y - beside,
+                    w.edges,
+                    fitted,
+                    for_record(model, record.name),
+                    MappingProxyType(simulated),
+                )  # fmt: skip
             )
         return Comparison(model, tuple(rows))
 
@@ -69,7 +80,7 @@ class TimeDataset(Dataset):
         comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
             self.block_of(found.model), found.standard_errors, found.at_bound, blurred(found), doubts(found),
-            found.covariance, comparison, found.converged, found.nfev,
+            found.covariance, comparison, found.converged, found.nfev, found.own,
         )  # fmt: skip
 
     def _tells_references(self) -> bool:

@@ -15,6 +15,7 @@ from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
+from ..prediction.values import block_of, with_values
 from ..shooting.multiple_shooting import Solution, Stage
 from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import Problem
@@ -22,6 +23,7 @@ from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import default_free, step_of_sensor
 from ..thresholds import NOTHING, RTOL
 from .covariance import covariance_of
+from .own_values import OwnValue, at_bounds, merged, own_values, strongest
 from .sensitivity import OutputSensitivity
 from .sigma_points import sigma_points
 from .thresholds import EFFORT_SHORT, RESTARTS_KEPT
@@ -35,8 +37,11 @@ class FitResult:
     ----------
     model : block
         With the parameters found.
-    names, values : tuple of str, (p,) array
-        The free parameters.
+    records : tuple of str
+        Names of the records.
+    names, values : tuple of str, tuple of float
+        The free parameters. Of those that every record has for itself (`PerRecord`) what follows is of their
+        mean over the records.
     covariance : (p, p) array
         Of `values`, for residuals of the colour seen.
     residual, simulated : list of (n,) array
@@ -60,6 +65,8 @@ class FitResult:
         Relative singular value and direction (in scaled parameters) the data do not determine.
     scale : (p,) array
         Natural scale of each parameter.
+    own : mapping of str to mapping of str to OwnValue
+        Of the parameters that every record has for itself: by name, then by record.
     starts : list of (nw, ns) array
         Initial states, as corrections (see `Simulator.run`).
     segments : list of Segments
@@ -71,8 +78,9 @@ class FitResult:
     """
 
     model: Any
+    records: tuple[str, ...]
     names: tuple[str, ...]
-    values: np.ndarray
+    values: tuple[float, ...]
     covariance: np.ndarray
     residual: list
     simulated: list
@@ -86,6 +94,7 @@ class FitResult:
     at_bound: tuple[bool, ...]
     null: list
     scale: np.ndarray
+    own: Mapping[str, Mapping[str, OwnValue]]
     starts: list
     segments: list
     linear: Callable[[], OutputSensitivity] | None = field(repr=False, default=None)
@@ -117,6 +126,15 @@ class FitResult:
     def simulated_pieces(self) -> list[np.ndarray]:
         """The simulated output, as `residual_pieces`."""
         return self._pieces(self.simulated)
+
+    @property
+    def squares(self) -> list[float]:
+        """Per record, the sum of squares of what the cost sees."""
+        seen = self.residual
+        if self.error_filter is not None:
+            filtered = self.error_filter.filtered
+            seen = [filtered(x, w.slices) for x, w in zip(self.residual, self.segments, strict=True)]
+        return [float(e @ e) for e in seen]
 
     @property
     def outputs(self) -> int:
@@ -159,7 +177,7 @@ class FitResult:
     @property
     def parameters(self) -> dict[str, float]:
         """Free parameters by name."""
-        return dict(zip(self.names, map(float, self.values), strict=True))
+        return dict(zip(self.names, self.values, strict=True))
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -234,9 +252,8 @@ def fit_records(
     """
     records = list(records)
     thin = thinnable(records, thin)
-    first = simulator_of(model, records[0])
-    model = first.with_values(dict(start)) if start else model
-    block = first.block if not start else simulator_of(model, records[0]).block
+    model = with_values(model, start)
+    first, block = simulator_of(model, records[0]), block_of(model)
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
     begun = {k: p.value for k, p in block.parameters.items()} if names else {}
@@ -372,22 +389,26 @@ def _with_slopes(stage: Stage, found: Solution, central: bool = False) -> Soluti
 def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     """Return the outcome of a fit; `errors`: with covariance, from the derivatives of its last step."""
     problem, theta, residual = stage.problem, found.theta, found.residual
-    values = problem.values(theta) or {}
+    values = problem.named(theta)
     covariance, null, linear = np.zeros((0, 0)), [], None
     if problem.names and found.slopes is not None:
-        parts = (*found.slopes, stage.segments, stage.precision(found.states), problem.error_filter)
-        linear = partial(OutputSensitivity, *parts)
+        by_parameter = [problem.in_columns(k, slopes) for k, slopes in enumerate(found.slopes[0])]
+        parts = (stage.segments, stage.precision(found.states), problem.error_filter)
+        linear = partial(OutputSensitivity, by_parameter, found.slopes[1], *parts)
         if errors:
             covariance, null = covariance_of(stage, found, linear())
             slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
             covariance = covariance * np.outer(slopes, slopes)
+    at_bound = at_bounds(problem, theta, _at_bound)
+    scale = np.array([max(v.scale, v.natural) for v in problem.variables])
     total, count = stage.power(residual)
     spread, _ = stage.power([w.centred(y) for w, y in zip(stage.segments, stage.measured, strict=True)])
     return FitResult(
-        model=problem.first.with_values(values),
+        model=with_values(problem.model, values),
+        records=tuple(r.name for r in problem.records),
         names=problem.names,
-        values=np.array([values[k] for k in problem.names]),
-        covariance=covariance,
+        values=tuple(values[k] for k in problem.names),
+        covariance=merged(problem, covariance),
         residual=residual,
         simulated=[m - e for m, e in zip(stage.measured, residual, strict=True)],
         count=count,
@@ -397,18 +418,26 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
         converged=found.converged,
-        at_bound=tuple(
-            bool(
-                v.clip(q + AT_BOUND) == q
-                or v.clip(q - AT_BOUND) == q
-                or abs(values[v.name] - v.p(q)) > ON_BOUND * v.scale
-            )
-            for v, q in zip(problem.variables, theta, strict=True)
-        ),
-        null=null,
-        scale=np.array([max(v.scale, v.natural) for v in problem.variables]),
+        at_bound=tuple(strongest(problem, at_bound)),
+        null=[(size, np.array(strongest(problem, direction))) for size, direction in null],
+        scale=np.array(strongest(problem, scale)),
+        own=own_values(problem, values, covariance, null, at_bound, scale),
         starts=found.states.values,
         segments=stage.segments,
         linear=linear,
-        about=partial(sigma_points, problem.variables, theta, problem.precision),
+        about=partial(_about, problem, theta),
+    )
+
+
+def _about(problem: Problem, theta, curvature, variance) -> list[dict[str, float]]:
+    """Return the values by name at the `sigma_points` about a fit."""
+    points = sigma_points(problem.variables, theta, problem.precision, curvature, variance)
+    return [problem.named(q) for q in points]
+
+
+def _at_bound(variable, q, value) -> bool:
+    return bool(
+        variable.clip(q + AT_BOUND) == q
+        or variable.clip(q - AT_BOUND) == q
+        or abs(value - variable.p(q)) > ON_BOUND * variable.scale
     )

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...simulate.crew import side_by_side
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..shooting.thresholds import BETTER
 from ..thresholds import HOPELESS, STILL_POSSIBLE
 from .common_friction import dry_level

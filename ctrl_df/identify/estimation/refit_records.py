@@ -12,13 +12,14 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ..data.derivatives import step_of
 from ..data.measurement import Measurement
-from ..prediction.segments import facts
-from ..prediction.simulators import simulator_of
+from ..prediction.segments import facts, make_segments
+from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SEGMENT_LEAST
 from ..shooting.variables import step_of_sensor
 from ..thresholds import PROCESS_NOISE, TAKES_PART
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
+from .per_record import begun_with_angles
 from .segmented import prepare
 from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS
 
@@ -45,8 +46,9 @@ def refit_records(
     settings: dict[str, Any] = dict(
         budget=budget, mode=mode, window=window, robust=robust, tolerance=tolerance, central=True, polish=6
     )
+    model = _with_angles(model, records, names)
     # short segments lead from far off; from nearby they may lead away, into another minimum
-    ways = [True, False] if start is None and _many_minima(model, records) else [start is None]
+    ways = [True, False] if start is None and _many_minima(model) else [start is None]
     fits = [fit_records(model, records, start, names, coarse=w, iterations=steps, **settings) for w in ways]
     found = min(fits, key=lambda f: f.rmse)
     shown = None
@@ -69,6 +71,16 @@ def refit_records(
     return found, seen
 
 
+def _with_angles(model, records: Sequence[Measurement], names):
+    """Return the model with the angles that every record has for itself, sought over half strokes."""
+    segments = [make_segments(r, max(0.5 * facts(r).swing, SEGMENT_LEAST * facts(r).dt)) for r in records]
+
+    def fit(trial, moved, starts, iterations) -> FitResult:
+        return fit_segments(trial, records, segments, moved, starts=starts, iterations=iterations)
+
+    return begun_with_angles(model, names, records, None, fit)[0]
+
+
 def _short_segment(model, records: Sequence[Measurement]) -> float | None:
     """Return the length [s] of `SegmentedData.short_segments` where disturbance forces prevail; or None.
 
@@ -88,9 +100,9 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
     return float(np.median(np.concatenate(spans)))
 
 
-def _many_minima(model, records) -> bool:
+def _many_minima(model) -> bool:
     """Whether the error of a model has many minima over its parameters."""
-    effects = getattr(simulator_of(model, records[0]).block, "effects", ())
+    effects = getattr(block_of(model), "effects", ())
     return any(e.nonsmooth or e.multimodal for e in effects)
 
 
@@ -109,14 +121,13 @@ class _Beside:
 
 def _with_step(found: FitResult, records, names, whole) -> FitResult:
     """Take the step of a rounding sensor from the records themselves: least squares cannot see it."""
-    first = simulator_of(found.model, records[0])
-    key = step_of_sensor(first.block)
+    key = step_of_sensor(block_of(found.model))
     if key is None or not (whole or key in names):
         return found
     steps = [step_of((r.outputs or {}).get("position", np.zeros(0))) for r in records]
     if min(steps) == 0:
         return found
-    return replace(found, model=first.with_values({key: float(np.median(steps))}))
+    return replace(found, model=with_values(found.model, {key: float(np.median(steps))}))
 
 
 def blurred(found: FitResult) -> set[str]:
@@ -155,4 +166,8 @@ def doubts(found: FitResult) -> tuple[str, ...]:
         )
     for k in sorted(blurred(found) - named, key=found.names.index):
         lines.append(f"{k} is less certain than it is large: these data do not determine it.")
+    for k, values in found.own.items():
+        open_ = [record for record, own in values.items() if not own.determined]
+        if open_ and k not in named | blurred(found):
+            lines.append(f"{k} is not determined by {' and '.join(open_)}.")
     return tuple(lines)

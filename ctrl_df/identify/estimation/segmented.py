@@ -16,14 +16,15 @@ from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
+from ..prediction.values import is_own
 from ..shooting.noise_model import NoiseModel, acceleration_filter
 from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import RecordScales
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
-from .angles_per_record import reestimated_per_record
 from .fit import FitResult, fit_segments
+from .per_record import reestimated
 from .starts import carried, same_begins
 from .thresholds import (
     BRIEF,
@@ -228,6 +229,11 @@ class SegmentedData:
         """Whether the block has hidden states that go on from segment to segment."""
         return any(self.simulator(block, r).continued for r in self.train.records)
 
+    def count(self, block, names) -> int:
+        """Return the number of values that a fit of these parameters finds."""
+        records = len(self.train.records)
+        return sum(records if is_own(block.parameters[k]) else 1 for k in names)
+
     def fit(
         self,
         block,
@@ -329,9 +335,7 @@ class SegmentedData:
         short = getattr(rough.level(SHORTEST), name)
         near = rough.states_of(model, view=short)
         if name == "validation" and view.records is not self.train.records:
-            near = reestimated_per_record(
-                near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i)
-            )
+            near = reestimated(near, lambda b, n, s, i: rough.fit(b, n, view=short, starts=s, iterations=i))
             model = near.model
         # single segments may have begun in a wrong minimum: each goes on by itself
         for data in (rough, self):

@@ -11,8 +11,8 @@ from ..shooting.variables import Variable
 
 def sigma_points(
     variables: Sequence[Variable], theta, precision, curvature, variance: float
-) -> list[dict[str, float]]:
-    """Return the values one standard deviation off an estimate, to both sides along every principal axis.
+) -> list[np.ndarray]:
+    """Return the points one standard deviation off an estimate, to both sides along every principal axis.
 
     Parameters
     ----------
@@ -29,8 +29,9 @@ def sigma_points(
 
     Returns
     -------
-    list of dict
-        2 p of them, within the bounds, and no farther than a factor of e, or (of what may be zero) its scale.
+    list of (p,) array
+        2 p of them, scaled, within the bounds, and no farther than a factor of e, or (of what may be zero)
+        its scale.
 
     References
     ----------
@@ -42,5 +43,5 @@ def sigma_points(
     for e, axis in zip(eigen, axes.T, strict=True):
         for sign in (-1, 1):
             step = sign * axis / np.sqrt(max(float(e), 1.0))
-            found.append({v.name: v.p(v.clip(q + d)) for v, q, d in zip(variables, theta, step, strict=True)})
+            found.append(np.array([v.clip(q + d) for v, q, d in zip(variables, theta, step, strict=True)]))
     return found

@@ -51,6 +51,9 @@ of it by chance (rigs with ripples)."""
 ANGLES = 6
 """Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
 
+EFFORT_OWN = 5
+"""Steps of a fit of what a record has for itself, all else being known."""
+
 # --- descents ---------------------------------------------------------------------------------------
 
 MOTOR_LEAST = 0.05

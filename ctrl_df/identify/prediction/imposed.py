@@ -14,6 +14,7 @@ from . import initial_states
 from .segments import Segments
 from .simulator import Simulator
 from .thresholds import HIDDEN_RTOL
+from .values import with_values
 
 
 class ImposedSimulator(Simulator):
@@ -75,7 +76,7 @@ class ImposedSimulator(Simulator):
         ]
 
     def _core(self, values) -> Core:
-        model: Any = self.with_values(values)
+        model: Any = with_values(self.model, values)
         return model.core
 
     def _begin(self, core, segments: Segments, start) -> np.ndarray:

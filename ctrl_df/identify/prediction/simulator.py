@@ -6,16 +6,13 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-import control as ct
 import numpy as np
 
-from ...blocks.core import is_kinetic, kinetic_level
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
 from ...simulate.crew import require_compiled
 from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped
-from ...simulate.loop import closed_loop
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..thresholds import RTOL
@@ -24,6 +21,7 @@ from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
 from .thresholds import RESTORING
+from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
@@ -38,7 +36,7 @@ class Simulator:
     ----------
     model : block or loop of `ctrl_df.closed_loop`
         A block is driven by the recorded input (the force). A loop runs on the reference: the channel
-        ``reference`` of the record, or its input where there is none.
+        ``reference`` of the record, or its input where there is none. It has this record's own values.
     record : Measurement
         The run.
     thin : int
@@ -67,16 +65,11 @@ class Simulator:
         force: np.ndarray | None = None,
         begins: str = initial_states.FREE,
     ):
+        model = for_record(model, record.name)
         self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
         self.input = np.asarray(record.u if force is None else force)
-        self.parts: Any = getattr(model, "parts", None)
-        self.closed = self.parts is not None
-        self.block = self.parts.block if self.closed else model
-        if not isinstance(self.block, ct.NonlinearIOSystem):
-            raise TypeError(
-                f"compare and refit need a block or a loop of closed_loop; got {type(model).__name__}. "
-                "Wrap a linear system with ct.nlsys, or build the block from ctrl_df.Mass and effects."
-            )
+        self.closed = getattr(model, "parts", None) is not None
+        self.block = block_of(model)
         self.mechanism = isinstance(self.block, Mechanism)
         self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
         self.facts, self.sensed = facts_of(self.block, record), sensed(record)
@@ -124,13 +117,6 @@ class Simulator:
         if not self.nuisances:
             return np.zeros((len(segments), 0))
         return initial_states.reach(self.nuisances, self.block.core, self.facts, segments)
-
-    def with_values(self, values: Mapping[str, float] | None):
-        """Return the model with these values; a static level below the kinetic one is raised to it."""
-        if not values:
-            return self.model
-        block = self.block.with_parameters(feasible(self.block, values))
-        return closed_loop(self.parts.controller, block, self.parts.dt) if self.closed else block
 
     def run(
         self,
@@ -381,7 +367,7 @@ class Simulator:
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]
-        model = self.with_values(values)
+        model: Any = with_values(self.model, values)
         if self.closed:
             part = of_loop(model, self.record, self.input, self.mechanism)
         elif self.mechanism:
@@ -445,22 +431,3 @@ def free_run(
     whole = Segments(np.array([0]), np.array([len(record)]), one, one, one, one, one)
     start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
     return simulator.run(whole, None, start, rounded=True)
-
-
-def feasible(block: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
-    """Return the values with static levels raised to the kinetic one where they fell below it."""
-    values = dict(values)
-    current = block.parameters
-    statics = [name for name, p in current.items() if p.threshold]
-    if statics:
-        kinetic = kinetic_level(
-            [
-                e.replace(**{n: values[f"{k}.{n}"] for n in e.parameters if f"{k}.{n}" in values})
-                for k, e in block.named_effects.items()
-                if is_kinetic(e)
-            ]
-        )
-        for name in statics:
-            if values.get(name, current[name].value) < kinetic:
-                values[name] = kinetic
-    return values

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ...checks import known_name
+from ..prediction.values import for_record
 from ..residuals.comparison_base import ComparisonBase
 
 
@@ -57,9 +59,11 @@ class Fit:
     Attributes
     ----------
     model : block or loop
-        The model given, with the parameters found.
+        The model given, with the parameters found. Of those that every record has for itself it shows the
+        mean (of angles its direction), and knows the values by the names of the records: `compare` takes each
+        record's own, and the mean for records of other names. See `model_of`.
     parameters : mapping of str to FittedParameter
-        Those that were free.
+        Those that were free and that all records share.
     comparison : ComparisonBase
         The refitted model beside the records.
     covariance : (p, p) array
@@ -70,6 +74,8 @@ class Fit:
         False: stopped at the bound on work.
     simulations : int
         How many were run.
+    own : mapping of str to mapping of str to FittedParameter
+        Those that every one of several records has for itself: by name, then by name of the record.
 
     Examples
     --------
@@ -90,6 +96,13 @@ class Fit:
     unidentifiable: tuple[str, ...]
     converged: bool
     simulations: int
+    own: Mapping[str, Mapping[str, FittedParameter]] = field(default_factory=dict)
+
+    def model_of(self, record) -> Any:
+        """Return the model with the values that it has in one record of this fit, or in that of a name."""
+        known = [r.record.name for r in self.comparison.records]
+        name = known_name("model_of", "record", getattr(record, "name", record), known)
+        return for_record(self.model, name)
 
     @property
     def nrmse(self) -> float:
@@ -112,6 +125,11 @@ class Fit:
     def report(self) -> str:
         """Return parameters, correlations, doubts and the comparison as text."""
         lines = [str(p) for p in self.parameters.values()]
+        for name, values in self.own.items():
+            lines += [
+                f"{name}, of each record:",
+                *(str(replace(p, name=f"  {r}")) for r, p in values.items()),
+            ]
         lines += [f"{a} and {b} are correlated: {r:+.3f}" for a, b, r in self.correlated()]
         lines += ["", *self.unidentifiable] if self.unidentifiable else []
         if not self.converged:

@@ -16,8 +16,9 @@ import numpy as np
 
 from ...simulate.crew import side_by_side
 from ..estimation.fit import FitResult
+from ..estimation.per_record import begun_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
 from ..starting.regression import Start
@@ -266,7 +267,7 @@ def _screened(begun, screen: Screen) -> list[CandidateFit]:
         block = extended(screen.block, best.effect)
         if block is None:
             continue
-        left, extra = math.sqrt(best.left), len(own_names(block))
+        left, extra = math.sqrt(best.left), screen.data.count(block, own_names(block))
         fit = replace(base, model=block, rmse=base.rmse * left, nrmse=base.nrmse * left, linear=None)
         evidence = -samples * math.log(left) - 0.5 * extra * math.log(samples)
         found.append(CandidateFit(best.effect.id, fit, extra=extra, evidence=evidence))
@@ -300,8 +301,15 @@ def _begin_joint(job) -> list[Attempt]:
         names = own_names(near.model)
         found.append(
             Attempt(
-                cls.id, near.model, (*free, *names), screen.data, *EFFORT_BENT, len(names), near.starts, near
-            )
+                cls.id,
+                near.model,
+                (*free, *names),
+                screen.data,
+                *EFFORT_BENT,
+                screen.data.count(near.model, names),
+                near.starts,
+                near,
+            )  # fmt: skip
         )
     return found
 
@@ -343,12 +351,19 @@ def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None
     bent = many and (start.effect.role in ("contact", "coupling") or start.effect.side == "load")
     begin = places.starts(block, start.values, many)
     effort = EFFORT_BENT if bent else EFFORT_TRIED
-    return Attempt(key, block, names, places.data(many), *effort, len(added), begin)
+    return Attempt(key, block, names, places.data(many), *effort, screen.data.count(block, added), begin)
 
 
 def _first(job) -> Attempt:
     """Take the first steps, fewer where all would not lead to an error below `hopeless` at their pace."""
     attempt, hopeless = job
+    data, block = attempt.data, attempt.block
+
+    def fit(model, names, starts, iterations) -> FitResult:
+        return data.fit(model, names, starts=starts, iterations=iterations)
+
+    block, starts = begun_with_angles(block, own_names(block), data.train.records, attempt.starts, fit)
+    attempt = replace(attempt, block=block, starts=starts)
     return _on(attempt, min(BEGUN, attempt.steps), hopeless)
 
 

@@ -23,7 +23,7 @@ from ..estimation.multistart import (
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
 from .attempts import itself
@@ -327,8 +327,9 @@ def _again(at: Standing, chosen, those) -> list[CandidateFit]:
     alike = alike_along(fine, at.base.block)
 
     def begun_there(pair):
-        fit = cross_started(*pair, fine, alike(*pair))
-        return fit and thresholds_refined(fine.validate(replace(pair[0], train=fit)), fine)
+        tried, best = pair
+        fit = cross_started(tried, best, fine, alike(tried, best))
+        return fit and thresholds_refined(fine.validate(replace(tried, train=fit)), fine)
 
     pairs = [(t, best) for best in those for t in chosen if t is not best]
     begun = side_by_side(begun_there, pairs)

@@ -86,7 +86,7 @@ class FirstLook:
         known = data.fit(model, names, iterations=4, followed=RESTARTS_KEPT)
         about = data.moved(at.base.train, 3)
         found = self._tried(at, data, about, self._short(at, data), reached=known.rmse)
-        more = len(names) - len(self.free)
+        more = data.count(model, names) - data.count(at.base.block, self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
     def _sampled(self, at: Standing, screened=None) -> tuple[FitResult, list[CandidateFit]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from .evidence import ranked

@@ -210,7 +210,7 @@ class StructureSearch(Search):
         """Return a block with these parameters fitted, and run over the segments held out."""
         found = self.at.data.fit(block, names, iterations=iterations, followed=RESTARTS_KEPT)
         return self.at.data.validate(
-            CandidateFit(block.newest if block.effects else "", found, extra=len(names))
+            CandidateFit(block.newest if block.effects else "", found, extra=self.at.data.count(block, names))
         )
 
     def ranked(self, base, judged):

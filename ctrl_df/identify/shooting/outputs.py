@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -84,8 +85,8 @@ class SegmentOutputs:
         """Return the outputs within the segments."""
         check()
         self.problem.nfev += 1
-        values = self.problem.values(theta)
-        return [s.run(w, values, a) for s, w, a in zip(self.simulators, self.segments, starts, strict=True)]
+        runs = zip(self.simulators, self.segments, starts, strict=True)
+        return [s.run(w, self.problem.values(theta, k), a) for k, (s, w, a) in enumerate(runs)]
 
     def residual(self, theta, starts) -> Signals:
         """Return measured minus simulated."""
@@ -93,9 +94,11 @@ class SegmentOutputs:
 
     def rounded(self, theta, starts) -> Signals:
         """Return the residual of what an encoder of the model rounds (fits leave it out: it has no slope)."""
-        values = self.problem.values(theta)
         runs = zip(self.simulators, self.segments, starts, self.measured, strict=True)
-        return [m - s.run(w, values, a, rounded=True) for s, w, a, m in runs]
+        return [
+            m - s.run(w, self.problem.values(theta, k), a, rounded=True)
+            for k, (s, w, a, m) in enumerate(runs)
+        ]
 
     def cost(self, residual, states: States, weights) -> float:
         """Return half the weighted sum of squares, initial states weighed by what is known of them."""
@@ -147,17 +150,21 @@ class SegmentOutputs:
     # --- how it changes -------------------------------------------------------------------------------
 
     def jacobian(self, theta, states: States, base, central=False) -> tuple[Signals, Signals]:
-        """Return per record (n, p) and (n, ns) derivatives of the output, scaled parameters."""
+        """Return per record (n, names) and (n, ns) derivatives of the output, scaled parameters.
+
+        What the records have for themselves moves in all of them at once.
+        """
         problem = self.problem
-        pairs = [self._ends(i, theta, central) for i in range(len(problem.variables))]
+        moves = [np.unique([of[j] for of in problem.of_record]) for j in range(len(problem.names))]
+        pairs = [self._ends(variables, theta, central) for variables in moves]
         thetas = [end for pair in pairs for end in pair if end is not None]
         moved: list[Signals] = [[] for _ in thetas]
         by_start = []
         for k, simulator in enumerate(self.simulators):
             begun = states.values[k]
-            asked = [(self.segments[k], problem.values(q), begun) for q in thetas]
+            asked = [(self.segments[k], problem.values(q, k), begun) for q in thetas]
             starts, widths = self._moved_starts(k, begun, self.segments[k], states.reach[k])
-            values = problem.values(theta)
+            values = problem.values(theta, k)
             asked += [(self.segments[k], values, start) for start in starts if start is not None]
             signals = simulator.run_all(asked)
             for found, y in zip(moved, signals, strict=False):
@@ -167,37 +174,43 @@ class SegmentOutputs:
         problem.nfev += len(thetas)
         columns: list[Signals] = [[] for _ in self.segments]
         ready = iter(moved)
-        for i, pair in enumerate(pairs):
+        for j, pair in enumerate(pairs):
             above, below = (base if end is None else next(ready) for end in pair)
-            width = float(pair[0][i] - (theta if pair[1] is None else pair[1])[i])
-            for k, column in enumerate(self._column(i, above, below, width)):
+            widths = pair[0] - (theta if pair[1] is None else pair[1])
+            for k, column in enumerate(self._columns(j, above, below, widths)):
                 columns[k].append(column)
         by_parameter = [
             np.array(c).T.reshape(len(m), -1) for c, m in zip(columns, self.measured, strict=True)
         ]
         return by_parameter, by_start
 
-    def _ends(self, i, theta, central):
-        """Return the parameters between which variable `i` is differenced; None for those there are."""
-        h, variable = self.problem.steps[i], self.problem.variables[i]
-        up = theta.copy()
-        up[i] = variable.clip(theta[i] + h)
-        if up[i] == theta[i]:
-            h = -h
-            up[i] = theta[i] + h
-        if not central:
-            return up, None
-        down = theta.copy()
-        down[i] = variable.clip(theta[i] - h)
-        return up, (None if down[i] == theta[i] else down)
+    def _ends(self, variables, theta, central):
+        """Return the parameters between which some variables are differenced; None for those there are."""
+        up, down = theta.copy(), theta.copy()
+        for i in variables:
+            h, variable = self.problem.steps[i], self.problem.variables[i]
+            up[i] = variable.clip(theta[i] + h)
+            if up[i] == theta[i]:
+                h = -h
+                up[i] = theta[i] + h
+            down[i] = variable.clip(theta[i] - h)
+        return up, (down if central and np.any(down != theta) else None)
 
-    def _column(self, i, moved, other, width) -> Signals:
-        """Return the derivatives by variable `i`, and choose its next step."""
-        variable, h = self.problem.variables[i], self.problem.steps[i]
-        change = math.sqrt(float(np.mean([np.mean((a - b) ** 2) for a, b in zip(moved, other, strict=True)])))
-        wanted = abs(h) * OUTPUT_MOVES * self.problem.noise / change if change > 0 else 10 * abs(h)
-        self.problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * abs(h)), NUDGE_MOST[variable.log])
-        return [(a - b) / width for a, b in zip(moved, other, strict=True)]
+    def _columns(self, j, moved, other, widths) -> Signals:
+        """Return the derivatives by parameter `j` in each record, and choose the next steps of its variables.
+
+        `widths`: by how much all variables were moved.
+        """
+        problem, power = self.problem, {}
+        which = [of[j] for of in problem.of_record]
+        for i, a, b in zip(which, moved, other, strict=True):
+            power.setdefault(i, []).append(np.mean((a - b) ** 2))
+        for i, squares in power.items():
+            change, h = math.sqrt(float(np.mean(squares))), abs(problem.steps[i])
+            wanted = h * OUTPUT_MOVES * problem.noise / change if change > 0 else 10 * h
+            most = NUDGE_MOST[problem.variables[i].log]
+            problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * h), most)
+        return [(a - b) / float(widths[i]) for i, a, b in zip(which, moved, other, strict=True)]
 
     def state_products(self, k, which, seen, starts, reach, residual) -> np.ndarray:
         """Return Z' Z, (nr, ns + 1, ns + 1), of some segments, Z = [derivatives by states, residual].
@@ -240,30 +253,32 @@ class SegmentOutputs:
 
     def normal(self, jp, js, residual, weights, states: States, damping=0.0):
         """Eliminate the initial states; return (H, g, back) with ``back(step)`` those of a step."""
-        p = len(self.problem.names)
+        p, n = len(self.problem.variables), len(self.problem.names)
         h, g, pieces = np.zeros((p, p)), np.zeros(p), []
         means, precision = self.means(), self.precision(states)
         for k, segments in enumerate(self.segments):
+            of: Any = self.problem.of_record[k]
+            here = np.ix_(of, of)
             if self.problem.error_filter is not None:
                 a, r = self.weighed(k, jp[k]), self.weighed(k, residual[k])
-                h += a.T @ a
-                g += a.T @ r
+                h[here] += a.T @ a
+                g[of] += a.T @ r
                 continue
             others = np.column_stack((jp[k], residual[k]))
             products, ns = products_of(js[k], others, weights[k], segments), js[k].shape[1]
-            h += products[:, ns:-1, ns:-1].sum(axis=0)
-            g += products[:, ns:-1, -1].sum(axis=0)
+            h[here] += products[:, ns:-1, ns:-1].sum(axis=0)
+            g[of] += products[:, ns:-1, -1].sum(axis=0)
             if ns:
                 solved = states_for(products, precision[k], damping, states.values[k] - means[k])
                 coupled = products[:, :ns, ns:-1]
-                h -= np.einsum("wsi,wsj->ij", coupled, solved[:, :, :p])
-                g -= np.einsum("wsi,ws->i", coupled, solved[:, :, p])
-                pieces.append((k, solved))
+                h[here] -= np.einsum("wsi,wsj->ij", coupled, solved[:, :, :n])
+                g[of] -= np.einsum("wsi,ws->i", coupled, solved[:, :, n])
+                pieces.append((k, of, solved))
 
         def back(step) -> States:
             moved = [a.copy() for a in states.values]
-            for k, solved in pieces:
-                there = states.values[k] + solved[:, :, p] - solved[:, :, :p] @ step
+            for k, of, solved in pieces:
+                there = states.values[k] + solved[:, :, n] - solved[:, :, :n] @ step[of]
                 moved[k] = self.within_reach(k, there, states.reach[k])
             return states.at(moved)
 

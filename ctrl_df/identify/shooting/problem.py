@@ -6,16 +6,20 @@ import math
 
 import numpy as np
 
+from ...per_record import PerRecord
 from ..prediction.initial_states import FREE
 from ..prediction.segments import facts_of
-from ..prediction.simulator import feasible
-from ..prediction.simulators import simulator_of
+from ..prediction.values import block_of, feasible, for_record, is_own, with_values
 from .thresholds import NUDGE_FIRST
 from .variables import beforehand, variables_of
 
 
 class Problem:
     """Records and free parameters of one fit, whatever segments it goes over (`multiple_shooting.Stage`).
+
+    A parameter is one variable, which all records share, or (`is_own`) as many as there are records, one for
+    each: `of_record[k]` tells which variables, (names,), the parameters are in record k, `first` which is the
+    first of each. Models carry values by record as `PerRecord`.
 
     `followed`: tries of where a segment begins that are followed to their end; with none the best is taken
     where it errs far less as it is. `nfev` counts simulations of all records, up to `budget`.
@@ -38,27 +42,56 @@ class Problem:
         self.error_filter, self.begins = error_filter, begins
         self.hopeless, self.outlook = hopeless
         self.followed = followed
-        self.first = simulator_of(model, records[0])
-        self.block = self.first.block
+        self.block = block_of(model)
+        self.blocks = [for_record(self.block, r.name) for r in self.records]
         self.known = [facts_of(self.block, r) for r in records]
-        self.variables = variables_of(self.block, names, self.records, self.known[0], limits)
+        self.own = frozenset(k for k in names if len(self.records) > 1 and is_own(self.block.parameters[k]))
+        self.variables = variables_of(self.block, names, self.records, self.known[0], limits, self.own)
+        copies = [len(self.records) if k in self.own else 1 for k in names]
+        self.first = np.cumsum([0, *copies])[:-1]
+        apart = np.array([k in self.own for k in names], bool)
+        self.of_record: list[np.ndarray] = [self.first + k * apart for k in range(len(self.records))]
         self.about, self.precision = beforehand(self.variables, about or {})
-        self.steps = np.full(len(names), NUDGE_FIRST)
+        self.steps = np.full(len(self.variables), NUDGE_FIRST)
         self.nfev = 0.0
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
 
     def start(self) -> np.ndarray:
         """Return the scaled parameters of the model as it is."""
-        return np.array([v.clip(v.q(self.block.parameters[v.name].value)) for v in self.variables])
+        return np.array([v.clip(v.q(v.begin)) for v in self.variables])
 
-    def values(self, theta):
-        """Return the parameters by name, static levels kept above the kinetic one."""
-        given = {v.name: v.p(q) for v, q in zip(self.variables, theta, strict=True)}
-        return feasible(self.block, given) if given else None
+    def values(self, theta, k):
+        """Return the parameters in record `k` by name, static levels kept above the kinetic one."""
+        given = {self.variables[i].name: self.variables[i].p(theta[i]) for i in self.of_record[k]}
+        return feasible(self.blocks[k], given) if given else None
+
+    def named(self, theta) -> dict[str, float]:
+        """Return the parameters by name, those that differ from record to record for each of them."""
+        tables = [self.values(theta, k) or {} for k in range(len(self.records))]
+        found: dict[str, float] = {}
+        for name in dict.fromkeys(name for table in tables for name in table):
+            known = [b.parameters[name].value for b in self.blocks]
+            each = [float(t[name] if name in t else v) for t, v in zip(tables, known, strict=True)]
+            if name not in self.own and min(each) == max(each):
+                found[name] = each[0]
+                continue
+            by_record = {r.name: value for r, value in zip(self.records, each, strict=True)}
+            found[name] = PerRecord.over(by_record, self.block.parameters[name].per_record)
+        return found
+
+    def model_at(self, theta):
+        """Return the model with these parameters."""
+        return with_values(self.model, self.named(theta))
+
+    def in_columns(self, k, slopes) -> np.ndarray:
+        """Return derivatives (n, names) of the output in record `k` as those by all variables, (n, p)."""
+        every = np.zeros((len(self.variables), len(slopes)))
+        every[self.of_record[k]] = slopes.T
+        return every.T
 
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
-        model = self.first.with_values(self.values(theta) or {})
+        model = self.model_at(theta)
         hopeless, records = (self.hopeless, self.outlook), self.records[which]
         return Problem(
             model, records, (), self.budget, None, self.error_filter, self.begins, hopeless,

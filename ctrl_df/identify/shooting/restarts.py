@@ -37,13 +37,14 @@ def restarted_segments(stage, found):
     States, bool
         These may be farther off in the segments tried.
     """
-    problem, better_found, values = stage.problem, False, stage.problem.values(found.theta)
+    problem, better_found = stage.problem, False
     all_starts = [a.copy() for a in found.states.values]
     all_reach = [p.copy() for p in found.states.reach]
     for k, simulator in enumerate(stage.simulators):
         if "v" not in simulator.nuisances or simulator.continued:
             continue
         column, segments, starts = simulator.nuisances.index("v"), stage.segments[k], all_starts[k]
+        values = problem.values(found.theta, k)
         rms = np.sqrt(segments.means(found.residual[k] ** 2))
         bad = (rms > OUTLYING_SEGMENT * np.quantile(rms, GOOD)) & (rms > OUTLYING_NOISE * problem.noise)
         if not bad.any():
@@ -111,7 +112,7 @@ def scanned_gap_states(stage, theta, states):
             continue
         at = simulator.nuisances.index("slack")
         segments, chosen = stage.segments[k], found[k].copy()
-        least, values, tries = np.full(len(segments), np.inf), problem.values(theta), _slacks(stage, k)
+        least, values, tries = np.full(len(segments), np.inf), problem.values(theta, k), _slacks(stage, k)
         trials = [found[k].copy() for _ in tries]
         for trial, slack in zip(trials, tries, strict=True):
             trial[:, at : at + 2] = slack

@@ -13,6 +13,7 @@ from ...blocks.primitives import Ramp
 from ...units import dimension, size
 from ..prediction.segments import Facts, facts
 from ..prediction.sensed import POSITION, sensed
+from ..prediction.values import in_record
 from .thresholds import LOG_MOST, NATURAL, OPEN_BOUND, SIZE_PRIOR
 
 
@@ -68,14 +69,17 @@ def step_of_sensor(block) -> str | None:
 
 
 class Variable:
-    """One parameter: physical value p, scaled value q; strictly positive ones on a logarithmic scale."""
+    """One parameter: physical value p, scaled value q; strictly positive ones on a logarithmic scale.
 
-    def __init__(self, name, parameter, natural, limits=None):
-        self.name = name
+    `begin`: where it begins; of a parameter that every record has for itself, in one of them.
+    """
+
+    def __init__(self, name, parameter, natural, limits=None, begin=None):
+        self.name, self.begin = name, parameter.value if begin is None else begin
         self.lower, self.upper = parameter.lower, parameter.upper
         # Bounded on both sides (a share, a restitution): linear. Strictly positive: logarithmic.
         self.log = parameter.strict and parameter.lower == 0 and math.isinf(parameter.upper)
-        self.scale = abs(parameter.value) if parameter.value != 0 else natural
+        self.scale = abs(self.begin) if self.begin != 0 else natural
         self.natural = natural
         if parameter.strict and not self.log:
             self.lower = parameter.lower + OPEN_BOUND
@@ -108,16 +112,21 @@ class Variable:
         return 1.0 if self.log else 1.0 * max(abs(q), 1.0)
 
 
-def variables_of(block, names, records, known: Facts, limits=None) -> list[Variable]:
+def variables_of(block, names, records, known: Facts, limits=None, own=frozenset()) -> list[Variable]:
     """Return the named parameters of a block as variables, with scales natural on these records.
 
-    `limits`, a mapping of names to (least, largest), narrows their ranges.
+    `limits`, a mapping of names to (least, largest), narrows their ranges. Those of `own` are as many
+    variables as there are records, one after the other.
     """
     if not names:
         return []
     table = block.parameters
     limits = limits or {}
-    found = [Variable(k, table[k], natural_scale(table[k].line_unit, known), limits.get(k)) for k in names]
+    found = [
+        Variable(k, table[k], natural_scale(table[k].line_unit, known), limits.get(k), begin)
+        for k in names
+        for begin in ([in_record(table[k].value, r.name) for r in records] if k in own else [table[k].value])
+    ]
     if isinstance(block, Mechanism):
         seen = seen_by(block, records, known)
         proved = {

@@ -6,10 +6,10 @@ equation of motion is integrated twice,
 
     y = x0 + v0 t + 1/m (u - friction + a sin kx + b cos kx), integrated twice,
 
-which is linear in all but k. Second differences take x0 and v0 out. What is left over has noise of two
-kinds, of the sensor and of forces; each frequency weighs by what is left at and around it (Whittle's
-likelihood), so that either may prevail. Then k is scanned, from the stroke down to what the smoothed
-position resolves.
+which is linear in all but k. Of several records each has a and b of its own. Second differences take x0 and
+v0 out. What is left over has noise of two kinds, of the sensor and of forces; each frequency weighs by what
+is left at and around it (Whittle's likelihood), so that either may prevail. Then k is scanned, from the
+stroke down to what the smoothed position resolves.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...per_record import PerRecord
 from ..prediction.segments import facts
 from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING
 from .thresholds import (
@@ -75,8 +76,8 @@ class RippleSpectrum:
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
         for k in known:
-            pair = self._response([np.exp(1j * k * x) for x in self.places])
-            base += [[np.real(p) for p in pair], [np.imag(p) for p in pair]]
+            pairs = self._apart(self._response([np.exp(1j * k * x) for x in self.places]))
+            base += [[part(p) for p in pair] for pair in pairs for part in (np.real, np.imag)]
         given = [_integral(_held(r), r.t) for r in records]
         self._base = [self._parts(given), *base]
         self._y = self._parts([facts(r).place for r in records])
@@ -111,13 +112,16 @@ class RippleSpectrum:
     def wave(self, k: float) -> Wave | None:
         """Return the ripple of wave number `k` [rad/m], fitted; None where the mass would be negative."""
         waves = [np.exp(1j * k * x) for x in self.places]
-        pair = self._response(waves)
+        pairs = self._apart(self._response(waves))
         # what a drive may have besides blurs the parameters of what it does have
         plain = self._base[: len(_PLAIN) + 1]
-        w = self._regressed([*plain, [np.imag(p) for p in pair], [np.real(p) for p in pair]])
+        columns = [[part(p) for p in pair] for pair in pairs for part in (np.imag, np.real)]
+        w = self._regressed([*plain, *columns])
         if w[0] <= 0:
             return None
-        mass, size, phase = 1 / w[0], math.hypot(w[-2], w[-1]), math.atan2(w[-1], w[-2])
+        mass, each = 1 / w[0], w[len(plain) :].reshape(-1, 2)
+        size = float(np.mean([math.hypot(*ab) for ab in each]))
+        phase = PerRecord.angles([r.name for r in self.records], [math.atan2(b, a) for a, b in each])
         return Wave(
             self._gain(waves),
             mass * size,
@@ -141,11 +145,11 @@ class RippleSpectrum:
 
     def _gain(self, waves) -> float:
         """Return what forces in phase and in quadrature with the waves explain together [nats]."""
-        pair = self._response(waves)
-        columns = [self._white([np.real(p) for p in pair]), self._white([np.imag(p) for p in pair])]
+        pairs = self._apart(self._response(waves))
+        columns = [self._white([part(p) for p in pair]) for pair in pairs for part in (np.real, np.imag)]
         a = self._without(np.array(columns).T).T
         g, h = a @ self._left, a @ a.T
-        h[np.diag_indices(2)] += DEPENDENT * np.trace(h) + NOTHING
+        h[np.diag_indices(len(h))] += DEPENDENT * np.trace(h) + NOTHING
         share = float(g @ np.linalg.solve(h, g)) / self._power
         return -0.5 * len(self._left) * math.log(max(1 - share, NEARLY_NOTHING))
 
@@ -162,6 +166,14 @@ class RippleSpectrum:
         return self._parts(
             [_integral(_integral(f, r.t), r.t) for f, r in zip(forces, self.records, strict=True)]
         )
+
+    def _apart(self, parts) -> list[list[np.ndarray]]:
+        """Return parts of all records as those of each, and nothing in the others."""
+        of = [k for k, runs in enumerate(self._runs) for _ in runs]
+        return [
+            [p if k == i else np.zeros_like(p) for i, p in zip(of, parts, strict=True)]
+            for k in range(len(self.records))
+        ]
 
     def _parts(self, signals) -> list[np.ndarray]:
         """Return second differences of means over samples, one array for each part without holes."""

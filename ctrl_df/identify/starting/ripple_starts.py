@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from ...per_record import PerRecord
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import RippleSpectrum, Wave
@@ -40,19 +41,29 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
 def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, float] | None:
     """Return what a wave of this length leaves of the residual (its square), its amplitude and phase.
 
-    None where it cannot be simulated.
+    Of several records each has a phase of its own where the effect says so. None where it cannot be
+    simulated.
     """
     size, pair = WAVE_TRIED * screen.scales.force, []
     for phase in (0.0, math.pi / 2):
-        block = extended(screen.block, make(size, wavelength, phase))
+        effect = make(size, wavelength, phase)
+        block = extended(screen.block, effect)
         change = None if block is None else screen.change(block)
         if change is None:
             return None
-        pair.append(screen.project(change))
-    matrix = np.array(pair).T
+        apart = any(p.per_record for p in effect.parameters.values())
+        pair.append([screen.project(c) for c in (_apart(change) if apart else [change])])
+    matrix = np.array([column for columns in zip(*pair, strict=True) for column in columns]).T
     w, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
     left = float(np.sum((screen.residual - matrix @ w) ** 2))
-    return left, size * float(np.hypot(*w)), math.atan2(w[1], w[0])
+    each = w.reshape(-1, 2)
+    phase = PerRecord.angles([r.name for r in screen.view.records], [math.atan2(b, a) for a, b in each])
+    return left, size * float(np.mean(np.hypot(*each.T))), phase
+
+
+def _apart(change) -> list[list[np.ndarray]]:
+    """Return a change in all records as those in each, and none in the others."""
+    return [[c if k == i else np.zeros_like(c) for i, c in enumerate(change)] for k in range(len(change))]
 
 
 def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..shooting.scales import Scales
 from ..shooting.variables import Variable
 from .errors import rms

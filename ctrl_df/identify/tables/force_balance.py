@@ -14,7 +14,7 @@ import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
-from ..prediction.simulator import feasible
+from ..prediction.values import feasible
 from ..shooting.scales import Scales
 from ..thresholds import NEARLY_NOTHING
 from .points import Points

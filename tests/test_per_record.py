@@ -1,0 +1,213 @@
+"""Parameters that every one of several records has for itself: refitted, judged, estimated anew elsewhere."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import ctrl_df as cdf
+from ctrl_df.identify.prediction.segments import make_segments
+from ctrl_df.identify.prediction.values import for_record, with_own
+from ctrl_df.identify.shooting.multiple_shooting import Stage
+from ctrl_df.identify.shooting.problem import Problem
+from ctrl_df.per_record import PerRecord
+
+START = cdf.friction_mass(2.0, 2.5, 5.0).with_effect(cdf.ConstantForce(0.0))
+OWN = {"viscous.coefficient": (4.0, 6.0, 9.0), "constant_force.force": (0.5, -1.0, 1.5)}
+NAMES = ("cold", "usual", "warm")
+
+
+def recorded(machines, noise=1e-4, seconds=4.0, names=NAMES):
+    """Return a record of each machine, under forces of its own."""
+    rng, t, records = np.random.default_rng(8), np.arange(0, seconds, 0.01), []
+    for i, (machine, name) in enumerate(zip(machines, names, strict=False)):
+        force = 9 * np.sin(3 * t + i) + 5 * np.sin(8 * t + 2 * i)
+        x = np.asarray(cdf.event_response(machine, t, force, input_hold="zoh").outputs)[0]
+        records.append(cdf.Measurement(t, force, x + noise * rng.standard_normal(t.size), name=name))
+    return records
+
+
+def machines(*effects):
+    """Return three machines that differ in what `OWN` names."""
+    rows = zip(*OWN.values(), strict=True)
+    made = [cdf.friction_mass(2.2, 3.0, b).with_effect(cdf.ConstantForce(f)) for b, f in rows]
+    for effect in effects:
+        made = [m.with_effect(effect) for m in made]
+    return made
+
+
+@pytest.fixture(scope="module")
+def records():
+    return recorded(machines())
+
+
+@pytest.fixture(scope="module")
+def fit(records):
+    return cdf.refit(START, records, own=["viscous", "constant_force"])
+
+
+# --- refit ----------------------------------------------------------------------------------------
+
+
+def test_refit_finds_shared_and_own_values(fit):
+    assert set(fit.parameters) == {"mass", "coulomb.level"} and fit.covariance.shape == (2, 2)
+    pulls = [(fit.parameters[k].value - v) / fit.parameters[k].standard_error for k, v in SHARED.items()]
+    for name, truth in OWN.items():
+        assert tuple(fit.own[name]) == NAMES
+        found = fit.own[name].values()
+        pulls += [(p.value - v) / p.standard_error for p, v in zip(found, truth, strict=True)]
+        assert all(p.identifiable and not p.at_bound and p.name == name for p in found)
+        assert all(p.standard_error < 5e-3 for p in found)  # 1e-3 at most
+    assert np.max(np.abs(pulls)) < 3.5  # eight values
+    assert fit.comparison.white
+
+
+SHARED = {"mass": 2.2, "coulomb.level": 3.0}
+
+
+def test_the_comparison_takes_each_records_own_values(fit, records):
+    assert cdf.compare(fit.model, records).nrmse == pytest.approx(fit.nrmse, rel=1e-3)
+    for r in records:
+        assert cdf.compare(fit.model_of(r), r).nrmse == pytest.approx(cdf.compare(fit.model, r).nrmse)
+    # a record of another name: the mean of all
+    other = cdf.compare(fit.model, records[0].replaced(name="another")).nrmse
+    assert other > 20 * cdf.compare(fit.model, records[0]).nrmse
+
+
+def test_the_model_shows_the_mean_and_knows_the_records(fit):
+    name = "viscous.coefficient"
+    values = [p.value for p in fit.own[name].values()]
+    assert fit.model.parameters[name].value == pytest.approx(np.mean(values))
+    for record, value in zip(NAMES, values, strict=True):
+        assert fit.model_of(record).parameters[name].value == value
+    with pytest.raises(ValueError, match=r"model_of needs record out of cold, usual, warm; got 'hot'"):
+        fit.model_of("hot")
+    one = fit.model.with_parameters({name: 5.0})  # shared again
+    assert for_record(one, "cold").parameters[name].value == 5.0
+
+
+def test_the_table_has_them(fit):
+    lines = str(fit).split("\n")
+    at = lines.index("viscous.coefficient, of each record:")
+    assert [line.split()[0] for line in lines[at + 1 : at + 4]] == list(NAMES)
+    assert "±" in lines[at + 1] and "N s/m" in lines[at + 1]
+
+
+def test_derivatives_cost_no_more_than_of_shared_parameters(records):
+    names, stages = tuple(START.parameters), []
+    for model in (START, with_own(START, OWN)):
+        problem = Problem(model, records, names, 1000)
+        stage = Stage(problem, [make_segments(r, 1.0) for r in records], 1)
+        theta = problem.start()
+        base = stage.simulate(theta, stage.begun.values)
+        before = problem.nfev
+        slopes = stage.jacobian(theta, stage.begun, base)
+        stages.append((problem, stage, slopes, problem.nfev - before, base))
+    (_, _, shared, cost, _), (problem, stage, own, same, base) = stages
+    assert same == cost
+    assert len(problem.variables) == 2 + 2 * 3
+    for a, b in zip(shared[0], own[0], strict=True):  # at one point they are the same, record by record
+        np.testing.assert_array_equal(a, b)
+    residual = [m - y for m, y in zip(stage.measured, base, strict=True)]
+    h, g, back = stage.normal(*own, residual, [np.ones(len(r)) for r in residual], stage.begun)
+    apart = h[2:5, 2:5]  # of the viscous coefficients
+    np.testing.assert_array_equal(apart - np.diag(np.diag(apart)), 0)
+    assert np.all(np.diag(apart) > 0) and np.all(h[0, 2:5] != 0) and len(g) == 8
+    step = np.zeros(8)
+    step[2] = 1e-3  # in the first record alone states follow
+    moved = [np.any(a != b) for a, b in zip(back(step).values, back(0 * step).values, strict=True)]
+    assert moved == [True, False, False]
+
+
+def test_with_one_record_own_is_free(records):
+    own = cdf.refit(START, records[0], own=["viscous"])
+    free = cdf.refit(START, records[0])
+    assert own.parameters == free.parameters and not own.own
+    assert own.model == free.model
+
+
+def test_own_names_are_moved_whatever_is_free(records):
+    for free in (["viscous", "mass"], ["mass"]):
+        fit = cdf.refit(START, records[:2], free=free, own=["viscous"], mode="windows", window=0.5)
+        assert tuple(fit.parameters) == ("mass",) and tuple(fit.own) == ("viscous.coefficient",)
+        assert fit.model.parameters["coulomb.level"].value == 2.5
+
+
+def test_records_of_one_name_are_numbered(records):
+    same = [r.replaced(name="run") for r in records[:2]]
+    fit = cdf.refit(START, same, free=["mass"], own=["constant_force"], mode="windows", window=0.5)
+    assert list(fit.own["constant_force.force"]) == ["run 1", "run 2"]
+
+
+def test_a_static_level_stays_above_each_records_kinetic_one():
+    block = cdf.friction_mass(2.0, 3.0, 1.0, static=4.0)
+    block = block.with_parameters({"coulomb.level": PerRecord(3.5, {"dry": 5.0, "oiled": 2.0})})
+    assert for_record(block, "dry").parameters["stiction.level"].value == 5.0
+    assert for_record(block, "oiled").parameters["stiction.level"].value == 4.0
+
+
+def test_unknown_names_and_tables_are_refused(records):
+    with pytest.raises(ValueError, match=r"own needs names out of mass, .*; got 'viscus'"):
+        cdf.refit(START, records, own="viscus")
+    table = cdf.FrequencyMeasurement([9.0, 12.0], [5.0, 9.0], np.full((2, 2), -2e-3 - 1e-3j))
+    for ask in (cdf.refit, cdf.diagnose, cdf.improve):
+        with pytest.raises(ValueError, match=r"own needs records over time; got tables .* Leave own out"):
+            ask(cdf.friction_mass(2.0, 2.5, 5.0), table, own="viscous")
+
+
+# --- ripples --------------------------------------------------------------------------------------
+
+PHASES = (0.3, 2.5, -1.4)
+
+
+@pytest.fixture(scope="module")
+def rippled():
+    ripples = [cdf.PositionRipple(1.5, wavelength=0.12, phase=p) for p in PHASES]
+    return recorded([cdf.friction_mass(2.2, 3.0, 6.0).with_effect(r) for r in ripples], seconds=6.0)
+
+
+def test_phases_are_of_each_record(rippled):
+    fit = cdf.refit(cdf.friction_mass(2.0, 2.5, 5.0).with_effect(cdf.PositionRipple(1.2, 0.12)), rippled)
+    phases = fit.own["position_ripple.phase"]
+    for record, truth in zip(NAMES, PHASES, strict=True):
+        p = phases[record]
+        assert abs(p.value - truth) < 4 * p.standard_error < 0.03
+    assert fit.parameters["position_ripple.wavelength"].value == pytest.approx(0.12, rel=1e-3)
+
+
+def test_a_ripple_is_found_whatever_its_phases(rippled):
+    names = ["position_ripple", "constant_force"]
+    found = cdf.diagnose(cdf.friction_mass(2.0, 2.5, 5.0), rippled[:2], candidates=names)
+    assert found.verdict == "effect" and found.best.id == "position_ripple"
+    table = found.best.model.parameters
+    for record, truth in zip(NAMES[:2], PHASES[:2], strict=True):
+        assert table["position_ripple.phase"].value.of(record) == pytest.approx(truth, abs=0.03)
+
+
+# --- diagnose -------------------------------------------------------------------------------------
+
+
+def test_own_parameters_are_refitted_and_estimated_anew_on_records_held_out():
+    *train, last = recorded(machines(cdf.QuadraticDrag(4.0)))
+    names = ["quadratic_drag", "linear_spring"]
+    found = cdf.diagnose(START, train, holdout=last, candidates=names, own=["viscous", "constant_force"])
+    assert found.verdict == "effect" and found.best.id == "quadratic_drag"
+    assert found.best.parameters["coefficient"] == pytest.approx(4.0, rel=0.02)
+    assert found.best.nrmse_holdout < 2 * found.best.nrmse  # its viscous friction is another one
+    table = found.best.model.parameters
+    for name, truth in OWN.items():
+        assert [table[name].value.of(r) for r in NAMES[:2]] == pytest.approx(truth[:2], abs=0.05)
+
+
+# --- the number -----------------------------------------------------------------------------------
+
+
+def test_a_number_of_each_record_is_a_number():
+    value = PerRecord.over({"a": 1.0, "b": 3.0})
+    assert value == 2.0 and value.of("b") == 3.0 and value.of("c") == 2.0
+    assert value != PerRecord.over({"a": 2.0, "b": 2.0})
+    again = pickle.loads(pickle.dumps(value))
+    assert again == value and dict(again.values) == dict(value.values)
+    # angles are within half a turn, and their mean is a direction
+    turned = PerRecord.over({"a": np.pi - 0.1, "b": np.pi + 0.3}, angle=True)
+    assert turned.of("b") == pytest.approx(0.3 - np.pi) and turned == pytest.approx(0.1 - np.pi)
