@@ -78,14 +78,17 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     if data.disturbed:
         # the residual is of forces here, as the fits see it
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
-    found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
-    if found:
-        # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
-        _, explained = max(found, key=lambda f: f[0].evidence)
-        left = residual - explained
-        noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER)
+
+    def regressed(noise) -> list[tuple[MissingForce, np.ndarray]]:
         absorbed = sensitivity.absorbed(noise)
-        found = [_regressed(k, m, s, residual, noise, segments, units, absorbed) for k, m, s in tables]
+        return [_regressed(k, m, s, residual, noise, segments, units, absorbed) for k, m, s in tables]
+
+    found = regressed(noise)
+    telling, explained = max(found, key=lambda f: f[0].evidence, default=(None, residual))
+    if telling is not None and telling.evidence > 0:
+        # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
+        left = residual - explained
+        found = regressed(noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER))
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
         best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
@@ -93,17 +96,15 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
 
 
 def _regressed(
-    kind, matrix, spans, residual, noise, segments, units, absorbed=None
+    kind, matrix, spans, residual, noise, segments, units, absorbed
 ) -> tuple[MissingForce, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain.
 
-    `absorbed`: what refitting could do, whitened (see `OutputSensitivity.absorbed`); None: taken away as far
-    as plain squares see it.
+    `absorbed`: what refitting could do, as this noise whitens it (see `OutputSensitivity.absorbed`).
     """
     white, filtered = noise.filtered(residual, segments), noise.filtered(matrix, segments)
-    if absorbed is not None:
-        white = white - absorbed @ (absorbed.T @ white)
-        filtered = filtered - absorbed @ (absorbed.T @ filtered)
+    white = white - absorbed @ (absorbed.T @ white)
+    filtered = filtered - absorbed @ (absorbed.T @ filtered)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
     left = white - filtered @ weights
     # a frequency is found by looking at many
