@@ -126,7 +126,7 @@ def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> Fi
 
 def cross_started(
     tried: CandidateFit, best: CandidateFit, data: SegmentedData, like: Any = None
-) -> CandidateFit | None:
+) -> FitResult | None:
     """Fit a candidate again from where the best one ended, of which it may be a limit.
 
     Stiction is that of a narrow Stribeck bump. The cost of stick and slip is nonsmooth: of two fits of one
@@ -148,8 +148,7 @@ def cross_started(
     near = data.fit(block, (), starts=best.train.starts, iterations=4)
     if near.rmse > HOPELESS * best.train.rmse:
         return None
-    fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
-    return thresholds_refined(data.validate(replace(tried, train=fitted)), data)
+    return data.fit(block, tried.train.names, starts=near.starts, iterations=6)
 
 
 def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> CandidateFit:

@@ -63,6 +63,21 @@ class OutputSensitivity:
             found[where, w] = states[where] @ root[w]
         return found.reshape(len(states), -1)
 
+    def absorbed(self, noise) -> np.ndarray:
+        """Return an orthonormal basis (n, m) of what refitting could explain, as a noise model whitens it."""
+        columns = [np.concatenate(self.parameters)]
+        if self.error_filter is None:
+            ends = np.cumsum([0, *(len(s) for s in self.states)])
+            for k, (states, segments) in enumerate(zip(self.states, self.segments, strict=True)):
+                own = np.zeros((ends[-1], len(segments), states.shape[1]))
+                for w, where in enumerate(segments.places):
+                    own[ends[k] : ends[k + 1]][where, w] = states[where]
+                columns.append(own.reshape(ends[-1], -1))
+        stacked = noise.filtered(np.column_stack(columns), self.pieces)
+        norms = np.linalg.norm(stacked, axis=0)
+        q, r = np.linalg.qr(stacked[:, norms > 0] / norms[norms > 0])
+        return q[:, np.abs(np.diag(r)) > 1e-9]
+
     @property
     def pieces(self) -> list[slice]:
         """What `project` returns as evidence takes it: whole, or by segments where errors are of forces."""

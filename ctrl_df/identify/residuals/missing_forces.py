@@ -84,16 +84,26 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
         noise = noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER)
-        found = [_regressed(k, m, s, residual, noise, segments, units) for k, m, s in tables]
+        absorbed = sensitivity.absorbed(noise)
+        found = [_regressed(k, m, s, residual, noise, segments, units, absorbed) for k, m, s in tables]
     unit, best = tried.train.unit, {}
     for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
         best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
     return list(best.values())
 
 
-def _regressed(kind, matrix, spans, residual, noise, segments, units) -> tuple[MissingForce, np.ndarray]:
-    """Fit forces of one kind; return what they tell and the output they explain."""
+def _regressed(
+    kind, matrix, spans, residual, noise, segments, units, absorbed=None
+) -> tuple[MissingForce, np.ndarray]:
+    """Fit forces of one kind; return what they tell and the output they explain.
+
+    `absorbed`: what refitting could do, whitened (see `OutputSensitivity.absorbed`); None: taken away as far
+    as plain squares see it.
+    """
     white, filtered = noise.filtered(residual, segments), noise.filtered(matrix, segments)
+    if absorbed is not None:
+        white = white - absorbed @ (absorbed.T @ white)
+        filtered = filtered - absorbed @ (absorbed.T @ filtered)
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
     left = white - filtered @ weights
     # a frequency is found by looking at many
@@ -194,14 +204,20 @@ def _motion(record, segments, y):
     v = np.array(record.y, float) if moved else np.zeros(0)
     # the output is the model's own: what it errs by is no function of itself
     (load if known.imposed else v if moved else x)[segments.samples] = y
-    v = _smooth(v) if moved else np.gradient(_smooth(x), record.t)
-    a = np.gradient(_smooth(v), record.t)
-    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": load}
+    begins = segments.samples[[where.start for where in segments.slices]]
+    v = v if moved else _rate(x, record.t, begins)
+    return {"t": record.t - record.t[0], "x": x, "v": v, "a": _rate(v, record.t, begins), "u": load}
 
 
-def _smooth(x, reach=2):
-    kernel = np.ones(2 * reach + 1) / (2 * reach + 1)
-    return np.convolve(np.pad(x, reach, mode="edge"), kernel, mode="valid")
+def _rate(x, t, begins):
+    """Return backward differences, of segments that begin anew.
+
+    A force must not know what comes: under a controller that is made of the sensor's noise of now, and the
+    residual would be explained by itself.
+    """
+    rate = np.diff(x, prepend=x[0]) / np.diff(t, prepend=2 * t[0] - t[1])
+    rate[begins] = rate[begins + 1]
+    return rate
 
 
 def _grid(values, tail, count):

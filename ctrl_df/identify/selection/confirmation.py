@@ -24,9 +24,8 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import feasible
-from ..starting.like_another import like_another
-from ..starting.regression import motion_of
 from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
+from .alike import alike_along
 from .attempts import itself
 from .evidence import ranked, rounds
 from .standing import Standing
@@ -325,12 +324,12 @@ def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> Ca
 def _again(at: Standing, chosen, those) -> list[CandidateFit]:
     """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
     fine = at.data.fine
-    motion = motion_of(fine.train, fine.thin, at.base.block)
+    alike = alike_along(fine, at.base.block)
 
     def begun_there(pair):
         tried, best = pair
-        like = like_another(tried.block.effects[-1], best.block.effects[-1], motion.x, motion.v)
-        return cross_started(tried, best, fine, like)
+        fit = cross_started(tried, best, fine, alike(tried, best))
+        return fit and thresholds_refined(fine.validate(replace(tried, train=fit)), fine)
 
     pairs = [(t, best) for best in those for t in chosen if t is not best]
     begun = side_by_side(begun_there, pairs)

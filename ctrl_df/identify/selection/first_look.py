@@ -12,6 +12,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..starting.screen import Screen
 from ..thresholds import BY_CHANCE, GROWTH
+from .alike import begun_like_better
 from .attempts import tried
 from .evidence import ranked
 from .standing import Standing
@@ -107,7 +108,9 @@ class FirstLook:
 
         `about`: the model about which starts are sought; `short`, `screened`: see `tried`.
         """
-        return ranked(CandidateFit("", base), self._tried(at, data, about, short, screened))[0]
+        before = CandidateFit("", base)
+        found = ranked(before, self._tried(at, data, about, short, screened))[0]
+        return ranked(before, begun_like_better(found, data, about.model))[0]
 
     def _tried(
         self,

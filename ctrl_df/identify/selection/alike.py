@@ -1,0 +1,56 @@
+"""Candidates whose laws can do the same: one of two such fits may have missed what the other found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from ...simulate.crew import side_by_side
+from ..estimation.multistart import cross_started
+from ..estimation.segmented import CandidateFit, SegmentedData
+from ..shooting.thresholds import BETTER
+from ..starting.like_another import like_another
+from ..starting.regression import motion_of
+from .thresholds import CONFIRMED
+
+
+def alike_along(data: SegmentedData, block) -> Callable:
+    """Return ``alike(tried, other)``: the newest effect of a candidate such that it acts like another's.
+
+    `data`, `block`: the motion, and the model that is driven along it.
+    """
+    motion = motion_of(data.train, data.thin, block)
+    return lambda tried, other: like_another(
+        tried.block.effects[-1], other.block.effects[-1], motion.x, motion.v
+    )
+
+
+def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
+    """Begin candidates whose law can do what that of a better one does where that one ended.
+
+    A spring is a pendulum over a small angle.
+
+    Parameters
+    ----------
+    found : sequence of CandidateFit
+        Best first.
+    data : SegmentedData
+        That they are fitted to.
+    block : Mechanism
+        The model without them.
+
+    Returns
+    -------
+    list of CandidateFit
+        In the same order.
+    """
+    alike = alike_along(data, block)
+    pairs = [(t, best) for i, best in enumerate(found[:CONFIRMED]) for t in found[i + 1 :]]
+    likes = side_by_side(lambda pair: alike(*pair), pairs)
+    able = [(*pair, like) for pair, like in zip(pairs, likes, strict=True) if like is not None]
+    fits = side_by_side(lambda a: cross_started(a[0], a[1], data, a[2]), able)
+    nearest = {t.key: t for t in found}
+    for (tried, *_), fit in zip(able, fits, strict=True):
+        if fit is not None and fit.rmse < BETTER * nearest[tried.key].train.rmse:
+            nearest[tried.key] = replace(tried, train=fit)
+    return list(nearest.values())
