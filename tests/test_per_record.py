@@ -155,6 +155,24 @@ def test_unknown_names_and_tables_are_refused(records):
             ask(cdf.friction_mass(2.0, 2.5, 5.0), table, own="viscous")
 
 
+def test_loops_are_refitted_so_as_well():
+    controller, t, rng = cdf.pid(400.0, 200.0, 40.0), np.arange(0, 3, 0.01), np.random.default_rng(3)
+    records = []
+    for i, viscous in enumerate((4.0, 8.0)):
+        reference = 0.1 * np.sin(3 * t) + 0.05 * np.sin(7 * t + i)
+        loop = cdf.closed_loop(controller, cdf.friction_mass(2.2, 3.0, viscous))
+        x = np.asarray(cdf.event_response(loop, t, reference).outputs)[0]
+        noisy = x + 1e-5 * rng.standard_normal(t.size)
+        records.append(
+            cdf.Measurement(t, reference, noisy, name=f"loop {i}", input_unit="m", input_hold="linear")
+        )
+    loop = cdf.closed_loop(controller, cdf.friction_mass(2.0, 2.5, 5.0))
+    fit = cdf.refit(loop, records, own="viscous")
+    found = fit.own["viscous.coefficient"]
+    assert [found[r.name].value for r in records] == pytest.approx([4.0, 8.0], rel=0.03)
+    assert fit.model_of("loop 1").parts.block.parameters["viscous.coefficient"].value > 7
+
+
 # --- ripples --------------------------------------------------------------------------------------
 
 PHASES = (0.3, 2.5, -1.4)

@@ -34,9 +34,10 @@ from .thresholds import (
 
 
 def nonsmooth_names(found: FitResult) -> list[str]:
-    """Return the free parameters over which the cost has many minima."""
-    effects = found.model.named_effects
-    return [n for n in found.names if "." in n and effects[n.partition(".")[0]].nonsmooth]
+    """Return the free parameters over which the cost has many minima; of a loop none."""
+    effects = getattr(found.model, "named_effects", {})
+    nonsmooth = {key for key, effect in effects.items() if effect.nonsmooth}
+    return [n for n in found.names if n.partition(".")[0] in nonsmooth]
 
 
 def own(found: FitResult) -> list[str]:

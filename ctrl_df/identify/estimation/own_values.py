@@ -72,7 +72,5 @@ def merged(problem: Problem, covariance) -> np.ndarray:
 
 def strongest(problem: Problem, values) -> list:
     """Return of all variables of a name the value that is largest, either way."""
-    ends = [*problem.first[1:], len(values)]
-    return (
-        [max(values[i:j], key=abs) for i, j in zip(problem.first, ends, strict=True)] if len(values) else []
-    )
+    edges = [*problem.first, len(values)]
+    return [max(values[i:j], key=abs) for i, j in zip(edges[:-1], edges[1:], strict=True)]

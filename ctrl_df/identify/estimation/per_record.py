@@ -9,18 +9,12 @@ import math
 from collections.abc import Callable, Sequence
 
 from ...per_record import PerRecord
-from ..prediction.values import in_record, is_own, with_values
+from ..prediction.values import block_of, in_record, is_own, with_values
 from .fit import FitResult
 from .thresholds import ANGLE_WORTH, ANGLES, EFFORT_OWN
 
 Refit = Callable[..., FitResult]
 """``fit(model, names, starts, iterations)`` over the same segments of the same records."""
-
-
-def own_of(model, names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return which of the parameters every record has for itself: angles of its own, and others."""
-    own = {k: p for k, p in model.parameters.items() if k in names and is_own(p)}
-    return [k for k, p in own.items() if p.per_record], [k for k, p in own.items() if not p.per_record]
 
 
 def reestimated(near: FitResult, fit: Refit) -> FitResult:
@@ -34,13 +28,13 @@ def reestimated(near: FitResult, fit: Refit) -> FitResult:
         The model with its initial states fitted.
     fit : callable
     """
-    angles, others = own_of(near.model, tuple(near.model.parameters))
-    best = near
-    for name in angles:
+    own, best = {k: p for k, p in block_of(near.model).parameters.items() if is_own(p)}, near
+    for name in [k for k, p in own.items() if p.per_record]:
         found = turned(best, name, fit)
         found = fit(found.model, (name,), found.starts, EFFORT_OWN)
         if found.count * math.log(best.rmse / found.rmse) > ANGLE_WORTH:
             best = found
+    others = [k for k, p in own.items() if not p.per_record]
     if others:
         best = min(best, fit(best.model, tuple(others), best.starts, EFFORT_OWN), key=lambda f: f.rmse)
     return best
@@ -48,8 +42,8 @@ def reestimated(near: FitResult, fit: Refit) -> FitResult:
 
 def turned(near: FitResult, name: str, fit: Refit) -> FitResult:
     """Return a model with that angle, out of some all about the turn, with which each record errs least."""
-    table, records = near.model.parameters, near.records
-    tries, values = [near], [{r: in_record(table[name].value, r) for r in records}]
+    begin, records = block_of(near.model).parameters[name].value, near.records
+    tries, values = [near], [{r: in_record(begin, r) for r in records}]
     for i in range(1, ANGLES):
         values.append({r: v + 2 * math.pi * i / ANGLES for r, v in values[0].items()})
         tries.append(fit(_with_angles(near.model, name, values[-1]), (), near.starts, 1))
@@ -64,15 +58,22 @@ def _with_angles(model, name, values):
     return with_values(model, {name: PerRecord.angles([*values], [*values.values()])})
 
 
+def unknown_angles(model, names: Sequence[str], records: Sequence) -> list[str]:
+    """Return the angles among the parameters of which a model does not know what several records have."""
+    if len(records) < 2:
+        return []
+    table, records_named = block_of(model).parameters, {r.name for r in records}
+    angles = [k for k in names if table[k].per_record]
+    return [k for k in angles if not records_named <= getattr(table[k].value, "values", {}).keys()]
+
+
 def begun_with_angles(model, names: Sequence[str], records: Sequence, starts, fit: Refit):
     """Return where a fit to several records begins whose angles need not be alike: model, initial states.
 
     `names`: parameters fitted along, beside which angles show; `starts`: initial states or None.
     """
-    known = {r.name for r in records}
-    table, (angles, _) = model.parameters, own_of(model, names)
-    angles = [k for k in angles if not known <= getattr(table[k].value, "values", {}).keys()]
-    if not angles or len(records) < 2:
+    angles = unknown_angles(model, names, records)
+    if not angles:
         return model, starts
     near = fit(model, names, starts, EFFORT_OWN)
     for name in angles:

@@ -19,7 +19,7 @@ from ..shooting.variables import step_of_sensor
 from ..thresholds import PROCESS_NOISE, TAKES_PART
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
-from .per_record import begun_with_angles
+from .per_record import begun_with_angles, unknown_angles
 from .segmented import prepare
 from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS
 
@@ -73,6 +73,8 @@ def refit_records(
 
 def _with_angles(model, records: Sequence[Measurement], names):
     """Return the model with the angles that every record has for itself, sought over half strokes."""
+    if not unknown_angles(model, names, records):
+        return model
     segments = [make_segments(r, max(0.5 * facts(r).swing, SEGMENT_LEAST * facts(r).dt)) for r in records]
 
     def fit(trial, moved, starts, iterations) -> FitResult:
