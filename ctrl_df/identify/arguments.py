@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..blocks.effect import Effect, effect_class, effect_library
+from ..blocks.effect import Effect, effect_class, effect_library, stated_parameters
 from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
@@ -29,6 +29,31 @@ def free_parameters(block, free=None) -> tuple[str, ...]:
 def own_parameters(block, own) -> tuple[str, ...]:
     """Return the parameters that every record has for itself, named as `free` names them."""
     return () if own is None else _parameters(block, "own", own)
+
+
+def known_beforehand(block, prior) -> dict[str, tuple[float, float]]:
+    """Return value and standard deviation of parameters of a model, or of effects that it may be given."""
+    found = {}
+    for name, stated in ({} if prior is None else mapping("prior", "prior", prior, _PRIOR)).items():
+        effect = effect_library().get(str(name).partition(".")[0])
+        may_be = () if effect is None else [f"{effect.id}.{k}" for k, _ in stated_parameters(effect)]
+        if name not in block.parameters and name not in may_be:
+            raise ValueError(
+                f"prior needs names out of {', '.join(block.parameters)}, or of a parameter of an effect "
+                f"that may be added, such as 'stribeck.level'; got {shown(name)}."
+            )
+        pair = tuple(stated) if isinstance(stated, Sequence) and not isinstance(stated, str) else (stated,)
+        if len(pair) != 2:
+            raise ValueError(
+                f"prior needs a value and its standard deviation; got {shown(stated)} for {name}. Write "
+                f"prior={_PRIOR}."
+            )
+        value = number("prior", f"the value of {name}", pair[0])
+        found[name] = (value, positive("prior", f"the standard deviation of {name}", pair[1]))
+    return found
+
+
+_PRIOR = "{'mass': (2.0, 0.05)}"
 
 
 def with_those(free, own) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from .arguments import (
     check_limits,
     check_quantities,
     effect_classes,
+    known_beforehand,
     mechanism_of,
     own_parameters,
     with_those,
@@ -30,6 +31,7 @@ def diagnose(
     candidates=None,
     free=None,
     own=None,
+    prior=None,
     executor=None,
     limits=None,
     progress=None,
@@ -60,6 +62,11 @@ def diagnose(
     own : sequence of str or None
         Parameters of the model that every record has for itself, as for `refit`: they are estimated anew on
         records held out.
+    prior : mapping or None
+        What is known of parameters besides the records: value and standard deviation by name, each in its
+        unit, ``{"mass": (2.0, 0.05)}``, of the model or of an effect that it may be given. Of the others the
+        model's own values count, each known within a factor of three (one standard deviation): no more than
+        one sample does.
     executor : concurrent.futures.Executor or None
         Runs candidates side by side; None: threads of this process do.
     limits : mapping or None
@@ -108,6 +115,7 @@ def diagnose(
     check_quantities(block, (*dataset.records, *dataset.validation))
     own = own_parameters(block, own)
     names = with_those(dataset.free_parameters(block, free), own)
+    dataset = dataset.with_prior(known_beforehand(block, prior))
     block = dataset.with_own(block, own)
 
     def work():

@@ -7,6 +7,7 @@ from ..checks import executor as checked_executor
 from .arguments import (
     check_quantities,
     effect_classes,
+    known_beforehand,
     mechanism_of,
     own_parameters,
     with_those,
@@ -28,6 +29,7 @@ def improve(
     candidates=None,
     free=None,
     own=None,
+    prior=None,
     executor=None,
     progress=None,
     callback=None,
@@ -50,7 +52,7 @@ def improve(
         Records to confirm on; None: every third part of the training records, or point of the tables.
     max_effects : int
         Longest ladder, >= 0.
-    candidates, free, own, executor, progress
+    candidates, free, own, prior, executor, progress
         As for `diagnose`.
     callback : callable or None
         Takes the `Study` as it stands, first within seconds. What it raises ends the ladder.
@@ -89,6 +91,7 @@ def improve(
     check_quantities(start, (*dataset.records, *dataset.validation))
     own = own_parameters(start, own)
     kept = frozenset(start.parameters) - set(with_those(dataset.free_parameters(start, free), own))
+    dataset = dataset.with_prior(known_beforehand(start, prior))
     start = dataset.with_own(start, own)
 
     def free_of(block) -> list[str]:

@@ -12,6 +12,7 @@ from ..checks import unknown_keywords
 from .arguments import (
     check_fit,
     check_quantities,
+    known_beforehand,
     own_parameters,
     parametric,
     with_those,
@@ -29,6 +30,7 @@ def refit(
     free=None,
     *,
     own=None,
+    prior=None,
     start: Mapping[str, float] | None = None,
     mode: str = "auto",
     window: float | None = None,
@@ -57,6 +59,11 @@ def refit(
         temperature), by name or by effect id; they are moved, also where `free` does not name them. Those
         that say so themselves (``parameter.per_record``: a ripple's phase), and those that the model has
         from such a fit, always are.
+    prior : mapping or None
+        What is known of parameters besides the records: value and standard deviation by name, each in its
+        unit, ``{"mass": (2.0, 0.05)}``, of the model or of an effect that it may be given. Of the others the
+        model's own values count, each known within a factor of three (one standard deviation): no more than
+        one sample does.
     start : mapping or None
         Start values other than the model's; the short windows are then left out.
     mode, window
@@ -102,7 +109,7 @@ def refit(
     own = own_parameters(block, own)
     names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
-    found = dataset.fit(
+    found = dataset.with_prior(known_beforehand(block, prior)).fit(
         dataset.with_own(model, own),
         names,
         start,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -62,10 +63,13 @@ class Dataset(ABC):
     ----------
     records, held : tuples
         To fit; to validate on (may be empty: a part of `records` is then held out).
+    prior : mapping of str to (float, float)
+        Value and standard deviation of parameters known beforehand.
     """
 
     records: tuple
     validation: tuple
+    prior: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
     def free_parameters(self, block, free=None) -> tuple[str, ...]:
         """Return the parameters that a fit to these data moves (see `arguments.free_parameters`)."""
@@ -94,6 +98,15 @@ class Dataset(ABC):
     @abstractmethod
     def plan(self, diagnosis, models: Sequence, names, **limits) -> Experiment:
         """Return the input that separates the models best."""
+
+    def with_prior(self, prior):
+        """Return the same data, of a machine of which that is known; tables take no such knowledge."""
+        if prior:
+            raise ValueError(
+                f"prior needs records over time; got tables N(A, omega), and prior of {', '.join(prior)}. "
+                "Hold these parameters instead: leave them out of free."
+            )
+        return self
 
     def with_own(self, model, names):
         """Return a model of which every record has these parameters for itself; tables share all of them."""

@@ -22,7 +22,7 @@ class ImposedDataset(TimeDataset):
 
     def search(self, block, free):
         """Return the search in force."""
-        return ImposedSearch(block, self.records, self.validation, free)
+        return ImposedSearch(block, self.records, self.validation, free, self.prior)
 
     def plan(self, diagnosis, models, names, **limits):
         """Refuse: inputs are planned as forces."""

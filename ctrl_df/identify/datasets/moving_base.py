@@ -30,4 +30,4 @@ class MovingBaseDataset(TimeDataset):
 
     def search(self, block, free):
         """Return the search among what acts between a base and a mass."""
-        return MovingBaseSearch(block, self.records, self.validation, free)
+        return MovingBaseSearch(block, self.records, self.validation, free, self.prior)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from types import MappingProxyType
 
 from ..arguments import check_window
@@ -27,6 +28,12 @@ class TimeDataset(Dataset):
 
     def __init__(self, records, validation=()):
         self.records, self.validation = tuple(records), tuple(validation)
+
+    def with_prior(self, prior):
+        """Return the same data, of a machine of which that is known."""
+        self = copy(self)
+        self.prior = prior
+        return self
 
     def check_segments(self, mode, window):
         """Check the mode, and a length of segment that holds samples enough."""
@@ -75,7 +82,7 @@ class TimeDataset(Dataset):
             model = model.parts.block
         found, seen = refit_records(
             model, self.records, names, start, whole=whole, mode=mode, window=window, robust=robust,
-            budget=budget,
+            budget=budget, prior=self.prior,
         )  # fmt: skip
         comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
@@ -88,7 +95,7 @@ class TimeDataset(Dataset):
 
     def search(self, block, free):
         """Return the search over segments of the records."""
-        return StructureSearch(block, self.records, self.validation, free)
+        return StructureSearch(block, self.records, self.validation, free, self.prior)
 
     def plan(self, diagnosis, models, names, **limits):
         """Return the input, of a few shapes and sizes, whose outputs differ most."""

@@ -37,6 +37,10 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     problem, residual = stage.problem, found.residual
     ones = [np.ones(len(r)) for r in residual]
     h, _, _ = stage.normal(*found.slopes, residual, ones, found.states)
+    # what is stated of parameters tells as one sample off by the error there is, and is as uncertain as that
+    power, count = stage.power(residual)
+    error = power * problem.unit**2 / max(count, 1)
+    h = h + error * np.diag(problem.stated)
     size = np.sqrt(np.maximum(np.diag(h), NOTHING))
     size[size <= DEPENDENT * max(float(size.max()), NOTHING)] = 1.0
     eigen, vectors = np.linalg.eigh(h / np.outer(size, size))
@@ -48,7 +52,7 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     ]
     root = vectors / np.sqrt(np.maximum(eigen, NEARLY_NOTHING * top)) / size[:, None]
     inverse = root @ root.T
-    middle, variances = np.zeros_like(h), [(np.zeros(len(h)), np.zeros(len(h)))]
+    middle, variances = error**2 * np.diag(problem.stated), [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):
         e, columns, segments = stage.weighed(k, e), sensitivity.parameters[k], stage.segments[k]
         if problem.error_filter is None and len(segments) >= MANY_SEGMENTS:
@@ -62,7 +66,10 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
             middle += noise.product(columns[block])
             variances.append(noise.variances(columns[block] @ inverse))
     wide = _widening(*np.sum(variances, axis=0))
-    return inverse @ middle @ inverse * np.outer(wide, wide), null
+    covariance = inverse @ middle @ inverse * np.outer(wide, wide)
+    lost = np.flatnonzero(np.diag(covariance) <= 0) if null else ()  # by rounding, where nothing is told
+    covariance[lost, lost] = math.inf
+    return covariance, null
 
 
 def _widening(variances, errors) -> np.ndarray:

@@ -20,7 +20,7 @@ from ..shooting.multiple_shooting import Solution, Stage
 from ..shooting.noise_model import NoiseModel
 from ..shooting.problem import Problem
 from ..shooting.thresholds import AT_BOUND, ON_BOUND
-from ..shooting.variables import default_free, step_of_sensor
+from ..shooting.variables import Prior, default_free, priors, step_of_sensor
 from ..thresholds import NOTHING, RTOL
 from .covariance import covariance_of
 from .own_values import OwnValue, at_bounds, merged, own_values, strongest
@@ -217,6 +217,7 @@ def fit_records(
     tolerance: float = 1e-3,
     central: bool = False,
     iterations: int = 12,
+    prior: Mapping[str, tuple[float, float]] | None = None,
 ) -> FitResult:
     """Fit a model to records, fast.
 
@@ -249,6 +250,8 @@ def fit_records(
         Whether the last Jacobian is by central differences.
     iterations : int
         Bound on the iterations over the full segments.
+    prior : mapping or None
+        Value and standard deviation of parameters known beforehand; of the others see `Prior`.
     """
     records = list(records)
     thin = thinnable(records, thin)
@@ -256,8 +259,8 @@ def fit_records(
     first, block = simulator_of(model, records[0]), block_of(model)
     names = tuple(default_free(block) if free is None else free)
     lengths = segment_lengths(model, records, mode, window)
-    begun = {k: p.value for k, p in block.parameters.items()} if names else {}
-    problem = Problem(model, records, names, budget, about=begun, followed=RESTARTS_KEPT)
+    about = priors(block, prior) if names else {}
+    problem = Problem(model, records, names, budget, about=about, followed=RESTARTS_KEPT)
     theta = problem.start()
     if coarse is None:
         coarse = start is None
@@ -287,7 +290,7 @@ def fit_segments(
     tolerance: float = 1e-3,
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
-    about: Mapping[str, float] | None = None,
+    about: Mapping[str, Prior] | None = None,
     errors: bool = False,
     error_filter: NoiseModel | None = None,
     begins: str = FREE,
@@ -314,7 +317,7 @@ def fit_segments(
     limits : mapping or None
         Least and largest values of some parameters, within their ranges.
     about : mapping or None
-        What some of them are about (see `SIZE_PRIOR`).
+        What is known of some of them beforehand.
     errors : bool
         Whether to work out the covariance, from the derivatives of the last step; else it is empty.
     error_filter : NoiseModel or None

@@ -15,7 +15,7 @@ from ..data.measurement import Measurement
 from ..prediction.segments import facts, make_segments
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SEGMENT_LEAST
-from ..shooting.variables import step_of_sensor
+from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE, TAKES_PART
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
@@ -25,7 +25,7 @@ from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS
 
 
 def refit_records(
-    model, records, names, start, *, whole, mode, window, robust, budget
+    model, records, names, start, *, whole, mode, window, robust, budget, prior=None
 ) -> tuple[FitResult, FitResult]:
     """Return the fit, and the one whose segments and initial states the comparison is to show.
 
@@ -39,12 +39,19 @@ def refit_records(
         Start values other than the model's.
     whole : bool
         Whether the step of a sensor that rounds is to be found as well.
-    mode, window, robust, budget
+    mode, window, robust, budget, prior
         As for `ctrl_df.refit`.
     """
     steps, tolerance = EFFORT_REFIT
     settings: dict[str, Any] = dict(
-        budget=budget, mode=mode, window=window, robust=robust, tolerance=tolerance, central=True, polish=6
+        budget=budget,
+        mode=mode,
+        window=window,
+        robust=robust,
+        tolerance=tolerance,
+        central=True,
+        polish=6,
+        prior=prior,
     )
     model = _with_angles(model, records, names)
     # short segments lead from far off; from nearby they may lead away, into another minimum
@@ -60,7 +67,9 @@ def refit_records(
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     if nonsmooth_names(found):
-        better = restarted(found, _Beside(records, found.segments), nonsmooth_names(found))
+        better = restarted(
+            found, _Beside(records, found.segments, priors(block_of(model), prior)), nonsmooth_names(found)
+        )
         if better is not found:
             found = fit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
@@ -111,13 +120,13 @@ def _many_minima(model) -> bool:
 class _Beside:
     """Fits over the segments of a refit, at the full rate."""
 
-    def __init__(self, records, segments):
-        self.records, self.segments = records, segments
+    def __init__(self, records, segments, about):
+        self.records, self.segments, self.about = records, segments, about
 
     def __call__(self, model, names, *, starts, iterations, hopeless) -> FitResult:
         return fit_segments(
             model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
-            hopeless=hopeless,
+            hopeless=hopeless, about=self.about,
         )  # fmt: skip
 
 

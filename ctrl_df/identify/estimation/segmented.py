@@ -21,7 +21,7 @@ from ..shooting.noise_model import NoiseModel, acceleration_filter
 from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
 from ..shooting.thresholds import EFFORT_ALONE
-from ..shooting.variables import RecordScales
+from ..shooting.variables import Prior, RecordScales, priors
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import reestimated
@@ -93,7 +93,7 @@ class SegmentedData:
     thin: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
-    about: Mapping[str, float]  # what these are about, before any data
+    about: Mapping[str, Prior]  # what is known of these before any data
     filtered: RecordScales  # of effects
     whole: tuple[SegmentedRecords, SegmentedRecords] | None = None
     step: int = 0  # samples a step of the input before this was made fine
@@ -346,8 +346,13 @@ class SegmentedData:
         return near
 
 
-def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurement] = ()) -> SegmentedData:
-    """Cut records into segments; without records held out, every third ninth of each is."""
+def prepare(
+    block, records: Sequence[Measurement], validation: Sequence[Measurement] = (), prior=None
+) -> SegmentedData:
+    """Cut records into segments; without records held out, every third ninth of each is.
+
+    `prior`: value and standard deviation of parameters known beforehand, by name.
+    """
     records = tuple(records)
     if validation:
         learn = SegmentedRecords(records, tuple(cut(r, _count(r)) for r in records))
@@ -372,7 +377,7 @@ def prepare(block, records: Sequence[Measurement], validation: Sequence[Measurem
         scales.force, scales.position, scales.speed, scales.mass, min(r.dt for r in records),
         max(r.duration for r in records),
     )  # fmt: skip
-    about = {k: p.value for k, p in block.parameters.items()}
+    about = priors(block, prior)
     return SegmentedData(learn, judge, 1, scales, limits, about, seen).coarse(thin, step)
 
 

@@ -38,6 +38,8 @@ class StructureSearch(Search):
         To fit; to validate on (may be empty).
     free : tuple of str
         Parameters of the model that may be refitted.
+    prior : mapping or None
+        Value and standard deviation of parameters known beforehand, by name.
 
     Attributes
     ----------
@@ -50,9 +52,10 @@ class StructureSearch(Search):
     words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
     at: Standing
 
-    def __init__(self, block, records, validation, free):
+    def __init__(self, block, records, validation, free, prior=None):
         self.block, self.free = block, tuple(free)
-        self.at = begun(block, self.segmentations(prepare(block, records, validation)), self.free)
+        data = prepare(block, records, validation, prior)
+        self.at = begun(block, self.segmentations(data), self.free)
 
     @property
     def base(self):

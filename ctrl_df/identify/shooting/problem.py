@@ -51,7 +51,7 @@ class Problem:
         self.first = np.cumsum([0, *copies])[:-1]
         apart = np.array([k in self.own for k in names], bool)
         self.of_record: list[np.ndarray] = [self.first + k * apart for k in range(len(self.records))]
-        self.about, self.precision = beforehand(self.variables, about or {})
+        self.about, self.precision, self.stated = beforehand(self.variables, about or {})
         self.steps = np.full(len(self.variables), NUDGE_FIRST)
         self.nfev = 0.0
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))

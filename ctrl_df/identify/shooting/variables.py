@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -140,19 +141,40 @@ def variables_of(block, names, records, known: Facts, limits=None, own=frozenset
     return found
 
 
-def beforehand(variables, about: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+class Prior(NamedTuple):
+    """What is known of a parameter before any data: about where it lies, and its standard deviation.
+
+    Both in its unit; None for one that nobody has stated: the value may be off by a factor, `SIZE_PRIOR`.
+    """
+
+    value: float
+    std: float | None = None
+
+
+def priors(block, stated: Mapping[str, tuple[float, float]] | None = None) -> dict[str, Prior]:
+    """Return what is known of the parameters of a block, and what is stated of some, by name."""
+    of_block = {k: Prior(p.value) for k, p in block.parameters.items()}
+    return of_block | {k: Prior(*known) for k, known in (stated or {}).items()}
+
+
+def beforehand(variables, about: Mapping[str, Prior]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return what is known of scaled parameters before any data: about where they lie, one over variance.
 
-    `about`: values by name; of others nothing is known, and their variance is infinite.
+    The third array has the latter of those whose standard deviation is stated, else 0. Of parameters that
+    `about` does not have nothing is known, and their variance is infinite.
     """
-    means, precisions = np.zeros(len(variables)), np.zeros(len(variables))
+    means, precisions, stated = np.zeros((3, len(variables)))
     for i, v in enumerate(variables):
-        value = about.get(v.name)
-        if value is not None and (value > 0 or not v.log):
-            means[i] = v.q(value)
+        value, std = about.get(v.name, Prior(math.nan))
+        if math.isnan(value) or (v.log and value <= 0):
+            continue
+        means[i] = v.q(value)
+        if std is not None:
+            stated[i] = precisions[i] = (v.slope(means[i]) / std) ** 2
+        else:
             spread = math.log(SIZE_PRIOR) if v.log else SIZE_PRIOR * max(abs(value), v.natural) / v.scale
             precisions[i] = 1 / spread**2
-    return means, precisions
+    return means, precisions, stated
 
 
 def natural_scale(unit: str, known: Facts) -> float:
