@@ -42,7 +42,30 @@ def test_a_free_force_knows_nothing_of_what_comes():
     now = 700
     later = y + 0.1 * (np.arange(len(y)) > now)
     at = segments.samples[now]
-    for before, after in zip(
-        _motion(run, segments, y).values(), _motion(run, segments, later).values(), strict=True
-    ):
-        assert np.array_equal(before[: at + 1], after[: at + 1])
+    before, after = _motion(run, segments, y), _motion(run, segments, later)
+    for name in ("x", "v", "a", "u"):
+        assert np.array_equal(before[name][: at + 1], after[name][: at + 1])
+
+
+def test_samples_outside_the_segments_and_their_spacing_do_not_count():
+    t = np.sort(np.random.default_rng(0).uniform(0, 4, 4000))
+    run = cdf.Measurement(t, np.sin(t), np.sin(5 * t) + 1e-3 * np.random.default_rng(1).standard_normal(4000))
+    whole = make_segments(run, 1.0)
+    segments = whole.only(np.arange(len(whole)) % 2 == 0)
+    motion = _motion(run, segments, np.sin(5 * t[segments.samples]))
+    inside = motion["inside"]
+    assert len(inside) < 2500
+    assert np.max(np.abs(motion["v"][inside] - 5 * np.cos(5 * t[inside]))) < 0.2
+    assert np.median(np.abs(motion["a"][inside] + 25 * np.sin(5 * t[inside]))) < 0.5
+
+
+def test_two_outputs_are_diagnosed():
+    true = cdf.Mass(2.0).with_effect(cdf.LinearSpring(40.0)).with_effect(cdf.Viscous(3.0))
+    t = np.arange(0.0, 6.0, 0.004)
+    u = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    x, v = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)
+    rng = np.random.default_rng(2)
+    outputs = {"x": x + 1e-4 * rng.standard_normal(t.size), "v": v + 1e-3 * rng.standard_normal(t.size)}
+    assert (
+        cdf.diagnose(true, cdf.Measurement(t, u, outputs=outputs), candidates=["coulomb"]).verdict == "none"
+    )

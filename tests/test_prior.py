@@ -68,6 +68,8 @@ def test_what_it_needs(record, prior, said):
 
 def test_tables_take_none():
     omega = np.array([2.0, 4.0, 8.0])
-    table = cdf.FrequencyMeasurement([8.0, 20.0], omega, cdf.describing_function_family(TRUE, [8.0, 20.0], omega).N)
+    table = cdf.FrequencyMeasurement(
+        [8.0, 20.0], omega, cdf.describing_function_family(TRUE, [8.0, 20.0], omega).N
+    )
     with pytest.raises(ValueError, match="prior needs records over time"):
         cdf.refit(TRUE, table, prior={"mass": (2.0, 0.1)})

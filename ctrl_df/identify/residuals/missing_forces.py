@@ -160,7 +160,7 @@ class _Scene:
 
     def kinds(self):
         """Yield (kind, families): each a list of (shape, span), coarse and fine along what the kind is of."""
-        every = {k: np.concatenate([m[k] for m in self.motion]) for k in ("t", "x", "v", "u")}
+        every = {k: np.concatenate([m[k][m["inside"]] for m in self.motion]) for k in ("t", "x", "v", "u")}
         for kind, name, tail, count, factors in (
             ("time", "t", 0.0, 8, (_one, _direction, _acceleration)),
             ("position", "x", *FREE_STEPS["position"], (_one, _direction)),
@@ -199,26 +199,35 @@ class _Scene:
 
 
 def _motion(record, segments, y):
-    known = facts(record)
-    x, load, y = np.array(known.place, float), np.array(known.load, float), y[segments.blocks[0]]
-    moved = sensed(record).columns[0] != POSITION
-    v = np.array(record.y, float) if moved else np.zeros(0)
-    # the output is the model's own: what it errs by is no function of itself
-    (load if known.imposed else v if moved else x)[segments.samples] = y
-    begins = segments.samples[[where.start for where in segments.slices]]
-    v = v if moved else _rate(x, record.t, begins)
-    return {"t": record.t - record.t[0], "x": x, "v": v, "a": _rate(v, record.t, begins), "u": load}
+    """Return the motion that the model makes, and outside the segments that of the record.
 
-
-def _rate(x, t, begins):
-    """Return backward differences, of segments that begin anew.
-
-    A force must not know what comes: under a controller that is made of the sensor's noise of now, and the
-    residual would be explained by itself.
+    Within the segments speeds and accelerations are backward differences: a force must not know what comes,
+    as under a controller that is made of the sensor's noise of now, and the residual would explain itself.
     """
-    rate = np.diff(x, prepend=x[0]) / np.diff(t, prepend=2 * t[0] - t[1])
-    rate[begins] = rate[begins + 1]
-    return rate
+    known, inside = facts(record), segments.samples
+    x, v, load = (np.array(c, float) for c in (known.place, known.velocity, known.load))
+    a = np.gradient(v, record.t)
+    y, t = y[segments.blocks[0]], record.t[inside]
+    parts = segments.slices[: len(segments)]
+    if known.imposed:
+        load[inside] = y
+    elif sensed(record).columns[0] == POSITION:
+        # the output is the model's own: what it errs by is no function of itself
+        x[inside], v[inside], a[inside] = y, _rate(y, t, parts, 1), _rate(y, t, parts, 2)
+    else:
+        v[inside], a[inside] = y, _rate(y, t, parts, 1)
+    return {"t": record.t - record.t[0], "x": x, "v": v, "a": a, "u": load, "inside": inside}
+
+
+def _rate(y, t, parts, order):
+    """Return backward differences within each part; its first samples have those of the next."""
+    found = np.zeros(len(y))
+    for where in parts:
+        rate, at = y[where], t[where]
+        for _ in range(order):
+            rate, at = np.diff(rate) / np.diff(at), 0.5 * (at[1:] + at[:-1])
+        found[where] = np.concatenate((np.repeat(rate[:1], order), rate)) if len(rate) else 0.0
+    return found
 
 
 def _grid(values, tail, count):
@@ -240,12 +249,16 @@ def _one(m):
 
 
 def _direction(m):
-    slow = SLOWLY * float(np.sqrt(np.mean(m["v"] ** 2))) + NOTHING
+    slow = SLOWLY * _rms(m, "v") + NOTHING
     return np.tanh(m["v"] / slow)
 
 
 def _acceleration(m):
-    return m["a"] / (float(np.sqrt(np.mean(m["a"] ** 2))) + NOTHING)
+    return m["a"] / (_rms(m, "a") + NOTHING)
+
+
+def _rms(m, name):
+    return float(np.sqrt(np.mean(m[name][m["inside"]] ** 2)))
 
 
 def _since(length):
