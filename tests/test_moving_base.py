@@ -82,13 +82,24 @@ def test_what_is_missing_is_found(records):
 
 def test_how_the_motion_was_read_is_said(records):
     said = str(cdf.compare(TRUE, records["position"]))
-    assert "shaker, seen from its base, its motion low-passed at" in said
+    assert "record 'shaker'" in said and "seen from its base, its motion low-passed at" in said
     assert "low-passed" not in str(cdf.compare(TRUE, records["acceleration"]))
 
 
 def test_what_such_a_record_does_not_tell_is_refused(records):
     with pytest.raises(ValueError, match="a base that moves tells forces per mass only"):
         cdf.refit(NOMINAL, records["position"], free=["mass"])
+    with pytest.raises(ValueError, match="start needs parameters"):
+        cdf.refit(NOMINAL, records["position"], start={"mass": 3.0})
+    with pytest.raises(ValueError, match="got input_saturation, which acts on a force"):
+        cdf.compare(NOMINAL.with_effect(cdf.InputSaturation(30.0)), records["position"])
+    with pytest.raises(ValueError, match="got sensor_delay, which acts on the place in space"):
+        cdf.compare(NOMINAL.with_effect(cdf.SensorDelay(0.01)), records["position"])
+    assert cdf.compare(NOMINAL.with_effect(cdf.SensorDelay(0.01)), records["acceleration"]).nrmse > 0
+    force = cdf.Measurement(TIMES, base(2), mass()[0])
+    for mixed in ([force, records["position"]], [records["position"], force]):
+        with pytest.raises(ValueError, match="judged apart"):
+            cdf.compare(NOMINAL, mixed)
     with pytest.raises(ValueError, match="velocity of a base does not tell its position"):
         cdf.compare(NOMINAL, cdf.Measurement(TIMES, base(1), mass()[0], input_unit="m/s", output_unit="m"))
     with pytest.raises(ValueError, match="needs one body with a mass"):

@@ -82,11 +82,19 @@ def test_parts_are_fitted_and_diagnosed_together(x):
     assert (found.verdict, found.best.id) == ("effect", "quadratic_drag")
 
 
+def test_times_are_dates_or_numbers(x):
+    dates = np.datetime64("2026-01-31T12:00:00") + (1e6 * T).astype("timedelta64[us]")
+    first, second = cdf.Measurement.in_parts(dates, U, x + 0.4 * (T > 3.0))
+    assert (first.t[0], second.t[0]) == pytest.approx((0.0, T[len(first)]))
+
+
 def test_what_cannot_be_used_is_refused(x):
     with pytest.raises(ValueError, match="needs a part without a break of 10 samples or more"):
         cdf.Measurement.in_parts(T, U, np.full(T.size, np.nan))
     with pytest.raises(ValueError, match="arrays of equal length"):
         cdf.Measurement.in_parts(T, U[1:], x)
+    with pytest.raises(TypeError, match="numbers"):
+        cdf.Measurement.in_parts(T, U.astype(str), x)
     with pytest.raises(TypeError, match="colour"):
         cdf.Measurement.in_parts(T, U, x, colour=3)
     with pytest.raises(ValueError, match="in_parts"):

@@ -33,8 +33,7 @@ def as_channel(owner: str, name: str, values, length: int | None = None) -> np.n
         raise ValueError(
             f"{owner} needs real numbers in {name}; got complex ones. Is this a frequency response?"
         )
-    if name == "t" and raw.dtype.kind in "mM" and raw.ndim == 1 and len(raw):
-        raw = (raw - raw[0]) / np.timedelta64(1, "s")  # dates and durations: seconds from the first
+    raw = seconds(raw) if name == "t" else raw
     mixed = raw.dtype.kind == "O" and not all(is_number(v) for v in raw.ravel())
     if mixed or raw.dtype.kind not in "fiuO" + ("b" if name not in ("t", "u", "y") else ""):
         kind = {"U": "text", "S": "text", "b": "truth values", "M": "dates", "m": "durations"}
@@ -62,6 +61,14 @@ def as_channel(owner: str, name: str, values, length: int | None = None) -> np.n
             "yourself where that is honest."
         )
     return array
+
+
+def seconds(times) -> np.ndarray:
+    """Return dates and durations as seconds from the first; what is neither as it is."""
+    raw = np.ma.asanyarray(times) if np.ma.isMaskedArray(times) else np.asarray(times)
+    if raw.dtype.kind not in "mM" or raw.ndim != 1 or not len(raw):
+        return raw
+    return (raw - raw[0]) / np.timedelta64(1, "s")
 
 
 def check_times(owner: str, t: np.ndarray) -> None:

@@ -66,6 +66,8 @@ class Measurement:
         position, or the first. A `velocity` judges nothing: drives compute it from the position.
     units : mapping
         SI unit of each output, by quantity.
+    note : str
+        How the record was read where that is not as it was given; empty: as it was.
 
     Raises
     ------
@@ -97,6 +99,7 @@ class Measurement:
     input: str | None = None
     outputs: Mapping[str, Any] | None = None
     units: Mapping[str, str] = field(init=False)
+    note: str = field(init=False, default="")
 
     def __post_init__(self):
         choice("Measurement", "input_hold", self.input_hold, HOLDS)

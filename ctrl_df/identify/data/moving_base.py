@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from ...blocks.mechanism import Mechanism
+from ...blocks.primitives import Ramp
 from ...checks import shown
 from ...units import dimension
 from . import derivatives
@@ -27,6 +28,11 @@ def moves_base(model, record) -> bool:
     return quantity_of(record.input_unit) in _DERIVATIVES and all(q in _DERIVATIVES for q in outputs)
 
 
+def told_in_space(record: Measurement) -> bool:
+    """Return whether a record of a base that moves has its outputs in space, not relative to the base."""
+    return quantity_of(record.input_unit) != "acceleration"
+
+
 def seen_from_base(model, record: Measurement) -> Measurement:
     """Return a record with the force of inertia as input, and outputs relative to the base.
 
@@ -35,10 +41,12 @@ def seen_from_base(model, record: Measurement) -> Measurement:
     Raises
     ------
     ValueError
-        A model of two bodies or without a mass, units of another kind of motion than the model's, an output
+        A model of two bodies or without a mass, or with effects on the way of a force (of a sensor in space
+        but for its offset), units of another kind of motion than the model's, an output
         that the motion of the base does not tell.
     """
     mass, moves = _inertia(model), model.coordinates
+    _check_channels(model, told_in_space(record))
     given = _DERIVATIVES.index(quantity_of(record.input_unit))
     turns = dimension(record.input_unit).get("rad", 0) == 1
     if turns != (moves.unit == "rad"):
@@ -63,7 +71,7 @@ def seen_from_base(model, record: Measurement) -> Measurement:
     how = f", its motion low-passed at {cutoff:.3g} Hz" if given < 2 else ""
     seen = record.replaced(
         u=-mass * base(2), input="force", input_unit=moves.force_unit, input_hold="linear", outputs=outputs,
-        velocity=velocity, name=f"{record.name}, seen from its base{how}",
+        velocity=velocity, note=f"seen from its base{how}",
     )  # fmt: skip
     # low-passed, the motion is not known at the very ends
     ends = 1 / cutoff if cutoff else 0.0
@@ -77,6 +85,19 @@ def _inertia(model) -> float:
             "Inertia without backlash and compliance, or record the force."
         )
     return model.core.masses[0]
+
+
+def _check_channels(model, in_space: bool) -> None:
+    for effect in model.effects:
+        moved = effect.role == "output" and not all(isinstance(p, Ramp) for p in effect.channel())
+        if effect.role == "input" or (moved and in_space):
+            what = "a force, and here none is applied" if effect.role == "input" else (
+                "the place in space, and the record is taken as seen from the base"
+            )  # fmt: skip
+            raise ValueError(
+                f"on a base that moves a model needs effects between base and mass; got {effect.id}, which "
+                f"acts on {what}. Leave it out."
+            )
 
 
 def _relative(record, quantity, given, y, base) -> np.ndarray:

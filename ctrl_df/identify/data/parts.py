@@ -10,7 +10,7 @@ import numpy as np
 
 from ...checks import is_number
 from . import quantities
-from .checks import holes, leaps
+from .checks import holes, leaps, seconds
 from .thresholds import MINIMUM
 
 
@@ -18,6 +18,7 @@ def in_parts(kind: Callable, t, u, y, keywords: dict[str, Any]) -> tuple:
     """Return the parts of a run as records; see `Measurement.in_parts`."""
     name, n = keywords.pop("name", "measurement"), np.size(t)
     owner = f"Measurement {name!r}"
+    t = seconds(t)
     given = dict(t=t, u=u, y=y) | {k: keywords.pop(k, None) for k in ("outputs", "velocity", "channels")}
     every: dict[str, Any] = {}
     for key, value in given.items():
@@ -76,13 +77,16 @@ def _sliced(value, span: slice):
     if isinstance(value, Mapping):
         return {k: _sliced(v, span) for k, v in value.items()}
     values, unit = quantities.with_unit(value)
-    part = np.asarray(np.ma.getdata(values)[span].tolist())
+    part = np.asarray(np.ma.getdata(values)[span])
+    part = part.astype(float) if part.dtype.kind == "O" else part
     return part if unit is None else (part, unit)
 
 
 def _present(values) -> np.ndarray:
     """Return which samples of a channel are there: not masked, finite numbers."""
     plain = np.ma.getdata(values)
+    if plain.dtype.kind not in "fiubO":
+        raise TypeError(f"Measurement needs numbers, NaN where one is missing; got dtype {plain.dtype}.")
     finite = (
         [is_number(v) and bool(np.isfinite(v)) for v in plain]
         if plain.dtype.kind == "O"

@@ -7,7 +7,7 @@ from typing import Any
 from ..arguments import check_held_out
 from ..data.as_data import as_records, as_tables, distinguished, has_tables
 from ..data.imposed import imposes_motion
-from ..data.moving_base import moves_base, seen_from_base
+from ..data.moving_base import moves_base
 from .dataset import Dataset
 from .imposed import ImposedDataset
 from .moving_base import MovingBaseDataset
@@ -34,9 +34,9 @@ def dataset_of(model, data, holdout=None, name: str = "data") -> Dataset:
     if kind is TableDataset:
         return kind(records, validation)
     named = distinguished((*records, *validation))
-    kind = TimeDataset
+    parts = named[: len(records)], named[len(records) :]
     if any(map(imposes_motion, named)):
-        kind = ImposedDataset
-    elif any(moves_base(model, r) for r in named):
-        kind, named = MovingBaseDataset, tuple(seen_from_base(model, r) for r in named)
-    return kind(named[: len(records)], named[len(records) :])
+        return ImposedDataset(*parts)
+    if any(moves_base(model, r) for r in named):
+        return MovingBaseDataset(model, *parts)
+    return TimeDataset(*parts)

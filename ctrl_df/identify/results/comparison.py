@@ -284,6 +284,8 @@ class Comparison(ComparisonBase):
                 f"{self.windows} windows of {np.mean(lengths):.3g} s, each from a fitted initial state "
                 "(nothing holds this model in place: over a free run it would drift)"
             )
+        if worst.record.note:
+            how = f"{worst.record.note}; {how}"
         count = f"{len(self.records)} records" if len(self.records) > 1 else f"record {worst.record.name!r}"
         return (
             f"{count}: nrmse {self.nrmse:.4g}, fit {self.fit_percent:.2f} %, rmse {self._sizes()}, "

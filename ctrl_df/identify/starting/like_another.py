@@ -28,11 +28,11 @@ def like_another(effect: Effect, other: Effect, x: np.ndarray, v: np.ndarray) ->
     Effect or None
         None where it cannot do what the other does, or where the motion alone does not tell of one.
     """
-    if not (tells(effect) and tells(other)):
+    names = [k for k, p in effect.parameters.items() if p.free and not p.stepped]
+    if not (names and tells(effect) and tells(other)):
         return None
     every = max(len(x) // LIKE_SAMPLES, 1)
     x, v = x[::every], v[::every]
-    names = [k for k, p in effect.parameters.items() if p.free and not p.stepped]
     table = [effect.parameters[k] for k in names]
 
     def made(values):
