@@ -9,6 +9,7 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.residuals.missing_forces import _motion, missing_forces
 from ctrl_df.identify.selection.evidence import ranked
+from ctrl_df.identify.shooting.noise_model import NoiseModel, OutputNoise
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.thresholds import SIGNIFICANT
 
@@ -69,3 +70,16 @@ def test_two_outputs_are_diagnosed():
     assert (
         cdf.diagnose(true, cdf.Measurement(t, u, outputs=outputs), candidates=["coulomb"]).verdict == "none"
     )
+
+
+def test_a_whitening_matrix_does_what_the_filter_does():
+    rng = np.random.default_rng(0)
+    pieces = [slice(0, 40), slice(40, 90)]
+    x = rng.standard_normal((90, 3))
+    slow = NoiseModel(np.array([0.6, 0.2]), 2.0)
+    for noise in (
+        slow,
+        NoiseModel(np.zeros(0), 1.0),
+        OutputNoise(slow.a, 2.0, 1, (NoiseModel(np.array([0.5]), 4.0),)),
+    ):
+        assert np.allclose(noise.matrix(pieces) @ x, noise.filtered(x, pieces))

@@ -53,3 +53,8 @@ PADDING = 30
 THINNED_BAND, THINNED_RIPPLE = 0.7, 5e-4
 """Band that thinning keeps, over the new Nyquist frequency, and its ripple [dB]: flat within 1e-4, 49 dB down
 at that frequency."""
+
+LONG, CUTOFFS_KEPT = 100_000, 3.0
+"""Samples beyond which a record is decimated if it loses nothing: a diagnosis of so many takes minutes. Band
+that is kept over the frequency at which the outputs have sunk into their noise: forces that change at once
+reach beyond it, two octaves lower in a position for every one above."""

@@ -7,6 +7,7 @@ from typing import Any
 from ..arguments import check_held_out
 from ..data.as_data import as_records, as_tables, distinguished, has_tables
 from ..data.imposed import imposes_motion
+from ..data.long_records import shortened
 from ..data.moving_base import moves_base
 from .dataset import Dataset
 from .imposed import ImposedDataset
@@ -34,9 +35,11 @@ def dataset_of(model, data, holdout=None, name: str = "data") -> Dataset:
     if kind is TableDataset:
         return kind(records, validation)
     named = distinguished((*records, *validation))
+    moving = any(moves_base(model, r) for r in named)
+    named = tuple(shortened(r, motion=moving) for r in named)
     parts = named[: len(records)], named[len(records) :]
     if any(map(imposes_motion, named)):
         return ImposedDataset(*parts)
-    if any(moves_base(model, r) for r in named):
+    if moving:
         return MovingBaseDataset(model, *parts)
     return TimeDataset(*parts)

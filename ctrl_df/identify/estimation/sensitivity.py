@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
 from ..shooting.elimination import products_of, states_for
-from ..thresholds import NEARLY_NOTHING
+from ..shooting.noise_model import NoiseModel
+from ..thresholds import DEPENDENT, NEARLY_NOTHING
 
 
 class OutputSensitivity:
@@ -63,20 +66,44 @@ class OutputSensitivity:
             found[where, w] = states[where] @ root[w]
         return found.reshape(len(states), -1)
 
-    def absorbed(self, noise) -> np.ndarray:
-        """Return an orthonormal basis (n, m) of what refitting could explain, as a noise model whitens it."""
-        columns = [np.concatenate(self.parameters)]
-        if self.error_filter is None:
-            ends = np.cumsum([0, *(len(s) for s in self.states)])
-            for k, (states, segments) in enumerate(zip(self.states, self.segments, strict=True)):
-                own = np.zeros((ends[-1], len(segments), states.shape[1]))
-                for w, where in enumerate(segments.places):
-                    own[ends[k] : ends[k + 1]][where, w] = states[where]
-                columns.append(own.reshape(ends[-1], -1))
-        stacked = noise.filtered(np.column_stack(columns), self.pieces)
-        norms = np.linalg.norm(stacked, axis=0)
-        q, r = np.linalg.qr(stacked[:, norms > 0] / norms[norms > 0])
-        return q[:, np.abs(np.diag(r)) > 1e-9]
+    def beside(self, noise: NoiseModel) -> Callable[[np.ndarray], np.ndarray]:
+        """Return what takes from whitened signals (n,) or (n, m) all that refitting could explain of them.
+
+        Unlike `project` by the least squares that this noise asks for: of slow noise initial states take
+        another part than plain squares see.
+        """
+        of_states = self._states_taken(noise)
+        columns = of_states(noise.filtered(np.concatenate(self.parameters), self.pieces))
+        norms = np.linalg.norm(columns, axis=0)
+        basis, r = np.linalg.qr(columns[:, norms > 0] / norms[norms > 0])
+        basis = basis[:, np.abs(np.diag(r)) > DEPENDENT]
+
+        def taken(x):
+            x = of_states(x)
+            return x - basis @ (basis.T @ x)
+
+        return taken
+
+    def _states_taken(self, noise: NoiseModel) -> Callable[[np.ndarray], np.ndarray]:
+        """Return what takes from whitened signals all that initial states could explain: sparse columns."""
+        if self.error_filter is not None or not any(s.size for s in self.states):
+            return lambda x: x
+        parts = []
+        for states, segments in zip(self.states, self.segments, strict=True):
+            where = [np.arange(len(states))[w] for w in segments.places]
+            owner = np.empty(len(states), int)
+            for w, rows in enumerate(where):
+                owner[rows] = w
+            ns = states.shape[1]
+            columns = owner[:, None] * ns + np.arange(ns)
+            shape = (len(states), len(segments) * ns)
+            rows = np.repeat(np.arange(len(states)), ns)
+            parts.append(sparse.csr_array((states.ravel(), (rows, columns.ravel())), shape=shape))
+        z = sparse.csc_array(noise.matrix(self.pieces) @ sparse.block_diag(parts, format="csr"))
+        norms = np.sqrt(np.asarray(z.multiply(z).sum(axis=0)).ravel())
+        z = z[:, norms > 0] @ sparse.diags_array(1 / norms[norms > 0])
+        solve = splu(sparse.csc_array(z.T @ z + DEPENDENT**2 * sparse.eye_array(z.shape[1]))).solve
+        return lambda x: x - z @ solve(z.T @ x)
 
     @property
     def pieces(self) -> list[slice]:

@@ -80,8 +80,8 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
 
     def regressed(noise) -> list[tuple[MissingForce, np.ndarray]]:
-        absorbed = sensitivity.absorbed(noise)
-        return [_regressed(k, m, s, residual, noise, segments, units, absorbed) for k, m, s in tables]
+        beside = sensitivity.beside(noise)
+        return [_regressed(k, m, s, residual, noise, segments, units, beside) for k, m, s in tables]
 
     found = regressed(noise)
     telling, explained = max(found, key=lambda f: f[0].evidence, default=(None, residual))
@@ -96,15 +96,13 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
 
 
 def _regressed(
-    kind, matrix, spans, residual, noise, segments, units, absorbed
+    kind, matrix, spans, residual, noise, segments, units, beside
 ) -> tuple[MissingForce, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain.
 
-    `absorbed`: what refitting could do, as this noise whitens it (see `OutputSensitivity.absorbed`).
+    `beside`: takes away what refitting could do (see `OutputSensitivity.beside`).
     """
-    white, filtered = noise.filtered(residual, segments), noise.filtered(matrix, segments)
-    white = white - absorbed @ (absorbed.T @ white)
-    filtered = filtered - absorbed @ (absorbed.T @ filtered)
+    white, filtered = beside(noise.filtered(residual, segments)), beside(noise.filtered(matrix, segments))
     weights, *_ = np.linalg.lstsq(filtered, white, rcond=DEPENDENT)
     left = white - filtered @ weights
     # a frequency is found by looking at many

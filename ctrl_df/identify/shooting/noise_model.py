@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from ..thresholds import NOTHING
 from .thresholds import IMPULSE_GONE, NOISE_ORDER
@@ -55,6 +57,22 @@ class NoiseModel:
     def weighed(self, x, piece: int) -> np.ndarray:
         """Return what counts of one piece of several."""
         return self.filtered(x, [slice(0, len(x))])
+
+    def matrix(self, segments) -> sparse.csr_array:
+        """Return `filtered` as a matrix, of signals of which every sample counts by itself (`step` 1)."""
+        parts = []
+        for i, w in enumerate(segments):
+            n, model = w.stop - w.start, self.of(i)
+            scale = self.sigma / max(model.sigma, NOTHING) if model is not self else 1.0
+            weights = scale * np.concatenate(([1.0], -model.a))
+            # what a unit impulse becomes stands below the diagonal
+            diagonals: Any = sparse.diags(list(weights), -np.arange(len(weights)), shape=(n, n), format="csr")
+            parts.append(diagonals[model.order :])
+        return sparse.csr_array(sparse.block_diag(parts, format="csr"))
+
+    def of(self, piece: int) -> NoiseModel:
+        """Return the model of one piece of several."""
+        return self
 
     def rows(self, segments) -> np.ndarray:
         """Return the sample in the middle of each value that `seen` returns of signals within `windows`."""

@@ -1,0 +1,23 @@
+"""Records of very many samples."""
+
+import numpy as np
+
+import ctrl_df as cdf
+
+
+def test_a_long_record_is_decimated_where_nothing_is_lost_and_says_so():
+    t = np.arange(0.0, 12.0, 5e-5)  # 240,000 samples
+    u = 9 * np.sin(3 * t) + 5 * np.sin(8 * t)
+    true = cdf.Mass(2.0).with_effect(cdf.LinearSpring(40.0)).with_effect(cdf.Viscous(6.0))
+    x = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
+    x = x + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
+    comparison = cdf.compare(true, cdf.Measurement(t, u, x, name="long"))
+    used = comparison.records[0].record
+    assert len(used) == 80_000
+    assert "record 'long'" in str(comparison) and "1 of 3 samples, of what is below 2.33e+03 Hz" in str(
+        comparison
+    )
+    # all of its band is motion
+    noisy = np.cumsum(np.random.default_rng(1).standard_normal(120_000))
+    whole = cdf.Measurement(t[:120_000], u[:120_000], noisy)
+    assert len(cdf.compare(true, whole).records[0].record) == 120_000
