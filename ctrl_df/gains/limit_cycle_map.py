@@ -106,7 +106,7 @@ def limit_cycle_map(
     >>> gains.at(kp=2000, ki=44250, exact=True).verdict
     'rests or diverges'
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, limit_cycle_map)
     points = count(_OWNER, "n", n, 2, meaning="values of each range")
     checks = count(_OWNER, "exact_check", exact_check, 0, meaning="points simulated")
     if 0 < checks < CHECKS_LEAST:

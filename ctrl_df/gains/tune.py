@@ -201,7 +201,7 @@ def tune_pid(
     >>> tuned.bandwidth >= 12 and tuned.max_sensitivity <= 1.7
     True
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, tune_pid)
     if np.ndim(bandwidth) == 0:
         least = positive(_OWNER, "bandwidth", bandwidth, "rad/s", meaning="crossover frequency")
         band = least, WIDER * least

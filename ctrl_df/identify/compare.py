@@ -44,7 +44,7 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     >>> comparison.fit_percent < 90, bool(comparison.white)
     (True, False)
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, compare)
     dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     return dataset.compare(model, mode, window)

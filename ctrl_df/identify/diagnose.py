@@ -105,7 +105,7 @@ def diagnose(
     >>> diagnosis.verdict, diagnosis.best.id, round(diagnosis.best.parameters["force"], 1)
     ('effect', 'constant_force', 1.0)
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, diagnose)
     checked_executor("diagnose", executor)
     check_limits(limits)
     classes = effect_classes(candidates)

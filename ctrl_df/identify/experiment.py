@@ -39,7 +39,7 @@ def next_experiment(
     ValueError
         Limits that are not positive; candidates that leave the stroke under every input.
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, next_experiment)
     remaining = [c for c in diagnosis.remaining if c.model is not None]
     if diagnosis.verdict == "none" or not remaining:
         return None

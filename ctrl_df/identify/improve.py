@@ -82,7 +82,7 @@ def improve(
     >>> study.verdict, study.effects
     ('effect', ('constant_force',))
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, improve)
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     course = Course("improve", progress, callback, budget)

@@ -101,7 +101,7 @@ def refit(
     >>> {name: round(p.value, 1) for name, p in fit.parameters.items()}
     {'mass': 2.2, 'coulomb.level': 3.0, 'viscous.coefficient': 6.0}
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, refit)
     dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)

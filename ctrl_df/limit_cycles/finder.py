@@ -89,7 +89,7 @@ def find_limit_cycle(
     >>> cdf.find_limit_cycle(loop, guess=(8.0, 11.6))
     <Orbit: 7.945402 @ 11.62868 rad/s, stable>
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, find_limit_cycle)
     check_search(
         "find_limit_cycle", max_iterations=max_iterations, search_time=search_time,
         raise_on_failure=raise_on_failure,

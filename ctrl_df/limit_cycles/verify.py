@@ -57,7 +57,7 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     >>> [row.verdict for row in cdf.verify(resp)]
     ['confirmed']
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, verify)
     check_search("verify", search_time=search_time, search=search)
     if not hasattr(resp, "limit_cycles"):
         raise TypeError(

@@ -95,7 +95,7 @@ def explore(
     >>> view.gains["ki"]
     10000.0
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, explore)
     flag(_OWNER, "exact", exact)
     tf = number(_OWNER, "tf", tf, "s", lower=0.0, meaning="filter time constant")
     width = number(_OWNER, "width", width, "in", lower=2.0)

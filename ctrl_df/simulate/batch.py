@@ -194,7 +194,7 @@ def batch_response(
     >>> batch.outputs.shape
     (100, 2, 2501)
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, batch_response)
     for name, value in dict(keep_events=keep_events, return_states=return_states).items():
         flag(_OWNER, name, value)
     threads = None if threads is None else count(

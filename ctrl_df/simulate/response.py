@@ -166,7 +166,7 @@ def event_response(
     >>> [(round(float(e.time), 4), e.kind) for e in run.events]
     [(0.3013, 'breakaway'), (1.0564, 'stick'), (1.3485, 'breakaway')]
     """
-    unknown_keywords(keywords)
+    unknown_keywords(keywords, event_response)
     for name, value in dict(keep_events=keep_events, return_states=return_states, squeeze=squeeze).items():
         if value is not None:
             flag("event_response", name, value)

@@ -309,7 +309,7 @@ class Measurement:
     @classmethod
     def _check_keywords(cls, keywords):
         known = [f.name for f in dataclasses.fields(cls) if f.init and f.name not in ("t", "u", "y")]
-        unknown_keywords([k for k in keywords if k not in known])
+        unknown_keywords([k for k in keywords if k not in known], known)
 
     # --- what it is -------------------------------------------------------------------------------
 

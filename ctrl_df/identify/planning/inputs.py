@@ -69,6 +69,8 @@ def input_that_separates(
             far = max(float(np.max(np.abs(y - centre))) for y in ys)
             if not np.isfinite(far) or far > PLAN_MARGIN * reach * PLAN_SLACK or asked > force:
                 continue
+            if max(float(np.ptp(y)) for y in ys) <= diagnosis.noise:
+                continue  # nothing moves
             separation = min(gaps) / max(diagnosis.noise, NOTHING)
             # A record in which nothing may move teaches one bit; where all candidates move it teaches their
             # shape.
@@ -77,8 +79,8 @@ def input_that_separates(
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
     if best is None:
         raise ValueError(
-            f"every input tried leaves the stroke of {reach:g} {long} or asks more than {force:g} {strong}: "
-            "the candidates drift. Allow more stroke, or give loop= (a closed_loop whose controller holds "
+            f"every input tried leaves the stroke of {reach:g} {long}, asks more than {force:g} {strong} or "
+            "moves nothing. Allow more stroke or force, or give loop= (a closed_loop whose controller holds "
             "the drive in place)."
         )
     what = (

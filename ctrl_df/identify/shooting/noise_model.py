@@ -66,7 +66,8 @@ class NoiseModel:
             scale = self.sigma / max(model.sigma, NOTHING) if model is not self else 1.0
             weights = scale * np.concatenate(([1.0], -model.a))
             # what a unit impulse becomes stands below the diagonal
-            diagonals: Any = sparse.diags(list(weights), -np.arange(len(weights)), shape=(n, n), format="csr")
+            offsets: Any = -np.arange(len(weights))
+            diagonals: Any = sparse.diags(list(weights), offsets, shape=(n, n), format="csr")
             parts.append(diagonals[model.order :])
         return sparse.csr_array(sparse.block_diag(parts, format="csr"))
 
