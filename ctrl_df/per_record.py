@@ -7,6 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from .record_name import among
+
 
 class PerRecord(float):
     """Value of a parameter that differs from record to record; as a number, what it is for one not known.
@@ -14,7 +16,7 @@ class PerRecord(float):
     Attributes
     ----------
     values : mapping of str to float
-        By name of the record.
+        By name of the record. A `RecordName` that is made up is known by its run.
     """
 
     values: Mapping[str, float]
@@ -26,12 +28,18 @@ class PerRecord(float):
         return self
 
     @classmethod
-    def over(cls, values: Mapping[str, float], angle: bool = False) -> PerRecord:
-        """Return these values; a record not known has their mean, of angles its direction."""
+    def over(
+        cls, values: Mapping[str, float], angle: bool = False, weights: Sequence[float] | None = None
+    ) -> PerRecord:
+        """Return these values; a record not known has their mean, of angles its direction.
+
+        `weights`: of each in the mean, not all zero, one over its variance say; None: all count the same.
+        """
+        pairs = list(zip(values.values(), weights or [1.0] * len(values), strict=True))
         if angle:
             values = {k: math.remainder(v, 2 * math.pi) for k, v in values.items()}
-            return cls(cmath.phase(sum(cmath.rect(1.0, v) for v in values.values())), values)
-        return cls(sum(values.values()) / len(values), values)
+            return cls(cmath.phase(sum(cmath.rect(w, v) for v, w in pairs)), values)
+        return cls(sum(w * v for v, w in pairs) / sum(w for _, w in pairs), values)
 
     @classmethod
     def angles(cls, records: Sequence[str], values: Sequence[float]) -> float:
@@ -40,7 +48,12 @@ class PerRecord(float):
 
     def of(self, record: str) -> float:
         """Return the value of the record of that name."""
-        return self.values.get(record, float(self))
+        name = among(record, self.values)
+        return float(self) if name is None else self.values[name]
+
+    def knows(self, record: str) -> bool:
+        """Whether it has a value of the record of that name."""
+        return among(record, self.values) is not None
 
     def __eq__(self, other) -> bool:
         same = super().__eq__(other)

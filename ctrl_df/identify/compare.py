@@ -47,4 +47,5 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     unknown_keywords(keywords, compare)
     dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
+    dataset.warn_of_means(model)
     return dataset.compare(model, mode, window)

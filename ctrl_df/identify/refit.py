@@ -109,6 +109,7 @@ def refit(
     own = own_parameters(block, own)
     names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
+    dataset.warn_of_means(model, names)
     found = dataset.with_prior(known_beforehand(block, prior)).fit(
         dataset.with_own(model, own),
         names,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from ...record_name import RecordName, digest
 from .frequency_measurement import FrequencyMeasurement
 from .measurement import Measurement
 
@@ -44,11 +46,27 @@ def as_records(data, name: str = "data") -> tuple[Measurement, ...]:
 
 
 def distinguished(records: tuple) -> tuple:
-    """Return records with names of their own: those of one name are numbered from 1."""
-    counts, seen, named = Counter(r.name for r in records), Counter(), []
+    """Return records with names of their own: those of one name are numbered, by numbers no other name has.
+
+    A number is made up: the run then tells which record it is (`RecordName`), and of parts of one run their
+    own data.
+    """
+    counts, runs = Counter(r.name for r in records), Counter(_run(r) for r in records)
+    taken, named = set(counts), []
     for record in records:
-        if counts[record.name] > 1:
-            seen[record.name] += 1
-            record = record.replaced(name=f"{record.name} {seen[record.name]}")
+        name = record.name
+        if counts[name] > 1:
+            numbered = next(k for i in itertools.count(1) if (k := f"{name} {i}") not in taken)
+            taken.add(numbered)
+            run = _run(record) if runs[_run(record)] == 1 else _digest(record)
+            record = record.replaced(name=RecordName(numbered, run, given=False))
         named.append(record)
     return tuple(named)
+
+
+def _run(record) -> str:
+    return getattr(record.name, "run", "") or _digest(record)
+
+
+def _digest(record) -> str:
+    return digest((record.t, record.u, *record.outputs.values()))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import choice, count, mapping, number, shown, unknown_keywords
+from ...record_name import RecordName, digest
 from ...units import si_unit, to_si
 from ..thresholds import ON_SAMPLE
 from . import derivatives, quantities, readers
@@ -142,6 +143,9 @@ class Measurement:
             array, unit = quantities.with_unit(given)
             extra[key] = to_si(as_channel(owner, f"channel {key!r}", array, n), unit or "")[0]
         values["channels"] = MappingProxyType({k: _frozen(v) for k, v in extra.items()})
+        given = self.name != type(self).name and getattr(self.name, "given", True)
+        run = digest((values["t"], values["u"], *values["outputs"].values()))
+        values["name"] = RecordName(self.name, run, given)
         for key, value in values.items():
             object.__setattr__(self, key, _frozen(value) if isinstance(value, np.ndarray) else value)
 
@@ -267,7 +271,8 @@ class Measurement:
             output = mapping("from_response", "outputs", outputs, "{'x': 0, 'v': 1}")
         t, u, y = readers.read_response(response, input, output)
         keywords.setdefault("input_hold", "linear")
-        keywords.setdefault("name", getattr(response, "sysname", None) or "response")
+        # every response of that system has this name
+        keywords.setdefault("name", RecordName(getattr(response, "sysname", None) or "response", given=False))
         return cls(t, u, **({"y": y} if outputs is None else {"outputs": y}), **keywords)
 
     @classmethod
@@ -458,12 +463,16 @@ class Measurement:
     def replaced(self, **changes):
         """Copy without checking again: a part of a good record may well have a constant input.
 
-        A `y` alone takes the place of all outputs.
+        A `y` alone takes the place of all outputs. The copy is still of the run that the record is of.
         """
         if "y" in changes:
             changes["outputs"] = {self.output: changes["y"]}
         if "outputs" in changes:
             changes |= self._led(changes["outputs"])
+        if not isinstance(name := changes.get("name", self.name), RecordName):
+            changes["name"] = RecordName(
+                name, getattr(self.name, "run", ""), getattr(self.name, "given", True)
+            )
         part = object.__new__(type(self))
         for f in dataclasses.fields(self):
             value = changes.get(f.name, getattr(self, f.name))

@@ -108,6 +108,13 @@ class Dataset(ABC):
             )
         return self
 
+    def warn_of_means(self, model, moved=()) -> None:
+        """Warn where the model has values by record and none for some of these; tables share all of them.
+
+        `moved`: parameters that are about to be fitted to these.
+        """
+        return None
+
     def with_own(self, model, names):
         """Return a model of which every record has these parameters for itself; tables share all of them."""
         if names:

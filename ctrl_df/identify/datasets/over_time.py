@@ -14,7 +14,7 @@ from ..prediction.prepared import REFERENCE
 from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
-from ..prediction.values import block_of, for_record, with_own
+from ..prediction.values import block_of, for_record, warn_of_means, with_own
 from ..results.comparison import Comparison, RecordComparison
 from ..selection.structure_search import StructureSearch
 from ..shooting.multiple_shooting import Stage
@@ -42,6 +42,10 @@ class TimeDataset(Dataset):
     def block_of(self, model):
         """Return the block itself, or that of a loop."""
         return block_of(model)
+
+    def warn_of_means(self, model, moved=()):
+        """Warn where the model has values by record, and none for some of these."""
+        warn_of_means(model, self.records, moved)
 
     def with_own(self, model, names):
         """Return the model marked so; of one record alone it is as it was."""

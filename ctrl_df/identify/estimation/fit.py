@@ -23,7 +23,7 @@ from ..shooting.thresholds import AT_BOUND, ON_BOUND
 from ..shooting.variables import Prior, default_free, priors, step_of_sensor
 from ..thresholds import NOTHING, RTOL
 from .covariance import covariance_of
-from .own_values import OwnValue, at_bounds, merged, own_values, strongest
+from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
 from .sensitivity import OutputSensitivity
 from .sigma_points import sigma_points
 from .thresholds import EFFORT_SHORT, RESTARTS_KEPT
@@ -41,7 +41,7 @@ class FitResult:
         Names of the records.
     names, values : tuple of str, tuple of float
         The free parameters. Of those that every record has for itself (`PerRecord`) what follows is of their
-        mean over the records.
+        mean over the records, weighted by one over the variance where that is known.
     covariance : (p, p) array
         Of `values`, for residuals of the colour seen.
     residual, simulated : list of (n,) array
@@ -60,9 +60,10 @@ class FitResult:
     converged : bool
         Whether the last step promised less than a thousandth of the cost.
     at_bound : tuple of bool
-        Per parameter.
-    null : list of (float, array)
-        Relative singular value and direction (in scaled parameters) the data do not determine.
+        Per parameter; of those that every record has for itself, whether it stands there in all of them.
+    null : list of (float, list of (str, str or None, float))
+        Directions that the data do not determine: relative singular value, and what takes part, by name and
+        record (None: shared by all), with its move in scaled parameters.
     scale : (p,) array
         Natural scale of each parameter.
     own : mapping of str to mapping of str to OwnValue
@@ -392,7 +393,6 @@ def _with_slopes(stage: Stage, found: Solution, central: bool = False) -> Soluti
 def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     """Return the outcome of a fit; `errors`: with covariance, from the derivatives of its last step."""
     problem, theta, residual = stage.problem, found.theta, found.residual
-    values = problem.named(theta)
     covariance, null, linear = np.zeros((0, 0)), [], None
     if problem.names and found.slopes is not None:
         by_parameter = [problem.in_columns(k, slopes) for k, slopes in enumerate(found.slopes[0])]
@@ -402,6 +402,8 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
             covariance, null = covariance_of(stage, found, linear())
             slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
             covariance = covariance * np.outer(slopes, slopes)
+    weights = weights_of(problem, covariance, null)
+    values = problem.named(theta, weights)
     at_bound = at_bounds(problem, theta, _at_bound)
     scale = np.array([max(v.scale, v.natural) for v in problem.variables])
     total, count = stage.power(residual)
@@ -411,7 +413,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         records=tuple(r.name for r in problem.records),
         names=problem.names,
         values=tuple(values[k] for k in problem.names),
-        covariance=merged(problem, covariance),
+        covariance=merged(problem, covariance, weights),
         residual=residual,
         simulated=[m - e for m, e in zip(stage.measured, residual, strict=True)],
         count=count,
@@ -421,9 +423,9 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         nrmse=math.sqrt(total / spread),
         nfev=round(problem.nfev),
         converged=found.converged,
-        at_bound=tuple(strongest(problem, at_bound)),
-        null=[(size, np.array(strongest(problem, direction))) for size, direction in null],
-        scale=np.array(strongest(problem, scale)),
+        at_bound=tuple(by_name(problem, at_bound, all)),
+        null=[(size, parts_of(problem, direction)) for size, direction in null],
+        scale=np.array(by_name(problem, scale, max)),
         own=own_values(problem, values, covariance, null, at_bound, scale),
         starts=found.states.values,
         segments=stage.segments,

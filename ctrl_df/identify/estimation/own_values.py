@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from ...per_record import PerRecord
 from ..prediction.values import in_record
 from ..shooting.problem import Problem
 from ..thresholds import TAKES_PART
@@ -33,44 +35,76 @@ class OwnValue:
 
 
 def own_values(problem: Problem, named, covariance, null, at_bound, scale) -> dict[str, dict[str, OwnValue]]:
-    """Return them by name, then by record.
+    """Return them by name, then by record: those in `named` that are a `PerRecord`.
 
     `named`: values as `Problem.named` has them; the arrays are of all variables of the problem.
     """
     unknown = np.full(len(scale), math.nan)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0)) if len(covariance) else unknown
-    open_ = [i for i in range(len(scale)) if any(abs(d[i]) > TAKES_PART for _, d in null)]
-    found: dict[str, dict[str, OwnValue]] = {name: {} for name in problem.names if name in problem.own}
+    open_ = _open(null, len(scale))
+    found: dict[str, dict[str, OwnValue]] = {k: {} for k in problem.names if isinstance(named[k], PerRecord)}
     for k, record in enumerate(problem.records):
         for name, i in zip(problem.names, problem.of_record[k], strict=True):
             if name in found:
                 value, error = in_record(named[name], record.name), float(errors[i])
-                known = i not in open_ and error <= max(abs(value), scale[i])
+                known = not open_[i] and error <= max(abs(value), scale[i])
                 found[name][record.name] = OwnValue(value, error, at_bound[i], known)
     return found
 
 
 def at_bounds(problem: Problem, theta, is_at_bound) -> list[bool]:
-    """Return ``is_at_bound(variable, q, value)`` for all variables; `value`: what became of it."""
-    found = [False] * len(theta)
+    """Return ``is_at_bound(variable, q, value)`` for all variables; `value`: what became of it.
+
+    A shared one stands at a bound where it does so in all records.
+    """
+    found = [True] * len(theta)
     for k, of in enumerate(problem.of_record):
         values = problem.values(theta, k) or {}
         for i in of:
-            found[i] = is_at_bound(problem.variables[i], theta[i], values[problem.variables[i].name])
+            found[i] &= is_at_bound(problem.variables[i], theta[i], values[problem.variables[i].name])
     return found
 
 
-def merged(problem: Problem, covariance) -> np.ndarray:
+def weights_of(problem: Problem, covariance, null) -> np.ndarray:
+    """Return what all variables count in means over the records: one over the variance, of a sum of 1.
+
+    Those in a direction that the data do not determine count nothing, unless that holds in all records.
+    """
+    first, n = problem.first, len(problem.variables)
+    found = np.ones(n)
+    variances = np.diag(covariance) if len(covariance) else np.ones(n)
+    known = np.isfinite(variances) & (variances > 0) & ~_open(null, n)
+    for i, j in pairwise([*first, n]):
+        if np.any(known[i:j]):
+            found[i:j] = np.where(known[i:j], np.min(variances[i:j][known[i:j]]), 0)
+            found[i:j][known[i:j]] /= variances[i:j][known[i:j]]
+        found[i:j] /= np.sum(found[i:j])
+    return found
+
+
+def merged(problem: Problem, covariance, weights) -> np.ndarray:
     """Return the covariance (names, names) of the means over the records, from that of all variables."""
     if not len(covariance):
         return covariance
-    first = problem.first
-    sizes = np.diff([*first, len(covariance)])
-    sums = np.add.reduceat(np.add.reduceat(covariance, first, axis=0), first, axis=1)
-    return sums / np.outer(sizes, sizes)
+    first, counted = problem.first, covariance * np.outer(weights, weights)
+    return np.add.reduceat(np.add.reduceat(counted, first, axis=0), first, axis=1)
 
 
-def strongest(problem: Problem, values) -> list:
-    """Return of all variables of a name the value that is largest, either way."""
-    edges = [*problem.first, len(values)]
-    return [max(values[i:j], key=abs) for i, j in zip(edges[:-1], edges[1:], strict=True)]
+def by_name(problem: Problem, values, pick) -> list:
+    """Return ``pick`` of the values of all variables of a name."""
+    return [pick(values[i:j]) for i, j in pairwise([*problem.first, len(values)])]
+
+
+def parts_of(problem: Problem, direction) -> list[tuple[str, str | None, float]]:
+    """Return what takes part in a direction: name, record (None: shared by all), move."""
+    found = []
+    for name, i, j in zip(problem.names, problem.first, [*problem.first[1:], len(direction)], strict=True):
+        records = [r.name for r in problem.records] if name in problem.own else [None]
+        moves = zip(records, direction[i:j], strict=True)
+        found += [(name, record, float(d)) for record, d in moves if abs(d) > TAKES_PART]
+    return found
+
+
+def _open(null, n) -> np.ndarray:
+    """Return which of n variables take part in a direction that the data do not determine."""
+    return np.any([np.zeros(n, bool), *(np.abs(d) > TAKES_PART for _, d in null)], axis=0)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from ...per_record import PerRecord
-from ..prediction.values import block_of, in_record, is_own, with_values
+from ..prediction.values import block_of, in_record, is_own, knows, with_values
 from .fit import FitResult
 from .thresholds import ANGLE_WORTH, ANGLES, EFFORT_OWN
 
@@ -62,9 +62,9 @@ def unknown_angles(model, names: Sequence[str], records: Sequence) -> list[str]:
     """Return the angles among the parameters of which a model does not know what several records have."""
     if len(records) < 2:
         return []
-    table, records_named = block_of(model).parameters, {r.name for r in records}
-    angles = [k for k in names if table[k].per_record]
-    return [k for k in angles if not records_named <= getattr(table[k].value, "values", {}).keys()]
+    table = block_of(model).parameters
+    angles = {k: table[k].value for k in names if table[k].per_record}
+    return [k for k, v in angles.items() if not all(knows(v, r.name) for r in records)]
 
 
 def begun_with_angles(model, names: Sequence[str], records: Sequence, starts, fit: Refit):

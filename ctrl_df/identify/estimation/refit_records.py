@@ -16,7 +16,7 @@ from ..prediction.segments import facts, make_segments
 from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SEGMENT_LEAST
 from ..shooting.variables import priors, step_of_sensor
-from ..thresholds import PROCESS_NOISE, TAKES_PART
+from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .per_record import begun_with_angles, unknown_angles
@@ -142,43 +142,68 @@ def _with_step(found: FitResult, records, names, whole) -> FitResult:
 
 
 def blurred(found: FitResult) -> set[str]:
-    """Return the parameters in a null direction, or uncertain by more than themselves."""
-    names = set()
-    for _, direction in found.null:
-        names |= {k for k, d in zip(found.names, direction, strict=True) if abs(d) > TAKES_PART}
+    """Return the parameters in a null direction, or uncertain by more than themselves.
+
+    Those that every record has for itself where that holds in all records.
+    """
+    names = {k for _, parts in found.null for k, _, _ in parts if k not in found.own}
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0)) if len(found.names) else np.zeros(0)
     for k, value, error, scale in zip(found.names, found.values, errors, found.scale, strict=True):
-        if not math.isfinite(error) or error > max(abs(value), scale):
+        if k not in found.own and (not math.isfinite(error) or error > max(abs(value), scale)):
             names.add(k)
-    return names
+    return names | {k for k, own in found.own.items() if not any(v.determined for v in own.values())}
 
 
 def doubts(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every direction the data do not determine."""
-    lines, named = [], set()
-    for _, direction in found.null:
-        parts = [(k, d) for k, d in zip(found.names, direction, strict=True) if abs(d) > TAKES_PART]
-        parts.sort(key=lambda p: -abs(p[1]))
-        named |= {k for k, _ in parts}
-        if len(parts) == 1:
-            lines.append(f"{parts[0][0]} leaves no trace in these data: its value is the start value.")
+    lines, told, alone = [], set(), {}
+    for parts in (part for _, whole in found.null for part in _by_record(whole)):
+        moves: dict[str, float] = {}
+        for k, _, d in sorted(parts, key=lambda p: -abs(p[2])):
+            moves.setdefault(k, d)
+        told |= {(k, r) for k, r, _ in parts}
+        if len(moves) == 1:
+            for k, record, _ in parts:
+                alone.setdefault(k, {})[record] = None
             continue
-        signs = [p[1] * parts[0][1] > 0 for p in parts]
-        up = ", ".join(k for (k, _), s in zip(parts, signs, strict=True) if s)
-        down = ", ".join(k for (k, _), s in zip(parts, signs, strict=True) if not s)
-        change = (
-            f"raising {up}"
-            + (f" while lowering {down}" if down else "")
-            + (" together" if len(parts) > 1 else "")
-        )
+        names = {k: _of(k, [r for n, r, _ in parts if n == k], found) for k in moves}
+        first = next(iter(moves.values()))
+        up = ", ".join(names[k] for k, d in moves.items() if d * first > 0)
+        down = ", ".join(names[k] for k, d in moves.items() if d * first <= 0)
+        change = f"raising {up}" + (f" while lowering {down}" if down else "") + " together"
         lines.append(
-            f"{' and '.join(k for k, _ in parts)} cannot be told apart on these data: {change} leaves the "
+            f"{' and '.join(names.values())} cannot be told apart on these data: {change} leaves the "
             "output as it is. Fix one of them, or excite the drive otherwise."
         )
-    for k in sorted(blurred(found) - named, key=found.names.index):
-        lines.append(f"{k} is less certain than it is large: these data do not determine it.")
-    for k, values in found.own.items():
-        open_ = [record for record, own in values.items() if not own.determined]
-        if open_ and k not in named | blurred(found):
-            lines.append(f"{k} is not determined by {' and '.join(open_)}.")
+    for k, records in alone.items():
+        lines.append(
+            f"{_of(k, [*records], found)} leaves no trace in these data: its value is the start value."
+        )
+    doubtful = blurred(found)
+    for k in found.names:
+        if k in found.own:
+            open_ = [r for r, own in found.own[k].items() if not own.determined]
+            left = [r for r in open_ if not {(k, r), (k, None)} & told]
+            if left and len(left) < len(found.own[k]):
+                lines.append(f"{k} is not determined by {' and '.join(left)}.")
+                continue
+            doubt = bool(left)
+        else:
+            doubt = k in doubtful and (k, None) not in told
+        if doubt:
+            lines.append(f"{k} is less certain than it is large: these data do not determine it.")
     return tuple(lines)
+
+
+def _by_record(parts) -> list[list]:
+    """Return a direction as it is, or, of own parameters alone, that of each record: they do not meet."""
+    if any(record is None for _, record, _ in parts):
+        return [parts]
+    records = dict.fromkeys(record for _, record, _ in parts)
+    return [[p for p in parts if p[1] == record] for record in records]
+
+
+def _of(name, records, found: FitResult) -> str:
+    """Return a name with the records it is of, unless these are all."""
+    every = found.own.get(name, {})
+    return name if None in records or len(records) == len(every) else f"{name} of {' and '.join(records)}"

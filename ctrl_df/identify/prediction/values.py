@@ -6,6 +6,7 @@ records' own. The model carries these values wherever it goes; a simulator takes
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -54,6 +55,26 @@ def in_record(value: float, record: str) -> float:
     return value.of(record) if isinstance(value, PerRecord) else float(value)
 
 
+def knows(value: float, record: str) -> bool:
+    """Whether a value tells what it is in the record of that name alone."""
+    return isinstance(value, PerRecord) and value.knows(record)
+
+
+def warn_of_means(model, records, moved: Iterable[str] = ()):
+    """Warn where a model has values by record and a record is none of these; `moved`: names fitted to it."""
+    table, moved = getattr(block_of(model), "parameters", {}), set(moved)
+    own = {k: p.value for k, p in table.items() if isinstance(p.value, PerRecord) and k not in moved}
+    lacking = [(k, r.name) for k, v in own.items() if v.values for r in records if not v.knows(r.name)]
+    if lacking:
+        taken, strangers = (" and ".join(dict.fromkeys(words)) for words in zip(*lacking, strict=True))
+        warnings.warn(
+            f"the model has a value for each record of {taken}, and none for {strangers}: "
+            "the mean over the records fitted is taken. Give every record a name of its own (name=), the "
+            "same in the fit and here, or take fit.model_of(record).",
+            stacklevel=4,
+        )
+
+
 def with_own(model, names: Iterable[str]):
     """Return a model of which every record has these parameters for itself."""
     block = block_of(model)
@@ -95,6 +116,7 @@ def _raised(block: Mechanism, values: dict[str, float]) -> dict[str, float]:
             ]
         )
         for name in statics:
-            if values.get(name, current[name].value) < kinetic:
-                values[name] = kinetic
+            value = values.get(name, current[name].value)
+            if value < kinetic:
+                values[name] = PerRecord(kinetic, value.values) if isinstance(value, PerRecord) else kinetic
     return values

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import known_name
+from ...record_name import RecordName, among
 from ..prediction.values import for_record
 from ..residuals.comparison_base import ComparisonBase
 
@@ -60,8 +61,9 @@ class Fit:
     ----------
     model : block or loop
         The model given, with the parameters found. Of those that every record has for itself it shows the
-        mean (of angles its direction), and knows the values by the names of the records: `compare` takes each
-        record's own, and the mean for records of other names. See `model_of`.
+        mean (of angles its direction), each value weighted by one over its variance, and knows the records,
+        by the names that were given to them alone, others by their data: `compare` takes each record's own
+        values, and for any other the mean, with a warning. See `model_of`.
     parameters : mapping of str to FittedParameter
         Those that were free and that all records share.
     comparison : ComparisonBase
@@ -99,10 +101,29 @@ class Fit:
     own: Mapping[str, Mapping[str, FittedParameter]] = field(default_factory=dict)
 
     def model_of(self, record) -> Any:
-        """Return the model with the values that it has in one record of this fit, or in that of a name."""
+        """Return the model with the values that it has in one record of this fit, or in that of a name.
+
+        A record is known by its name where that was given to it alone, or by its data.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A record, or a name, that is none of this fit.
+        """
         known = [r.record.name for r in self.comparison.records]
-        name = known_name("model_of", "record", getattr(record, "name", record), known)
-        return for_record(self.model, name)
+        asked = getattr(record, "name", record)
+        name = among(asked, known) if isinstance(asked, str) else None
+        if name is None and isinstance(asked, RecordName):
+            same = [k for k in known if getattr(k, "run", "") == asked.run]
+            name = same[0] if len(same) == 1 else None
+            if name is None and asked in known:
+                raise ValueError(
+                    f"model_of needs a record of this fit; got {asked!r}, which is not the one of that name "
+                    "(made up, as it had none of its own). Give every record a name, or pass the one fitted."
+                )
+        return for_record(
+            self.model, known_name("model_of", "record", asked, known) if name is None else name
+        )
 
     @property
     def nrmse(self) -> float:

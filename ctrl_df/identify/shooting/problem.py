@@ -9,7 +9,7 @@ import numpy as np
 from ...per_record import PerRecord
 from ..prediction.initial_states import FREE
 from ..prediction.segments import facts_of
-from ..prediction.values import block_of, feasible, for_record, is_own, with_values
+from ..prediction.values import block_of, feasible, for_record, in_record, is_own, with_values
 from .thresholds import NUDGE_FIRST
 from .variables import beforehand, variables_of
 
@@ -44,6 +44,9 @@ class Problem:
         self.followed = followed
         self.block = block_of(model)
         self.blocks = [for_record(self.block, r.name) for r in self.records]
+        self.raised = [
+            _raised_in(b, self.block, r.name) for b, r in zip(self.blocks, self.records, strict=True)
+        ]
         self.known = [facts_of(self.block, r) for r in records]
         self.own = frozenset(k for k in names if len(self.records) > 1 and is_own(self.block.parameters[k]))
         self.variables = variables_of(self.block, names, self.records, self.known[0], limits, self.own)
@@ -63,12 +66,19 @@ class Problem:
     def values(self, theta, k):
         """Return the parameters in record `k` by name, static levels kept above the kinetic one."""
         given = {self.variables[i].name: self.variables[i].p(theta[i]) for i in self.of_record[k]}
-        return feasible(self.blocks[k], given) if given else None
+        return feasible(self.blocks[k], self.raised[k] | given) if given else None
 
-    def named(self, theta) -> dict[str, float]:
-        """Return the parameters by name, those that differ from record to record for each of them."""
+    def named(self, theta, weights=None) -> dict[str, float]:
+        """Return the parameters by name, those that differ from record to record for each of them.
+
+        A shared static level stays what it is where it lies below the kinetic one of some record: there
+        `for_record` raises it. Below that of a record not known it cannot stay, and is one of each record.
+
+        `weights`: of all variables, in means over the records; None: all count the same.
+        """
         tables = [self.values(theta, k) or {} for k in range(len(self.records))]
         found: dict[str, float] = {}
+        split: dict[str, PerRecord] = {}
         for name in dict.fromkeys(name for table in tables for name in table):
             known = [b.parameters[name].value for b in self.blocks]
             each = [float(t[name] if name in t else v) for t, v in zip(tables, known, strict=True)]
@@ -76,8 +86,21 @@ class Problem:
                 found[name] = each[0]
                 continue
             by_record = {r.name: value for r, value in zip(self.records, each, strict=True)}
-            found[name] = PerRecord.over(by_record, self.block.parameters[name].per_record)
-        return found
+            angle, counts = self.block.parameters[name].per_record, None
+            if name in self.own and weights is not None:
+                first = self.first[self.names.index(name)]
+                counts = list(weights[first : first + len(self.records)])
+            value = PerRecord.over(by_record, angle, counts)
+            if name in self.own:
+                found[name] = value
+                continue
+            split[name] = value
+            found[name] = self.block.parameters[name].value
+            if name in self.names:
+                i = self.first[self.names.index(name)]
+                found[name] = self.variables[i].p(theta[i])
+        usual = feasible(self.block, found) if split else found
+        return found | {k: v for k, v in split.items() if usual[k] != found[k]}
 
     def model_at(self, theta):
         """Return the model with these parameters."""
@@ -115,3 +138,11 @@ class Problem:
         if self.error_filter is None:
             return 1.0
         return (self.error_filter.step * self.known[0].dt) ** self.error_filter.order
+
+
+def _raised_in(own, block, record) -> dict[str, float]:
+    """Return the static levels, as a block has them, that are raised in that of a record."""
+    if own is block:
+        return {}
+    statics = {k: in_record(p.value, record) for k, p in block.parameters.items() if p.threshold}
+    return {k: v for k, v in statics.items() if own.parameters[k].value != v}
