@@ -84,9 +84,9 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         return [_regressed(k, m, s, residual, noise, segments, units, beside) for k, m, s in tables]
 
     found = regressed(noise)
-    telling, explained = max(found, key=lambda f: f[0].evidence, default=(None, residual))
-    if telling is not None and telling.evidence > 0:
+    if found:
         # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
+        _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
         found = regressed(noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER))
     unit, best = tried.train.unit, {}
