@@ -1,7 +1,7 @@
 """Judge diagnoses on the rigs of the second generator.
 
     python benchmarks/second.py --save FILE [--single 0:87] [--nothing 0:21] [--outside 0:16] [--double 0:14]
-        [--triple 0:6] [--limit 600] [--peers] [--table]
+        [--triple 0:6] [--limit 600] [--peers] [--table] [--diagram PNG]
 
 Each rig is one line of FILE; a second run goes on from there, ``--table`` only prints. One process works; a
 rig that takes more processor time than the limit [s] is stopped and counts as a miss. A miss is told with its
@@ -27,7 +27,7 @@ for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import numpy as np
 import rigs_second as rigs
-from second_table import table
+from second_table import claims_of, draw_reliability, table
 
 import ctrl_df as cdf
 
@@ -242,6 +242,7 @@ def main(arguments=None):
     parser.add_argument("--until", default="", help="HH:MM, begin no rig after that")
     parser.add_argument("--peers", action="store_true")
     parser.add_argument("--table", action="store_true")
+    parser.add_argument("--diagram", metavar="PNG", help="draw the reliability of the probabilities")
     args = parser.parse_args(arguments)
     saved = Path(args.save)
     rows = [json.loads(line) for line in saved.read_text().splitlines()] if saved.exists() else []
@@ -265,6 +266,8 @@ def main(arguments=None):
         print(brief, f"{row.get('seconds', args.limit):.0f} s", file=sys.stderr, flush=True)
     worker.close()
     print(table(rows))
+    if args.diagram:
+        draw_reliability(claims_of(rows), args.diagram)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from scipy.stats import binomtest
 
 EDGE = 5.5  # times the noise: what is hidden shows little below, clearly above
 BINS = (0.0, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0)
+DRAWN = (0.0, 0.5, 0.8, 0.95, 1.0)  # points that stand apart
 
 
 def share(right, of):
@@ -58,7 +59,7 @@ def table(rows):
     line("outside the library: region right", "85 %", of["outside"], lambda r: r.get("region"))
     line("two hidden: both in the final model", "90 %", of["double"], lambda r: r.get("all"))
     line("three hidden: all in the final model", "75 %", of["triple"], lambda r: r.get("all"))
-    claims = [r for k in ("single", "nothing", "outside") for r in of[k] if _claim(r)]
+    claims = claims_of(rows)
     line(
         "said at 95 % or more: right",
         "95 %",
@@ -102,20 +103,55 @@ def honest(row):
     return row.get("first") or row.get("verdict") in ("ambiguous", "none")
 
 
-def _claim(row):
-    return row.get("verdict") in ("effect", "ambiguous")
+def claims_of(rows):
+    """Return the rows of one diagnosis that names an effect, with a probability."""
+    said = ("effect", "ambiguous")
+    return [r for r in rows if r["job"][0] in ("single", "nothing", "outside") and r.get("verdict") in said]
+
+
+def binned(claims, bins=BINS):
+    """Yield least and largest probability said, how often, how often it was right, and the mean said."""
+    for low, high in zip(bins, bins[1:], strict=False):
+        part = [r for r in claims if low <= r["said"] < high or (high == 1.0 and r["said"] >= high)]
+        if part:
+            right = sum(bool(r.get("first")) for r in part)
+            yield low, high, len(part), right, np.mean([min(r["said"], 1.0) for r in part])
 
 
 def reliability(claims):
     """Return how often what was said with a probability was right."""
     lines = ["| probability said | times | right | mean said |", "|---|---|---|---|"]
-    for low, high in zip(BINS, BINS[1:], strict=False):
-        part = [r for r in claims if low <= r["said"] < high or (high == 1.0 and r["said"] >= high)]
-        if part:
-            right = sum(bool(r.get("first")) for r in part)
-            mean = np.mean([min(r["said"], 1.0) for r in part])
-            lines.append(f"| {low:g} to {high:g} | {len(part)} | {share(right, len(part))} | {mean:.4f} |")
+    for low, high, times, right, mean in binned(claims):
+        lines.append(f"| {low:g} to {high:g} | {times} | {share(right, times)} | {mean:.4f} |")
     return lines
+
+
+def draw_reliability(claims, path):
+    """Draw the share that was right over the probability said, with 95 % intervals."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    fig, ax = plt.subplots(figsize=(3.6, 3.3), layout="constrained")
+    ax.plot([0, 1], [0, 1], color="#8a94a0", lw=0.8)
+    for _, _, times, right, mean in binned(claims, DRAWN):
+        low, high = binomtest(right, times).proportion_ci(method="wilson")
+        ax.plot([mean, mean], [low, high], color="#c8501e", lw=1.2)
+        ax.plot(mean, right / times, "o", ms=4, color="#c8501e")
+        ax.annotate(
+            f"{right} of {times}", (mean, right / times), (-6, 2), textcoords="offset points", ha="right",
+            va="bottom", fontsize=8,
+        )  # fmt: skip
+    ax.set(
+        xlim=(0, 1.03),
+        ylim=(-0.03, 1.03),
+        xlabel="probability said",
+        ylabel="share that was right",
+        aspect="equal",
+    )
+    ax.spines[["top", "right"]].set_visible(False)
+    fig.savefig(path, dpi=160)
 
 
 def misses(rows):
