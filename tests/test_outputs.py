@@ -249,7 +249,9 @@ def test_low_rates_short_and_long_records_are_fitted(dt, count):
     x = x + 1e-4 * np.random.default_rng(5).standard_normal(count)
     fit = cdf.refit(START, cdf.Measurement(t, force, x))
     assert fit.parameters["mass"].value == pytest.approx(2.2, rel=2e-3)
-    assert fit.comparison.rmse == pytest.approx(1e-4, rel=0.1)
+    # a long record is decimated: the low-pass leaves 70 % of the new band
+    share = 0.7 * len(fit.comparison.records[0].record) / count if count > 100_000 else 1.0
+    assert fit.comparison.rmse == pytest.approx(1e-4 * np.sqrt(share), rel=0.1)
 
 
 def test_a_pause_of_the_drive_does_no_harm():
