@@ -33,4 +33,4 @@ def shortened(record: Measurement, motion: bool = False) -> Measurement:
         return record
     note = f"1 of {factor} samples, of what is below {THINNED_BAND * 0.5 / (factor * record.dt):.3g} Hz"
     _LOGGER.info("record %r: %s", record.name, note)
-    return record.decimate(factor).replaced(note="; ".join(filter(None, (record.note, note))))
+    return record.decimate(factor).noted(note)

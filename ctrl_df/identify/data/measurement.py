@@ -479,6 +479,10 @@ class Measurement:
             object.__setattr__(part, f.name, _frozen(value) if isinstance(value, np.ndarray) else value)
         return part
 
+    def noted(self, note: str, **changes):
+        """Copy as `replaced` does; `note` is added to what is said of how the record was read."""
+        return self.replaced(note="; ".join(filter(None, (self.note, note))), **changes)
+
     def _led(self, outputs) -> dict[str, Any]:
         """Return the fields that go with these outputs."""
         output = quantities.leading(outputs)

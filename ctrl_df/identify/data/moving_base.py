@@ -69,9 +69,9 @@ def seen_from_base(model, record: Measurement) -> Measurement:
     if velocity is not None and given < 2:
         velocity = velocity - base(1)
     how = f", its motion low-passed at {cutoff:.3g} Hz" if given < 2 else ""
-    seen = record.replaced(
-        u=-mass * base(2), input="force", input_unit=moves.force_unit, input_hold="linear", outputs=outputs,
-        velocity=velocity, note="; ".join(filter(None, (record.note, f"seen from its base{how}"))),
+    seen = record.noted(
+        f"seen from its base{how}", u=-mass * base(2), input="force", input_unit=moves.force_unit,
+        input_hold="linear", outputs=outputs, velocity=velocity,
     )  # fmt: skip
     # low-passed, the motion is not known at the very ends
     ends = 1 / cutoff if cutoff else 0.0

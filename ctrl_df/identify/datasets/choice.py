@@ -28,12 +28,13 @@ def dataset_of(model, data, holdout=None, name: str = "data") -> Dataset:
     ValueError
         A record both fitted and held out.
     """
-    of, kind = (as_tables, TableDataset) if has_tables(data) else (as_records, TimeDataset)
+    tables = has_tables(data)
+    of = as_tables if tables else as_records
     records: Any = of(data, name)
     validation: Any = () if holdout is None else of(holdout, "holdout")
     check_held_out(records, validation)
-    if kind is TableDataset:
-        return kind(records, validation)
+    if tables:
+        return TableDataset(records, validation)
     named = distinguished((*records, *validation))
     moving = any(moves_base(model, r) for r in named)
     named = tuple(shortened(r, motion=moving) for r in named)

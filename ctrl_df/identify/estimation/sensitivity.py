@@ -90,10 +90,7 @@ class OutputSensitivity:
             return lambda x: x
         parts = []
         for states, segments in zip(self.states, self.segments, strict=True):
-            where = [np.arange(len(states))[w] for w in segments.places]
-            owner = np.empty(len(states), int)
-            for w, rows in enumerate(where):
-                owner[rows] = w
+            owner = segments.spread(np.arange(len(segments)))
             ns = states.shape[1]
             columns = owner[:, None] * ns + np.arange(ns)
             shape = (len(states), len(segments) * ns)

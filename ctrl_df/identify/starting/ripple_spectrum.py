@@ -170,10 +170,7 @@ class RippleSpectrum:
     def _apart(self, parts) -> list[list[np.ndarray]]:
         """Return parts of all records as those of each, and nothing in the others."""
         of = [k for k, runs in enumerate(self._runs) for _ in runs]
-        return [
-            [p if k == i else np.zeros_like(p) for i, p in zip(of, parts, strict=True)]
-            for k in range(len(self.records))
-        ]
+        return apart(parts, of, len(self.records))
 
     def _parts(self, signals) -> list[np.ndarray]:
         """Return second differences of means over samples, one array for each part without holes."""
@@ -252,3 +249,10 @@ def _weights(left) -> np.ndarray:
     level = [np.median(power[max(int(m / 1.4) - 2, 1) : int(m * 1.4) + 3]) / math.log(2) for m in middles]
     logs = np.interp(np.log(np.arange(1, n)), np.log(middles), np.log(np.array(level) + NOTHING))
     return np.append(0.0, np.exp(-0.5 * logs))
+
+
+def apart(parts, of, records: int) -> list[list[np.ndarray]]:
+    """Return parts as those of each record, and nothing in the others; `of`: the number of each one's."""
+    return [
+        [p if k == i else np.zeros_like(p) for i, p in zip(of, parts, strict=True)] for k in range(records)
+    ]

@@ -10,7 +10,7 @@ import numpy as np
 from ...per_record import PerRecord
 from .extend import extended
 from .regression import own_values
-from .ripple_spectrum import RippleSpectrum, Wave
+from .ripple_spectrum import RippleSpectrum, Wave, apart
 from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, WAVE_TRIED
 
 
@@ -51,19 +51,15 @@ def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, 
         change = None if block is None else screen.change(block)
         if change is None:
             return None
-        apart = any(p.per_record for p in effect.parameters.values())
-        pair.append([screen.project(c) for c in (_apart(change) if apart else [change])])
+        own = any(p.per_record for p in effect.parameters.values())
+        each = apart(change, range(len(change)), len(change)) if own else [change]
+        pair.append([screen.project(c) for c in each])
     matrix = np.array([column for columns in zip(*pair, strict=True) for column in columns]).T
     w, *_ = np.linalg.lstsq(matrix, screen.residual, rcond=None)
     left = float(np.sum((screen.residual - matrix @ w) ** 2))
     each = w.reshape(-1, 2)
     phase = PerRecord.angles([r.name for r in screen.view.records], [math.atan2(b, a) for a, b in each])
     return left, size * float(np.mean(np.hypot(*each.T))), phase
-
-
-def _apart(change) -> list[list[np.ndarray]]:
-    """Return a change in all records as those in each, and none in the others."""
-    return [[c if k == i else np.zeros_like(c) for i, c in enumerate(change)] for k in range(len(change))]
 
 
 def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
