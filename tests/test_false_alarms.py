@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
+from ctrl_df.identify.estimation.sensitivity import OutputSensitivity
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.residuals.missing_forces import _motion, missing_forces
 from ctrl_df.identify.selection.evidence import ranked
@@ -83,3 +84,25 @@ def test_a_whitening_matrix_does_what_the_filter_does():
         OutputNoise(slow.a, 2.0, 1, (NoiseModel(np.array([0.5]), 4.0),)),
     ):
         assert np.allclose(noise.matrix(pieces) @ x, noise.filtered(x, pieces))
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_what_dependent_starts_can_do_is_taken_away(outputs):
+    run = record(0)
+    segments = make_segments(run, 1.0)
+    if outputs == 2:
+        v = np.gradient(run.y, run.t)
+        segments = make_segments(cdf.Measurement(run.t, run.u, outputs={"x": run.y, "v": v}), 1.0)
+    n = len(segments.samples) * outputs
+    rng = np.random.default_rng(0)
+    one, two = rng.standard_normal((2, n))
+    # the far mass of a gap that never closes does nothing; beside a stiff spring both do nearly the same
+    states = np.column_stack([one, two, one - two, one * (1 + 1e-11), np.zeros(n)])
+    columns, ridge = rng.standard_normal((n, 2)), np.full((1, 5), 1e-3)
+    sensitivity = OutputSensitivity([columns], [states], [segments], [ridge])
+    slow = NoiseModel(np.array([0.9]), 0.1)
+    noise = slow if outputs == 1 else OutputNoise(slow.a, 0.1, 1, (NoiseModel(np.array([0.5]), 0.2),))
+    taken = sensitivity.beside(noise)
+    size = rng.standard_normal(len(segments))
+    did = noise.filtered(states[:, :4] * segments.spread(size)[:, None], sensitivity.pieces)
+    assert np.max(np.abs(taken(did))) < 1e-8 * np.max(np.abs(did))

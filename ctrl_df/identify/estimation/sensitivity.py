@@ -86,20 +86,13 @@ class OutputSensitivity:
 
     def _states_taken(self, noise: NoiseModel) -> Callable[[np.ndarray], np.ndarray]:
         """Return what takes from whitened signals all that initial states could explain: sparse columns."""
-        if self.error_filter is not None or not any(s.size for s in self.states):
+        if self.error_filter is not None or not any(np.any(s) for s in self.states):
             return lambda x: x
-        parts = []
-        for states, segments in zip(self.states, self.segments, strict=True):
-            owner = segments.spread(np.arange(len(segments)))
-            ns = states.shape[1]
-            columns = owner[:, None] * ns + np.arange(ns)
-            shape = (len(states), len(segments) * ns)
-            rows = np.repeat(np.arange(len(states)), ns)
-            parts.append(sparse.csr_array((states.ravel(), (rows, columns.ravel())), shape=shape))
-        z = sparse.csc_array(noise.matrix(self.pieces) @ sparse.block_diag(parts, format="csr"))
+        ours = [_orthonormal(*pair) for pair in zip(self.states, self.segments, strict=True)]
+        z = sparse.csc_array(noise.matrix(self.pieces) @ sparse.block_diag(ours, format="csr"))
         norms = np.sqrt(np.asarray(z.multiply(z).sum(axis=0)).ravel())
         z = z[:, norms > 0] @ sparse.diags_array(1 / norms[norms > 0])
-        solve = splu(sparse.csc_array(z.T @ z + DEPENDENT**2 * sparse.eye_array(z.shape[1]))).solve
+        solve = splu(sparse.csc_array(z.T @ z + NEARLY_NOTHING * sparse.eye_array(z.shape[1]))).solve
         return lambda x: x - z @ solve(z.T @ x)
 
     @property
@@ -125,3 +118,16 @@ class OutputSensitivity:
             [self._without_starts(k, np.reshape(e, (-1, 1)))[:, 0] for k, e in enumerate(signals)]
         )
         return joined - self._basis @ (self._basis.T @ joined)
+
+
+def _orthonormal(states, segments) -> sparse.csr_array:
+    """Return orthonormal columns that span what the initial states (n, ns) of every segment can do."""
+    blocks, order = [], []
+    for where in segments.places:
+        part = states[where]
+        size = np.linalg.norm(part, axis=0)
+        u, s, _ = np.linalg.svd(part[:, size > 0] / size[size > 0], full_matrices=False)
+        blocks.append(u[:, s > DEPENDENT * s[:1]])
+        order.append(np.arange(len(states))[where])
+    rows = np.argsort(np.concatenate(order))
+    return sparse.csr_array(sparse.block_diag(blocks, format="csr"))[rows]
