@@ -184,10 +184,8 @@ class _Work:
     """The runs of one call, done and to do."""
 
     def __init__(self, groups, rows, drives, how, kept, states, events):
-        for array in (*rows, *drives, *(g.par for g in groups)):
-            # compiled code takes them for that
-            if isinstance(array, np.ndarray):
-                assert array.flags.c_contiguous and array.flags.writeable
+        for array in (*(a for a in drives if isinstance(a, np.ndarray)), *(g.par for g in groups)):
+            assert array.flags.c_contiguous and array.flags.writeable  # compiled code takes them for that
         self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
         self.kept, self.states, self.logged = kept, states, events
         self.stop = np.zeros(1, np.int64)
