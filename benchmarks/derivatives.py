@@ -29,6 +29,9 @@ from ctrl_df.identify.shooting.outputs import SegmentOutputs
 SMALLER = 0.01
 """Step of the central differences that stand for exact derivatives, over the usual one."""
 
+SAME = 1e-4
+"""Error over the better one's, less one, up to which two fits ended in the same optimum."""
+
 
 @contextmanager
 def derivatives(exact: bool, told: dict):
@@ -109,7 +112,7 @@ def main() -> None:
     steps, steps_exact, error, error_exact, apart, share = np.array(rows).T
     print(f"steps: {steps.sum():.0f}, with exact derivatives {steps_exact.sum():.0f}")
     print(f"over 1 % worse: {np.sum(error > 0.01)}, with exact derivatives {np.sum(error_exact > 0.01)}")
-    same = (error < 0.01) & (error_exact < 0.01)
+    same = (error < SAME) & (error_exact < SAME)
     print(f"in the same optimum ({same.sum()}): at most {np.max(apart[same], initial=0):.3f} apart,", end=" ")
     print(f"median {np.median(apart[same]):.4f} standard errors; share of time {np.median(share):.0%}")
 
