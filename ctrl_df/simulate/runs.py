@@ -184,8 +184,8 @@ class _Work:
     """The runs of one call, done and to do."""
 
     def __init__(self, groups, rows, drives, how, kept, states, events):
-        for array in (*rows, *drives, *(g.par for g in groups)):
-            # compiled code takes them for that
+        for array in (*drives, *(g.par for g in groups)):
+            # compiled code takes them for that; the rows are made here
             if isinstance(array, np.ndarray):
                 assert array.flags.c_contiguous and array.flags.writeable
         self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
