@@ -65,6 +65,9 @@ GROWN = 2.0
 """Error over the least that the shortest segments leave, up to which it may be noise: slow noise of thrice
 the power of the fast one, the only one that short segments do not absorb (rigs with coloured noise)."""
 
+SETTLED = 600
+"""Simulations at most that fit the parameters of the model that is named, as many as `refit` makes."""
+
 ANOTHER_START = (1.5, 0.02)
 """Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
 (rigs). Only work depends on it."""
