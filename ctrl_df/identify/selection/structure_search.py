@@ -263,7 +263,7 @@ class StructureSearch(Search):
         common = self.at.data.fine
         if common.disturbed:
             models = [self._sharpened(m, common, free) for m in models]
-        return [(m, *common.errors(m)) for m in models]
+        return [common.judged(m) for m in models]
 
     @staticmethod
     def _sharpened(model, data: SegmentedData, free):
