@@ -142,8 +142,10 @@ def _beside_truth(rig, model, right):
     for name, record, mode in (
         ("free", rig.held, "free"), ("auto", rig.held, "auto"), ("windows", rig.train, "windows")
     ):  # fmt: skip
-        best[name] = min(error(truth.model, record, mode), error(rig.truth, record, mode))
+        refitted = error(truth.model, record, mode)
+        best[name] = min(refitted, error(rig.truth, record, mode))
         row[f"over_{name}"] = error(model, record, mode) / best[name]
+        row[f"over_refit_{name}"] = error(model, record, mode) / refitted
     if right:
         row["optimum"] = error(right.model, rig.train, "windows") / best["windows"]
         row["optimum_held"] = error(right.model, rig.held, "windows") / error(

@@ -25,6 +25,8 @@ AT = {name: i for i, name in enumerate(NAMES)}
 RIGID, LOOSE, SPRUNG = 0, 1, 2
 STATES = 8  # x, v of the motor; motor less load: place, speed; bristle; pad; lag; friction with a memory
 HALVINGS = 60
+# only compiled functions call these: no references are counted, nothing is made for Python
+_part = njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 REST = 1e-7  # rebounds slower than this (of a speed of the order of one) end in contact
 
 MOTOR, LOAD, JOINT, GAP, GAP_E, JK, JC = range(7)
@@ -46,7 +48,7 @@ def blank():
     return p
 
 
-@njit(cache=True)
+@_part
 def _force_in(t, u, y, p):
     """Return the force on the motor that a command comes to, and the rate of the drive's lag."""
     f = u * p[GAIN]
@@ -64,7 +66,7 @@ def _force_in(t, u, y, p):
     return f, rate
 
 
-@njit(cache=True)
+@_part
 def _around(t, x, v, p):
     """Return the forces on the motor that are neither drive, dry friction nor joint."""
     f = p[CONST] - p[B] * v - p[DRAG] * v * abs(v) - 0.5 * p[DB] * abs(v)
@@ -84,7 +86,7 @@ def _around(t, x, v, p):
     return f
 
 
-@njit(cache=True)
+@_part
 def _level(still, side, speed, t, x, drive, p):
     """Return the dry friction of the motor against motion to one side."""
     base = p[FC] + p[CARRIED] * abs(drive)
@@ -100,7 +102,7 @@ def _level(still, side, speed, t, x, drive, p):
     return max(base, 0.0)
 
 
-@njit(cache=True)
+@_part
 def _bend(y, region, p):
     """Return the force of an elastic joint on the load."""
     d, w = y[2], y[3]
@@ -111,12 +113,12 @@ def _bend(y, region, p):
     return p[JK] * (d if region == 1 else d - p[GAP]) + p[JC] * w
 
 
-@njit(cache=True)
+@_part
 def _is_dry(p):
     return p[FC] + p[KS] + p[FS] + abs(p[DC]) + p[CARRIED] + p[PLACE] > 0.0
 
 
-@njit(cache=True)
+@_part
 def _push(t, y, u, region, p):
     """Return the force on the motor without dry friction, the drive's, and that of the joint on the load."""
     drive, _ = _force_in(t, u, y, p)
@@ -125,7 +127,7 @@ def _push(t, y, u, region, p):
     return f - joint, drive, joint
 
 
-@njit(cache=True)
+@_part
 def _rates(t, y, u, mode, p, dy):
     """Write the rates of all states in a mode (side of the motor, side of the load, joint, stop)."""
     _, dy[6] = _force_in(t, u, y, p)
@@ -160,25 +162,24 @@ def _rates(t, y, u, mode, p, dy):
     dy[2], dy[3] = (w, a - b) if two else (0.0, 0.0)
 
 
-@njit(cache=True)
+@_part
 def _step(t, y, h, u0, slope, mode, p, k, z, out):
     """Make one Runge-Kutta step of order four; the command is u0 + slope t."""
-    _rates(t, y, u0 + slope * t, mode, p, k[0])
-    z[:] = y + 0.5 * h * k[0]
-    _rates(t + 0.5 * h, z, u0 + slope * (t + 0.5 * h), mode, p, k[1])
-    z[:] = y + 0.5 * h * k[1]
-    _rates(t + 0.5 * h, z, u0 + slope * (t + 0.5 * h), mode, p, k[2])
-    z[:] = y + h * k[2]
-    _rates(t + h, z, u0 + slope * (t + h), mode, p, k[3])
-    out[:] = y + h / 6.0 * (k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3])
+    for stage in range(4):
+        share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+        for i in range(STATES):
+            z[i] = y[i] + share * h * k[stage - 1, i] if stage > 0 else y[i]
+        _rates(t + share * h, z, u0 + slope * (t + share * h), mode, p, k[stage])
+    for i in range(STATES):
+        out[i] = y[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
 
 
-@njit(cache=True)
+@_part
 def _sign(x):
     return 1 if x > 0.0 else (-1 if x < 0.0 else 0)
 
 
-@njit(cache=True)
+@_part
 def _event(t, y, u, mode, p):
     """Return what ended a mode by this state: 0 nothing, else the kind of event."""
     two, dry = p[JOINT] != RIGID, _is_dry(p)
@@ -222,7 +223,7 @@ def _event(t, y, u, mode, p):
     return 0
 
 
-@njit(cache=True)
+@_part
 def _meet(kind, t, y, u, mode, p):
     """Change the mode, and the speeds of an impact, at an event."""
     dry, two = _is_dry(p), p[JOINT] != RIGID
@@ -283,7 +284,7 @@ def _meet(kind, t, y, u, mode, p):
         mode[1] = _sign(joint)
 
 
-@njit(cache=True)
+@_part
 def _stand(t, y, u, mode, p):
     """Settle two joined bodies that stand still: they stay, go on together or part."""
     if y[1] != 0.0:
@@ -300,7 +301,7 @@ def _stand(t, y, u, mode, p):
         mode[0] = mode[1] = 0
 
 
-@njit(cache=True)
+@_part
 def _advance(t, y, end, h, u0, slope, mode, p, k, z, a, b):
     """Carry the state from t to `end` in steps of at most h, through all events; returns their number."""
     events, same = 0, 0
@@ -325,7 +326,8 @@ def _advance(t, y, end, h, u0, slope, mode, p, k, z, a, b):
                 _step(t, y, middle, u0, slope, mode, p, k, z, b)
                 if _event(t + middle, b, u0 + slope * (t + middle), mode, p) != 0:
                     high = middle
-                    a[:] = b
+                    for i in range(STATES):
+                        a[i] = b[i]
                 else:
                     low = middle
                 if high - low < 1e-15 * (abs(t) + step):
@@ -333,12 +335,13 @@ def _advance(t, y, end, h, u0, slope, mode, p, k, z, a, b):
             if high == step:
                 _step(t, y, step, u0, slope, mode, p, k, z, a)
             step = high
-        y[:] = a
+        for i in range(STATES):
+            y[i] = a[i]
         t = end if step == end - t else t + step
     return events
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def run(
     p, y0, command, closed, tick, h, linear, late_in, late_out, measured_load, pid, noise, step_of_sensor
 ):

@@ -67,8 +67,10 @@ def table(rows):
         lambda r: r.get("first"),
     )
     for key, name in (
-        ("over_free", "free run"),
-        ("over_auto", "free run where it holds still, else windows"),
+        ("over_refit_free", "refitted, free run"),
+        ("over_refit_auto", "refitted, free run where it holds still, else windows"),
+        ("over_free", "or the truth's own if less, free run"),
+        ("over_auto", "or the truth's own if less, free run where it holds still, else windows"),
     ):
         over = [r.get(key, np.inf) for r in singles if r.get("verdict") != "none"]
         if over:

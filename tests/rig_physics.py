@@ -32,6 +32,8 @@ NO_JOINT, IMPACT, ELASTIC = 0, 1, 2
 XL, VL, XM, VM, BEND, LAGGED, HYST, WORK, N_STATES = range(9)
 # Mode: standing flags and friction directions of motor and load, closed face of the gap, stop leaned on.
 M_STANDS, M_DIR, L_STANDS, L_DIR, FACE, LEAN, N_MODES = range(7)
+# Only compiled functions call these: no references are counted (six times as fast), no entry from Python.
+_part = njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 _PLASTIC = 1e-7  # relative speed after an impact [m/s] below which the bodies stay together
 _BISECTIONS = 44
 _MAX_EVENTS = 400  # in one sub-step
@@ -130,7 +132,7 @@ def _play(p, given, noise, quantum, dt, substeps, x0, v0, slack, closed, gains, 
             _advance(p, s, mode, work, t, dt, substeps, after)
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _drive(p, u):
     u = min(max(p[GAIN] * u, -p[SATURATION]), p[SATURATION])
     if abs(u) <= p[DEAD_ZONE]:
@@ -138,7 +140,7 @@ def _drive(p, u):
     return u - p[DEAD_ZONE] if u > 0 else u + p[DEAD_ZONE]
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _report(p, x, v, k, dt, t):
     """Reported position: delay (cubic Hermite between samples), then steps, offset, drift."""
     y = x[k]
@@ -164,7 +166,7 @@ def _report(p, x, v, k, dt, t):
     return y + p[SENSOR_OFFSET] + p[SENSOR_DRIFT] * t
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _advance(p, s, mode, work, t, span, pieces, u):
     trial = work[5]
     h = span / pieces
@@ -186,14 +188,15 @@ def _advance(p, s, mode, work, t, span, pieces, u):
                 else:
                     low = middle
             _rk4(p, now, s, high, u, mode, trial, work)
-            s[:] = trial
+            for j in range(N_STATES):
+                s[j] = trial[j]
             now, left = now + high, left - high
             _apply(p, now, s, u, mode)
             if left <= 0:
                 break
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _rk4(p, t, s, h, u, mode, out, work):
     k1, k2, k3, k4, w = work[0], work[1], work[2], work[3], work[4]
     _rates(p, t, s, u, mode, k1)
@@ -210,7 +213,7 @@ def _rk4(p, t, s, h, u, mode, out, work):
         out[i] = s[i] + h / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i])
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _rates(p, t, s, u, mode, d):
     force_m, force_l = _forces(p, t, s, u)
     d[LAGGED] = (u - s[LAGGED]) / p[LAG] if p[LAG] > 0 else 0.0
@@ -234,12 +237,12 @@ def _rates(p, t, s, u, mode, d):
     d[VL] = 0.0 if (mode[L_STANDS] or p[JOINT] == NO_JOINT) else force_l / p[LOAD]
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _motor_mass(p, t):
     return p[MOTOR] * (1.0 + p[MASS_RATE] * t)
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _drive_force(p, s, u):
     force = s[LAGGED] if p[LAG] > 0 else u
     if p[GAIN_RIPPLE] != 0:
@@ -247,7 +250,7 @@ def _drive_force(p, s, u):
     return force
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _forces(p, t, s, u):
     """All forces on motor and load except dry friction."""
     x, v = s[XM], s[VM]
@@ -279,7 +282,7 @@ def _forces(p, t, s, u):
     return f, load
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _bend_rate(p, t, s, u):
     if p[BRISTLE_K] == 0:
         return 0.0
@@ -288,7 +291,7 @@ def _bend_rate(p, t, s, u):
     return v if g <= 0 else v - p[BRISTLE_K] * abs(v) * s[BEND] / g
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _level(p, t, s, u, moving, direction):
     """Dry friction level on the motor [N]."""
     level = p[COULOMB] * (1.0 + p[COULOMB_RATE] * t) + p[WARMING] * s[WORK]
@@ -314,7 +317,7 @@ def _level(p, t, s, u, moving, direction):
     return level
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _goes(f, up, down):
     """Direction in which `f` moves a standing body that holds `up` against +x and `down` against -x."""
     if f > up:
@@ -324,14 +327,14 @@ def _goes(f, up, down):
     return 0
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _motor_goes(p, t, s, u, f):
     if p[BRISTLE_K] > 0:
         return _goes(f, 0.0, 0.0)
     return _goes(f, _level(p, t, s, u, False, 1), _level(p, t, s, u, False, -1))
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _together(p, t, s, u, face):
     """Standing in contact: (part?, motor direction, load direction)."""
     force_m, force_l = _forces(p, t, s, u)
@@ -347,7 +350,7 @@ def _together(p, t, s, u, face):
     return False, go, go
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _pressed(p, t, s, u, mode):
     """Contact force on the load, positive when the faces press (moving together)."""
     force_m, force_l = _forces(p, t, s, u)
@@ -358,7 +361,7 @@ def _pressed(p, t, s, u, mode):
     return mode[FACE] * (p[LOAD] * a - force_l)
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _settle(p, t, s, u, mode):
     """Decide, for the present state, who stands, who moves where, and who parts."""
     if mode[FACE] != 0:
@@ -392,7 +395,7 @@ def _settle(p, t, s, u, mode):
     mode[L_DIR], mode[L_STANDS] = go, go == 0
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _gap_hit(p, s, mode):
     if p[JOINT] != IMPACT or mode[FACE] != 0:
         return 0
@@ -402,7 +405,7 @@ def _gap_hit(p, s, mode):
     return -1 if (delta < 0 and rate < 0) else 0
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _stop_hit(p, s):
     if p[STOP] == 0:
         return 0
@@ -411,7 +414,7 @@ def _stop_hit(p, s):
     return -1 if (s[XM] < p[STOP_LOW] and s[VM] < 0) else 0
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _broken(p, t, s, u, mode):
     """Whether an event lies at or before this state."""
     if not mode[M_STANDS] and s[VM] * mode[M_DIR] < 0:
@@ -437,7 +440,7 @@ def _broken(p, t, s, u, mode):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@_part
 def _apply(p, t, s, u, mode):
     """Carry out the event found: stop, impact, leave."""
     hit, stop = _gap_hit(p, s, mode), _stop_hit(p, s)

@@ -74,14 +74,24 @@ def run(folder, *arguments, home=NOWHERE, locked=False, **environment):
     )
 
 
-@pytest.fixture
-def cold(tmp_path):
-    """A copy of the package without machine code, and with files where it would go."""
-    folder = tmp_path / "cold"
+def copied(folder, bare=False):
+    """Copy the package without machine code; `bare`: what is imported of it imports nothing else of it."""
     shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    if bare:
+        (folder / "ctrl_df" / "__init__.py").write_text("")
+    return folder
+
+
+def close(folder):
+    """Put files where machine code would go."""
     for place in PLACES:
         (folder / "ctrl_df" / place / "__pycache__").write_text("no folder")
     return folder
+
+
+@pytest.fixture
+def cold(tmp_path):
+    return close(copied(tmp_path / "cold", bare=True))
 
 
 @pytest.fixture
@@ -89,8 +99,7 @@ def warm(tmp_path):
     """A copy of the package with its machine code, which cannot be written."""
     if os.geteuid() == 0 and shutil.which("setpriv") is None:
         pytest.skip("root without setpriv writes everywhere")
-    folder = tmp_path / "warm"
-    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    folder = copied(tmp_path / "warm")
     for place in PLACES:
         (into := folder / "ctrl_df" / place / "__pycache__").mkdir()
         for kept in compiled.folders(PACKAGE / place / "_.py"):
@@ -105,8 +114,8 @@ def warm(tmp_path):
         path.chmod(0o755)
 
 
-def test_a_read_only_installation_without_a_home_compiles_in_memory_and_says_so_once(cold):
-    done = run(cold, "-c", COUNTED)
+def test_a_read_only_installation_without_a_home_compiles_in_memory_and_says_so_once(tmp_path):
+    done = run(close(copied(tmp_path / "cold")), "-c", COUNTED)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("(-0.00218") and "hits 0" in done.stdout
     assert done.stderr.count("Warning") == 1
@@ -143,8 +152,7 @@ def test_machine_code_in_a_read_only_place_is_used(warm):
 
 
 def test_damaged_machine_code_is_compiled_anew(tmp_path):
-    folder = tmp_path / "copy"
-    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    folder = copied(tmp_path / "copy", bare=True)
     assert "hits 0" in run(folder, "-c", SMALL).stdout
     files = list((folder / "ctrl_df" / "df" / "closed_form" / "__pycache__").glob("wall_map.wrap*.nb*"))
     assert len(files) == 2
@@ -164,8 +172,7 @@ def test_the_command_line_works_in_a_read_only_installation(tmp_path, request, c
 
 
 def test_a_caller_is_compiled_anew_when_what_it_calls_is_edited(tmp_path):
-    folder = tmp_path / "mypackage"
-    shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
+    folder = copied(tmp_path / "mypackage", bare=True)
     simulate = folder / "ctrl_df" / "simulate"
     for name, text in MODULES.items():
         (simulate / f"{name}.py").write_text(text)

@@ -244,9 +244,15 @@ def split(record: Measurement, segments: Segments, factor: int, least: int) -> S
     return _between(record, np.concatenate(begins), np.concatenate(ends)).every(segments.step)
 
 
+_BEGUN: WeakKeyDictionary[Measurement, dict[int, tuple[float, ...]]] = WeakKeyDictionary()
+
+
 def _between(record, begins, ends) -> Segments:
-    known = facts(record)
-    rows = np.array([_local(record, int(i), known) for i in begins])
+    known, begun = facts(record), _BEGUN.setdefault(record, {})
+    for i in begins.tolist():
+        if i not in begun:
+            begun[i] = _local(record, i, known)
+    rows = np.array([begun[i] for i in begins.tolist()])
     return Segments(begins, ends, *rows.T, outputs=len(sensed(record).columns))
 
 

@@ -13,6 +13,7 @@ from ...blocks.primitives import Ramp
 from ...simulate.crew import require_compiled
 from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped
+from ...simulate.kernel.many import Drives
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..thresholds import RTOL
@@ -75,6 +76,7 @@ class Simulator:
         self.facts, self.sensed = facts_of(self.block, record), sensed(record)
         self.runs = 0
         self._prepared: dict[Any, PreparedModel] = {}
+        self._kept_drives: Any = (), None
 
     @property
     def position_dependent(self) -> bool:
@@ -221,10 +223,7 @@ class Simulator:
         known = {(id(p.drive_time), id(p.drive_value)): p for p in parts}
         shared = [known[i] for i in drives]
         groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
-        sampled = sampled_drives(
-            np.array([p.drive_time for p in shared]), np.array([p.drive_value for p in shared])[:, None],
-            parts[0].hold or self.record.input_hold,
-        )  # fmt: skip
+        sampled = self._sampled(shared)
         ends, outputs = np.concatenate((first, [int(np.sum(length))])), {}
         for columns, delays in self._readings(parts):
             every = np.concatenate(
@@ -242,6 +241,19 @@ class Simulator:
             self._joined([outputs[c][ends[i] : ends[j]] for c in self.sensed.columns])
             for i, j in zip(edges[:-1], edges[1:], strict=True)
         ]
+
+    def _sampled(self, parts: Sequence[PreparedModel]) -> Drives:
+        """Return what drives these, as the engine takes it; the last is kept, mostly asked for again."""
+        inputs = tuple(array for p in parts for array in (p.drive_time, p.drive_value))
+        kept, sampled = self._kept_drives
+        if len(kept) != len(inputs) or any(a is not b for a, b in zip(kept, inputs, strict=True)):
+            sampled = sampled_drives(
+                np.array(inputs[::2]),
+                np.array(inputs[1::2])[:, None],
+                parts[0].hold or self.record.input_hold,
+            )
+            self._kept_drives = inputs, sampled
+        return sampled
 
     def _late(self, part) -> float:
         """Return by how much what is seen first of a segment lies before its first sample [s]."""

@@ -176,7 +176,8 @@ class Diagnosis:
         How far the diagnosis came. Before it is complete the verdict is of what is known: at most 'ambiguous'
         as long as nothing is confirmed.
     doubts : tuple of str
-        Why the first of the ranking is not called the effect although the evidence is for it, in sentences.
+        Why the first of the ranking is not called the effect although the evidence is for it, or what speaks
+        for more than that effect, in sentences.
 
     Examples
     --------

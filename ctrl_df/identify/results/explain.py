@@ -62,9 +62,10 @@ def explain(d, words) -> str:
             "them."
         )
     where, shows = places(d.where), words.shows.format(first.effect.shows)
+    doubts = "".join(f" {s}" for s in d.doubts)
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
-        f"probability {certainty(d.ranking):.1%}.{same}"
+        f"probability {certainty(d.ranking):.1%}.{same}{doubts}"
         + (f" Before, {where[0].lower() + where[1:]}" if where else "")
     )
 
@@ -84,11 +85,16 @@ def falls_behind(first, long) -> str:
     )
 
 
-def grows(short: float, error: float, seconds: float) -> str:
-    """Return that a model which follows short segments does not follow long ones, refitted to these."""
+def grows(short: float, error: float, seconds: float, effect=None) -> str:
+    """Return that a model which follows short segments does not follow long ones, refitted to these.
+
+    `effect`: what it was given, and what is therefore not all that is missing.
+    """
+    who = "The refitted model" if effect is None else f"With {named(effect)} the model"
+    more = "" if effect is None else ", so that more is missing"
     return (
-        f"The refitted model follows short segments to {short:.2%}, but not long ones: over {seconds:.3g} s "
-        f"each, refitted to these, it errs by {error:.2%}."
+        f"{who} follows short segments to {short:.2%}, but not long ones: over {seconds:.3g} s "
+        f"each, refitted to these, it errs by {error:.2%}{more}."
     )
 
 

@@ -56,8 +56,7 @@ class Standing:
         """Whether the model, refitted, errs over longer segments by more than slow noise does."""
         if self.data.disturbed or self.farthest is None:
             return False
-        grown = self._grown(self.noise, self.nearest, self.farthest)
-        return self.farthest.rmse > grown * self.nearest.rmse
+        return self.farthest.rmse > self.grown(self.nearest, self.farthest) * self.nearest.rmse
 
     def colour(self, noise: NoiseModel) -> NoiseModel:
         """Return the noise if it forgets within the shortest segments, else white noise.
@@ -70,16 +69,17 @@ class Standing:
 
     def by_noise(self, fit: FitResult, noise: NoiseModel) -> float:
         """Return the error over the segments of a fit that noise alone may make, slow noise too."""
-        return self.floor * (GROWN if self.least is None else self._grown(noise, self.least, fit))
+        return self.floor * (GROWN if self.least is None else self.grown(self.least, fit, noise))
 
-    def _grown(self, noise: NoiseModel, near: FitResult, far: FitResult) -> float:
+    def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its colour and by chance.
 
-        Of slow noise the initial states of short ones take a part, the more of them the more.
+        Of slow noise the initial states of short ones take a part, the more of them the more. `noise`: None:
+        that which judges.
         """
         if near.sensitivity is None or far.sensitivity is None:
             return GROWN
-        colour = self.colour(noise)
+        colour = self.colour(noise or self.noise)
         left = far.sensitivity.left_by_starts(colour) / near.sensitivity.left_by_starts(colour)
         return max(GROWN, math.sqrt(left) * by_chance(far.spanned / colour.memory))
 

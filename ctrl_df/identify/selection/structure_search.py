@@ -9,13 +9,13 @@ from functools import partial
 import numpy as np
 
 from ..course import Course
-from ..estimation.refit_records import blurred
+from ..estimation.refit_records import blurred, refit_records
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import grows
-from ..thresholds import PROCESS_NOISE, SIGNIFICANT, UNMOVED
+from ..thresholds import GROWTH, PROCESS_NOISE, SIGNIFICANT, UNMOVED
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import breaks_away_only, indistinguishable
@@ -24,7 +24,7 @@ from .first_look import FirstLook
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
 from .standing import Standing, begun
-from .thresholds import EXACT, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EXACT, SETTLED, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -53,7 +53,7 @@ class StructureSearch(Search):
     at: Standing
 
     def __init__(self, block, records, validation, free, prior=None):
-        self.block, self.free = block, tuple(free)
+        self.block, self.free, self.prior = block, tuple(free), prior
         data = prepare(block, records, validation, prior)
         self.at = begun(block, self.segmentations(data), self.free)
 
@@ -156,6 +156,23 @@ class StructureSearch(Search):
         doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
+    def settled(self, judged):
+        """Return a model with the values that `refit` finds from its own.
+
+        Candidates are told apart in segments that show what is missing, at an effort that they all can have.
+        Parameters are told best over stretches as long as a model can be followed: those of the one that is
+        named are fitted there, to the end, unless the segments that judge speak against them.
+        """
+        data, fit = self.at.data.fine, judged.train
+        found, _ = refit_records(
+            judged.block, data.train.records, fit.names, {}, whole=False, mode="auto", window=None,
+            robust=True, budget=SETTLED, prior=self.prior,
+        )  # fmt: skip
+        there = data.as_it_is(found)
+        there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
+        settled = data.validate(replace(judged, train=there))
+        return settled if settled.size <= GROWTH**2 * judged.size else judged
+
     def predicted(self, judged):
         """Return the model and the records held out (angles as these have them), or those fitted."""
         fitted, held = self.records
@@ -190,8 +207,8 @@ class StructureSearch(Search):
         if self.at.data.disturbed and not significant and self.at.nearest.nrmse > UNMOVED:
             # accelerations that are mostly noise do not speak for a model that does not even move
             return replace(left, unexplained=True)
-        if not significant and self.at.grows:
-            return self._growing(left)
+        if self.at.grows:
+            return self._growing(left, best) if significant else self._growing(left)
         if not left.unexplained and self.as_recorded(best):
             return replace(left, noise=self.at.base.train.rmse, structure=0.0)
         return left
@@ -200,16 +217,27 @@ class StructureSearch(Search):
         """Return the noise of the residual of the best candidate, or of the model without it."""
         return ranked(judged, ())[1] if judged is self.at.base else self.at.noise
 
-    def _growing(self, left: Remainder) -> Remainder:
-        """Return what a model leaves whose error grows with the length of segments."""
-        farthest = self.at.farthest
-        assert farthest is not None
-        error = math.sqrt(farthest.rmse**2 - self.at.nearest.rmse**2)
+    def _growing(self, left: Remainder, best: CandidateFit | None = None) -> Remainder:
+        """Return what is left by a model whose error grows with the length of segments.
+
+        `best`: what explains something beside it; None: nothing does. What grows with that as well is not
+        all that is missing, though it is part of it.
+        """
+        near, far = self.at.nearest, self.at.farthest
+        if best is not None:
+            shortest, *_, longest = self.at.segmentations
+            near, far = shortest.moved(best.train), longest.reached(best.train)
+        assert far is not None
+        if far.rmse <= self.at.grown(near, far) * near.rmse:
+            return left
         seconds = max(
             float(np.max(w.ends - w.begins)) * facts(r).dt
-            for r, w in zip(self.at.data.train.records, farthest.segments, strict=True)
+            for r, w in zip(self.at.data.train.records, far.segments, strict=True)
         )
-        doubt = grows(self.at.nearest.nrmse, farthest.nrmse, seconds)
+        if best is not None:
+            return replace(left, doubt=grows(near.nrmse, far.nrmse, seconds, best.block.effects[-1]))
+        doubt = grows(near.nrmse, far.nrmse, seconds)
+        error = math.sqrt(far.rmse**2 - near.rmse**2)
         return replace(left, structure=max(left.structure, error), unexplained=True, doubt=doubt)
 
     def located(self, best, remainder, unknown):

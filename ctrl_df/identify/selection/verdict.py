@@ -101,13 +101,19 @@ class _Asked:
         else:
             open_ones = rivals(ranking)
             verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
-        base, doubts = self._base(), (remainder.doubt,) if verdict == UNKNOWN and remainder.doubt else ()
+        base, doubts = self._base(), (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
         if verdict == EFFECT:
             course.stage("free prediction over long stretches")
-            verdict, ranking, doubts = doubted(ranking, base, search.significant)
+            verdict, ranking, further = doubted(ranking, base, search.significant)
+            doubts = further if verdict == UNKNOWN else (*further, *doubts)
             if verdict == UNKNOWN:
                 # refuted: what is missing is what the model leaves without it
                 best, remainder = search.base, search.remainder(search.base, False)
+        if verdict in (EFFECT, AMBIGUOUS):
+            course.stage("the parameters of the first")
+            first = ranking[0]
+            settled = _entry(search.settled(best), search, first.probability, first.equivalents)
+            ranking = [settled, *ranking[1:]]
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
         return Diagnosed(replace(result, explanation=explain(result, words) + note), search)

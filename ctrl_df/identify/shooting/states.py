@@ -85,7 +85,8 @@ class _Record:
 
     def _signal(self, rows):
         """Return which segments these rows are, and which samples of a signal theirs (booleans)."""
-        which = np.isin(np.arange(len(self.segments)), rows)
+        which = np.zeros(len(self.segments), bool)
+        which[rows] = True
         return which, self.segments.spread(which)
 
     def step(self, tolerance):
