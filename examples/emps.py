@@ -17,8 +17,8 @@ when the site is built.
 
 **Equations.** Published: :math:`M \ddot x = F - F_v \dot x - F_c \operatorname{sign} \dot x - F_0`.
 
-**Method.** ``improve``: one effect after another, judged on the record with pulses. Then an effect of our
-own.
+**Method.** ``improve``: one effect after another, judged on the record with pulses. Then what a drive has
+anew every day, from half of that record; then an effect of our own.
 """
 
 import math
@@ -60,7 +60,8 @@ def controller(folder) -> tuple[float, float, float]:
 # the force recorded; once as published, and once counting that a force held over a sample acts half a sample
 # late (at the pulses of the test record that matters). **Free run**: the model alone on the recorded force,
 # from rest at the first sample; nothing holds a mass on a rail in place, so every tenth of a newton adds up
-# over 25 s.
+# over 25 s. The published figures leave the mean out: so the published model comes to its 8.38 mm on the test
+# record. Here both are told.
 
 
 # %%
@@ -92,22 +93,38 @@ def force_error(model, run: cdf.Measurement, held=False) -> float:
     return float(np.linalg.norm(left) / np.linalg.norm(given))
 
 
-def free_run(model, run: cdf.Measurement) -> float:
-    """Return the rms position error [m] over the whole record, less its mean.
-
-    The published figures leave the mean out: so the published model comes to its 8.38 mm on the test record.
-    """
+def free_run(model, run: cdf.Measurement, begin=0.0) -> tuple[float, float]:
+    """Return the rms position error [m] from a time on [s], less its mean and with it."""
     from ctrl_df.identify.prediction.simulator import free_run
 
-    return float(np.std(run.y - free_run(model, run, position=float(run.y[0]))))
+    error = (run.y - free_run(model, run, position=float(run.y[0])))[run.t >= begin]
+    return float(np.std(error)), float(np.sqrt(np.mean(error**2)))
 
 
 def line(name, model, train, test) -> str:
     """Return one row of the table."""
     force = "".join(f"{100 * force_error(model, r):8.2f}" for r in (train, test))
     held = "".join(f"{100 * force_error(model, r, held=True):8.2f}" for r in (train, test))
-    free = "".join(f"{1e3 * free_run(model, r):8.2f}" for r in (train, test))
+    free = "".join(f"{1e3 * e:8.2f}" for r in (train, test) for e in free_run(model, r))
     return f"  {name:<24}{force}   {held}   {free}"
+
+
+# %%
+# The shape of friction belongs to the machine; its level and the zero of the amplifier belong to the day, and
+# where within a turn of the screw it begins to the record. On the test record friction is a newton larger,
+# 5 %, whatever model is fitted: in a move of a second that alone makes 5 mm, and no model of the training
+# record can know. All three are found on the first half of the record, two of four cycles: level and offset
+# by the free run, in which they add up, the phase a tenth of a second at a time. The other half is foretold.
+
+
+# %%
+def of_the_day(model, run: cdf.Measurement):
+    """Return the model with what the day sets, and the fit of level and offset to half of a record."""
+    half = run.slice(0, 0.5 * run.duration)
+    slow = cdf.refit(model, half, ("coulomb.level", "constant_force.force"), mode="free")
+    if "position_ripple.phase" not in model.parameters:
+        return slow.model, slow
+    return cdf.refit(slow.model, half, "position_ripple.phase", window=0.1).model, slow
 
 
 # %%
@@ -157,8 +174,8 @@ def main(folder, report=None):
     train, test = record(folder, TRAIN), record(folder, TEST)
     # The published symmetric model is where a user would begin; its offset of -3.1648 N opposes the force.
     published = cdf.Mass(95.1089, [cdf.Coulomb(20.3935), cdf.Viscous(203.5034), cdf.ConstantForce(3.1648)])
-    print(f"{'':<26}force error [%]    with the hold [%]  free run [mm]")
-    print(f"{'':<26}{'   train    test   ' * 3}")
+    print(f"{'':<26}force error [%]    with the hold [%]  free run less its mean, and with it [mm]")
+    print(f"{'':<26}{'   train    test   ' * 2}{'   train    with    test    with'}")
     print(line("published, symmetric", published, train, test), flush=True)
 
     # the ladder: what does the library find? A fourth rung, a lag of the drive, takes as long as these three.
@@ -170,10 +187,13 @@ def main(folder, report=None):
     for effect in study.model.effects:
         if effect.id == "position_ripple":
             print(f"The force repeats every {1e3 * effect.wavelength:.4g} mm of travel.")
-            # the carriage did not begin where it did before: only the phase is fitted to the test record
-            again = cdf.refit(study.model, test, "position_ripple.phase", window=0.1)
-            print("From where the test record begins:")
-            print(line("its phase found again", again.model, train, test), flush=True)
+    print("Level, offset and phase of the day, from the first half of the test record:")
+    for name, model in (("published, symmetric", published), ("the ladder's", study.model)):
+        today, fit = of_the_day(model, test)
+        print(line(name, today, train, test))
+        less, whole = free_run(today, test, begin=0.5 * test.duration)
+        print(f"  the half foretold: {1e3 * less:.2f} mm, {1e3 * whole:.2f} with the mean")
+        print("\n".join(f"    {p}" for p in fit.parameters.values()), flush=True)
 
     # our own effect in place of what bends the friction; a tenth of a second at a time, as slow changes of
     # friction (a newton from one record to the other) drowns all else over longer windows
@@ -185,6 +205,7 @@ def main(folder, report=None):
     improved = fit.model
     print("An effect of our own in place of Stribeck's:")
     print(line("+ rising friction (ours)", improved, train, test), flush=True)
+    print(line("of the day", of_the_day(improved, test)[0], train, test), flush=True)
     print("\n" + "\n".join(f"  {p}" for p in fit.parameters.values()))
 
     # what it means for the loop: its own controller, and one with an integral

@@ -369,6 +369,20 @@ def test_own_parameters_are_refitted_and_estimated_anew_on_records_held_out():
         assert [table[name].value.of(r) for r in NAMES[:2]] == pytest.approx(truth[:2], abs=0.05)
 
 
+def test_the_model_of_a_ladder_knows_what_records_held_out_have():
+    *train, last = recorded(machines(cdf.QuadraticDrag(4.0)))
+    names = ["quadratic_drag"]
+    study = cdf.improve(START, train[:1], last, 1, candidates=names, own=["viscous", "constant_force"])
+    assert study.effects == ("quadratic_drag",)
+    table = study.model.parameters
+    for name, truth in OWN.items():
+        assert table[name].value == table[name].value.of(NAMES[0])
+        assert [table[name].value.of(r) for r in (NAMES[0], NAMES[2])] == pytest.approx(truth[::2], abs=0.05)
+    # no warning: with these the error is the one the ladder tells
+    beside = cdf.compare(study.model, last)
+    assert beside.nrmse < 1.5 * cdf.compare(study.model, train[0]).nrmse
+
+
 # --- the number -----------------------------------------------------------------------------------
 
 

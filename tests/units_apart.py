@@ -64,10 +64,15 @@ def rig_of(hidden):
             *records,
             ["coulomb.level", "viscous.coefficient"],
         )
-    seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 800)
-    rig = rigs.draw(hidden, seed, excitation="multisine", snr_db=60, n=n)
+    rig = drawn(hidden)
     free = [k for k, p in rig.baseline.parameters.items() if p.free and k not in rig.known]
     return rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), free
+
+
+def drawn(hidden):
+    """Return the rig of an effect that `rigs` hide."""
+    seed, n = SEEDS.get(hidden, 21), LENGTHS.get(hidden, 800)
+    return rigs.draw(hidden, seed, excitation="multisine", snr_db=60, n=n)
 
 
 def driven(seed):

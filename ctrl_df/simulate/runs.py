@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from concurrent.futures import wait
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from .kernel.many import Drives, How, Rows
 from .kernel.space import lent_space
 from .program import pointers
 from .program.layout import H_AFFINE
-from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, TOGETHER_RUNS, WORTH_THREADS
+from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, TOGETHER_RUNS
 
 _ready: set[int] = set()  # kinds of laws (`H_AFFINE`) for which this process has the machine code
 _SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time
@@ -185,8 +184,10 @@ class _Work:
     """The runs of one call, done and to do."""
 
     def __init__(self, groups, rows, drives, how, kept, states, events):
-        for array in (*(a for a in drives if isinstance(a, np.ndarray)), *(g.par for g in groups)):
-            assert array.flags.c_contiguous and array.flags.writeable  # compiled code takes them for that
+        for array in (*drives, *(g.par for g in groups)):
+            # compiled code takes them for that; the rows are made here
+            if isinstance(array, np.ndarray):
+                assert array.flags.c_contiguous and array.flags.writeable
         self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
         self.kept, self.states, self.logged = kept, states, events
         self.stop = np.zeros(1, np.int64)
@@ -199,19 +200,16 @@ class _Work:
         if flag is not None:
             self._as_job(flag, threads)
             return
+        todo = deque(self._parts(threads))
+        threads = max(min(threads, len(todo)), 1)
         curved = int(self.groups[0].engine.program.ints[H_AFFINE])
         if curved not in _ready:
             # compiled, or read from its file, before any thread asks for it
             with ExitStack() as lent:
                 self._run(self._desk(self.groups[0], lent), self.groups[0], np.zeros(0, np.int64))
             _ready.add(curved)
-        todo, pool = deque(self._whole()), crew.pool(os.getpid(), threads, "runs")
-        self._await([pool.submit(self._work if threads == 1 else self._begin, todo)])
-        shares = deque(self._shares(todo, threads))
-        self._await([pool.submit(self._work, shares) for _ in range(min(threads, len(shares)))])
-
-    def _await(self, workers) -> None:
-        """Wait for threads; this one does nothing else, as it is the one that hears Ctrl-C."""
+        # this thread only waits: it is the one that hears Ctrl-C
+        workers = [crew.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)]
         try:
             for worker in workers:
                 if not wait([worker], crew.left()).done:
@@ -225,12 +223,9 @@ class _Work:
     def _as_job(self, flag, threads: int) -> None:
         """Make all runs in this thread, and in those of processors that have no job."""
         self.stop, others = flag, min(crew.spare(), threads - 1)
-        todo, helpers = deque(self._whole()), []
-        if others:
-            self._begin(todo)
-            todo = deque(self._shares(todo, 1 + others))
-            pool = crew.pool(os.getpid(), crew.processors(), "runs")
-            helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
+        todo = deque(self._parts(1 + others) if others else self._whole())
+        pool = crew.pool(os.getpid(), crew.processors(), "runs")
+        helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
         try:
             self._work(todo)
         finally:
@@ -279,29 +274,12 @@ class _Work:
         for group in self.groups:
             yield group, group.runs.astype(np.int64)
 
-    def _begin(self, todo) -> None:
-        """Make the first runs that are to do, and all where threads would cost more than they save."""
-        group, runs = todo.popleft()
-        first = max(len(runs) // _SHARES, 1)
-        count = len(runs) + sum(len(others) for _, others in todo)
-        began = thread_time()
-        with ExitStack() as lent:
-            desk = self._desk(group, lent)
-            self._run(desk, group, runs[:first])
-            brief = (thread_time() - began) * (count - first) < WORTH_THREADS * first
-            if brief and not self.stop[0]:
-                self._run(desk, group, runs[first:])
-            else:
-                todo.appendleft((group, runs[first:]))
-        if brief:
-            self._work(todo)
-
-    def _shares(self, todo, threads):
-        """Yield (group, runs) of what is to do in parts small enough to be shared out evenly."""
-        for group, runs in todo:
+    def _parts(self, threads):
+        """Yield (group, runs) in parts small enough to be shared out evenly."""
+        for group in self.groups:
             size = min(max(len(group.runs) // (_SHARES * threads), 1), TOGETHER_RUNS)
-            for i in range(0, len(runs), size):
-                yield group, runs[i : i + size]
+            for i in range(0, len(group.runs), size):
+                yield group, group.runs[i : i + size].astype(np.int64)
 
     def _work(self, todo):
         desk = at = None

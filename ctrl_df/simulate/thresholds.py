@@ -304,9 +304,6 @@ LOG = 4096
 TOGETHER_RUNS, TOGETHER_STRIDES, SPLITS = 256, 64, 64
 """Runs, strides in one call; kinds of systems in a batch, beyond which they are packed one by one."""
 
-WORTH_THREADS = 5e-4
-"""What runs must take [s] before they are shared out: to hand them over takes 0.2 ms of a processor."""
-
 STRIDE_STEPS, STRIDE_PEEKS = 400_000, 129
 """Steps of a stride at most; points in it, thirty a passage, from which the peak of an output is read."""
 

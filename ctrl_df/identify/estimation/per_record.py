@@ -28,16 +28,21 @@ def reestimated(near: FitResult, fit: Refit) -> FitResult:
         The model with its initial states fitted.
     fit : callable
     """
-    own, best = {k: p for k, p in block_of(near.model).parameters.items() if is_own(p)}, near
-    for name in [k for k, p in own.items() if p.per_record]:
+    best, table = near, block_of(near.model).parameters
+    for name in [k for k, p in table.items() if p.per_record]:
         found = turned(best, name, fit)
         found = fit(found.model, (name,), found.starts, EFFORT_OWN)
         if found.count * math.log(best.rmse / found.rmse) > ANGLE_WORTH:
             best = found
-    others = [k for k, p in own.items() if not p.per_record]
-    if others:
-        best = min(best, fit(best.model, tuple(others), best.starts, EFFORT_OWN), key=lambda f: f.rmse)
+    if others := own_values_of(near.model):
+        best = min(best, fit(best.model, others, best.starts, EFFORT_OWN), key=lambda f: f.rmse)
     return best
+
+
+def own_values_of(model) -> tuple[str, ...]:
+    """Return the parameters that every record has for itself, angles apart."""
+    table = block_of(model).parameters
+    return tuple(k for k, p in table.items() if is_own(p) and not p.per_record)
 
 
 def turned(near: FitResult, name: str, fit: Refit) -> FitResult:

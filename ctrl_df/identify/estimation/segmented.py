@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
 from ..prediction.simulators import simulator_of
-from ..prediction.values import is_own
+from ..prediction.values import is_own, knowing
 from ..shooting.noise_model import NoiseModel, acceleration_filter
 from ..shooting.scales import Scales, scales_of
 from ..shooting.segmented_records import SegmentedRecords
@@ -24,10 +25,11 @@ from ..shooting.thresholds import EFFORT_ALONE
 from ..shooting.variables import Prior, RecordScales, priors
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
-from .per_record import reestimated
+from .per_record import own_values_of, reestimated
 from .starts import carried, same_begins
 from .thresholds import (
     BRIEF,
+    EFFORT_OWN,
     EFFORT_STATES,
     FILTERED,
     HOLDOUT_PARTS,
@@ -324,9 +326,20 @@ class SegmentedData:
             for r, w, starts in zip(records, other.segments, other.starts, strict=True)
         ]
 
-    def errors(self, model) -> tuple[float, float]:
-        """Return nrmse of a model as it is, over the segments fitted and those held out."""
-        return self._ran(model, "train").nrmse, self._ran(model, "validation").nrmse
+    def judged(self, model) -> tuple[Any, float, float]:
+        """Return a model as it is with its nrmse over the segments fitted and those held out.
+
+        It then knows what the records held out have for themselves: by that their error is.
+        """
+        train, held = self._ran(model, "train"), self._ran(model, "validation")
+        if (names := own_values_of(held.model)) and self.validation.records is not self.train.records:
+            # found over short segments; here every one of them counts
+            whole = self.fit(
+                held.model, names, view=self.validation, starts=held.starts, iterations=EFFORT_OWN
+            )  # fmt: skip
+            held = min(held, whole, key=lambda f: f.rmse)
+        records = [[r.name for r in view.records] for view in (self.train, self.validation)]
+        return knowing(model, held.model, *records), train.nrmse, held.nrmse
 
     def _ran(self, model, name, hopeless: float = math.inf) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""

@@ -83,6 +83,22 @@ def with_own(model, names: Iterable[str]):
     return with_block(model, block.with_parameters(own)) if own else model
 
 
+def knowing(model, other, records: Iterable[str], others: Iterable[str]):
+    """Return a model fitted to `records` that knows what `others` have for themselves, as `other` has it.
+
+    As a number each value stays what it was, and so does one that all of them have.
+    """
+    block, found = block_of(model), {}
+    table, told = getattr(block, "parameters", {}), getattr(block_of(other), "parameters", {})
+    for k, p in table.items():
+        if is_own(p):
+            each = {r: in_record(p.value, r) for r in records}
+            each |= {r: in_record(told[k].value, r) for r in others}
+            if any(v != float(p.value) for v in each.values()):
+                found[k] = PerRecord(p.value, each)
+    return with_block(model, block.with_parameters(found)) if found else model
+
+
 def for_record(model, record: str) -> Any:
     """Return a model with the values that it has in the record of that name."""
     block = block_of(model)

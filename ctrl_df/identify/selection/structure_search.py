@@ -24,7 +24,7 @@ from .first_look import FirstLook
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
 from .standing import Standing, begun
-from .thresholds import EXACT, SETTLED, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EXACT, FLOOR, SETTLED, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -163,11 +163,18 @@ class StructureSearch(Search):
         Parameters are told best over stretches as long as a model can be followed: those of the one that is
         named are fitted there, to the end, unless the segments that judge speak against them.
         """
-        data, fit = self.at.data.fine, judged.train
-        found, _ = refit_records(
-            judged.block, data.train.records, fit.names, {}, whole=False, mode="auto", window=None,
-            robust=True, budget=SETTLED, prior=self.prior,
-        )  # fmt: skip
+        data, names = self.at.data.fine, judged.train.names
+
+        def refitted(model, start):
+            return refit_records(
+                model, data.train.records, names, start, whole=False, mode="auto", window=None,
+                robust=True, budget=SETTLED, prior=self.prior,
+            )[0]  # fmt: skip
+
+        found = refitted(judged.block, {})
+        if not data.disturbed and found.rmse > FLOOR * self.at.floor:
+            # a minimum beside the right one: short segments lead out of it
+            found = min(found, refitted(found.model, None), key=lambda f: f.rmse)
         there = data.as_it_is(found)
         there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
         settled = data.validate(replace(judged, train=there))
@@ -266,7 +273,7 @@ class StructureSearch(Search):
         common = self.at.data.fine
         if common.disturbed:
             models = [self._sharpened(m, common, free) for m in models]
-        return [(m, *common.errors(m)) for m in models]
+        return [common.judged(m) for m in models]
 
     @staticmethod
     def _sharpened(model, data: SegmentedData, free):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -292,6 +293,8 @@ def _endless(values, factor: float) -> int:
     geometrically, by ``1 - e / (n - 1)`` each; what is then still to come sums to ``(n - 1) / e`` times the
     last one. A growth towards a limit less than `factor` away is told from one without.
     """
+    if len(values) < 3 or not values[-1] > values[-2] > values[-3]:
+        return 0  # as nearly always
     growths = np.diff(np.log(np.maximum(values, NOTHING)))[::-1]
     high = np.maximum.accumulate(growths)
     low = np.minimum.accumulate(growths)
@@ -316,7 +319,7 @@ def _creeps(laps) -> bool:
     speed does.
     """
     recent = laps[-RECENT:]
-    durations = np.diff([lap.time for lap in recent])
+    durations = [after.time - before.time for before, after in pairwise(recent)]
     count = _endless(durations, 1 / FAINT)
     if not count:
         return False
