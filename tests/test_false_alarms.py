@@ -10,6 +10,8 @@ from ctrl_df.identify.estimation.sensitivity import OutputSensitivity
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.residuals.missing_forces import _motion, missing_forces
 from ctrl_df.identify.selection.evidence import ranked
+from ctrl_df.identify.selection.standing import Standing
+from ctrl_df.identify.selection.thresholds import GROWN
 from ctrl_df.identify.shooting.noise_model import NoiseModel, OutputNoise
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.thresholds import SIGNIFICANT
@@ -106,3 +108,77 @@ def test_what_dependent_starts_can_do_is_taken_away(outputs):
     size = rng.standard_normal(len(segments))
     did = noise.filtered(states[:, :4] * segments.spread(size)[:, None], sensitivity.pieces)
     assert np.max(np.abs(taken(did))) < 1e-8 * np.max(np.abs(did))
+
+
+def noisy(seed, size, noise, block, times):
+    """Return steps of force of some size, the place of a block and noise."""
+    rng = np.random.default_rng(seed)
+    u = size * np.repeat(rng.choice([-1.0, 1.0], len(times) // 50), 50)
+    x = np.asarray(cdf.event_response(block, times, u, input_hold="zoh").outputs)[0]
+    return u, x, rng.standard_normal(times.size) * noise
+
+
+SPRUNG = cdf.Mass(2.0).with_effect(cdf.Viscous(3.0)).with_effect(cdf.LinearSpring(40.0))
+
+
+@pytest.mark.parametrize(
+    ("step", "noise", "verdict"), [(0.04, 0.0, "none"), (0.04, 0.003, "effect"), (0.3, 0.0, "effect")]
+)
+def test_what_records_are_rounded_to_is_their_noise(step, noise, verdict):
+    # a fine grid that all values lie on; values beside the lines have a noise of their own; a coarse grid
+    t = TIMES[:1500]
+    u, x, errors = noisy(0, 9.0, 1.0, SPRUNG, t)
+    step, noise = step * np.std(x), noise * np.std(x)
+    y = step * np.round(x / step) + noise * errors
+    found = cdf.diagnose(SPRUNG, cdf.Measurement(t, u, y), candidates=["sensor_quantization"])
+    assert found.verdict == verdict
+    assert (f"rounded to {step:.3g} m" in found.explanation) == (verdict == "none")
+    if verdict == "none":
+        assert found.noise == pytest.approx(step / np.sqrt(12), rel=0.1)
+        assert found.ranking[0].probability > 0.99
+
+
+def test_a_larger_motion_held_out_errs_by_what_the_parameters_are_known_to():
+    t = TIMES[:1500]
+    (u, x, errors), (v, z, more) = noisy(0, 0.4, 0.002, SPRUNG, t), noisy(1, 30.0, 0.002, SPRUNG, t)
+    small, large = cdf.Measurement(t, u, x + errors), cdf.Measurement(t, v, z + more)
+    found = cdf.diagnose(SPRUNG, small, holdout=large, candidates=["constant_force"])
+    assert found.verdict == "none"
+    assert found.nrmse_holdout * np.std(z) > 4 * 0.002  # measured: 4.7 times the noise
+
+
+def test_memory_of_noise_and_what_starts_leave_of_it():
+    pole, count = 0.9, 60
+    slow = NoiseModel(np.array([pole]), 1.0)
+    assert slow.memory == pytest.approx((1 + pole**2) / (1 - pole**2))
+    assert slow.correlation(5) == pytest.approx(pole ** np.arange(5))
+    assert NoiseModel(np.zeros(0), 1.0).memory == pytest.approx(1.0)
+    # a start and a speed in each of the segments, against the trace of matrices
+    run = record(0)
+    segments = make_segments(run, count * 0.008)
+    length = int(segments.counts[0])
+    segments = segments.only(segments.counts == length)
+    n = length * len(segments)
+    ramp = np.tile(np.linspace(-1, 1, length), len(segments))
+    states, ridge = np.column_stack([np.ones(n), ramp]), np.zeros((len(segments), 2))
+    sensitivity = OutputSensitivity([np.ones((n, 1))], [states], [segments], [ridge])
+    basis, _ = np.linalg.qr(states[:length])
+    covariance = pole ** np.abs(np.subtract.outer(np.arange(length), np.arange(length)))
+    left = 1 - np.trace(basis.T @ covariance @ basis) / length
+    assert sensitivity.left_by_starts(slow) == pytest.approx(left)
+    assert sensitivity.left_by_starts(NoiseModel(np.zeros(0), 1.0)) == pytest.approx(1 - 2 / length)
+
+
+def test_slow_noise_may_grow_from_short_segments_to_long_ones():
+    data = prepare(TRUE, [record(0)])
+    fits = [level.fit(TRUE, default_free(TRUE)) for level in (data.segmentations[0], data.segmentations[2])]
+    base = CandidateFit("", fits[1])
+    at = Standing(
+        data.segmentations, data, base, fits[0], ranked(base, ())[1], fits[0].rmse, fits[0], fits[1]
+    )
+    shortest = int(min(np.min(w.ends - w.begins) for w in fits[0].segments))
+    for pole, conceded in ((0.5, False), (0.96, True), (1 - 0.5 / shortest, False)):
+        slow = NoiseModel(np.array([pole]), at.noise.sigma)
+        # what lasts longer than the shortest segments is not told from what is missing
+        assert (at.colour(slow) is slow) == (slow.memory <= shortest)
+        assert (at.by_noise(fits[1], slow) > 1.01 * GROWN * at.floor) == conceded

@@ -66,6 +66,9 @@ class FitResult:
         record (None: shared by all), with its move in scaled parameters.
     scale : (p,) array
         Natural scale of each parameter.
+    slopes : (pv,) array
+        Derivatives of the parameters by the scaled ones that `sensitivity` is of: as many as `names`, unless
+        records have some for themselves.
     own : mapping of str to mapping of str to OwnValue
         Of the parameters that every record has for itself: by name, then by record.
     starts : list of (nw, ns) array
@@ -95,6 +98,7 @@ class FitResult:
     at_bound: tuple[bool, ...]
     null: list
     scale: np.ndarray
+    slopes: np.ndarray
     own: Mapping[str, Mapping[str, OwnValue]]
     starts: list
     segments: list
@@ -136,6 +140,11 @@ class FitResult:
             filtered = self.error_filter.filtered
             seen = [filtered(x, w.slices) for x, w in zip(self.residual, self.segments, strict=True)]
         return [float(e @ e) for e in seen]
+
+    @property
+    def spanned(self) -> int:
+        """How many samples of the records the segments span, those left out included."""
+        return sum(int(np.sum(w.ends - w.begins)) for w in self.segments)
 
     @property
     def outputs(self) -> int:
@@ -394,13 +403,13 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
     """Return the outcome of a fit; `errors`: with covariance, from the derivatives of its last step."""
     problem, theta, residual = stage.problem, found.theta, found.residual
     covariance, null, linear = np.zeros((0, 0)), [], None
+    slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
     if problem.names and found.slopes is not None:
         by_parameter = [problem.in_columns(k, slopes) for k, slopes in enumerate(found.slopes[0])]
         parts = (stage.segments, stage.precision(found.states), problem.error_filter)
         linear = partial(OutputSensitivity, by_parameter, found.slopes[1], *parts)
         if errors:
             covariance, null = covariance_of(stage, found, linear())
-            slopes = np.array([v.slope(q) for v, q in zip(problem.variables, theta, strict=True)])
             covariance = covariance * np.outer(slopes, slopes)
     weights = weights_of(problem, covariance, null)
     values = problem.named(theta, weights)
@@ -426,6 +435,7 @@ def _outcome(stage: Stage, found: Solution, errors: bool) -> FitResult:
         at_bound=tuple(by_name(problem, at_bound, all)),
         null=[(size, parts_of(problem, direction)) for size, direction in null],
         scale=np.array(by_name(problem, scale, max)),
+        slopes=slopes,
         own=own_values(problem, values, covariance, null, at_bound, scale),
         starts=found.states.values,
         segments=stage.segments,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import matmul_toeplitz
 from scipy.sparse.linalg import splu
 
 from ..shooting.elimination import products_of, states_for
@@ -65,6 +66,24 @@ class OutputSensitivity:
         for w, where in enumerate(segments.places):
             found[where, w] = states[where] @ root[w]
         return found.reshape(len(states), -1)
+
+    def left_by_starts(self, noise: NoiseModel) -> float:
+        """Return the share of the power of noise that fitted initial states leave.
+
+        `noise`: of residuals at the full rate of the records.
+        """
+        taken = 0.0
+        for k, segments in enumerate(self.segments):
+            columns, ns = self.absorbed_by_starts(k), self.states[k].shape[1]
+            if not columns.shape[1]:
+                continue
+            reach = (int(np.max(segments.counts)) - 1) * segments.step + 1
+            known = [noise.of(i).correlation(reach)[:: segments.step] for i in range(segments.outputs)]
+            for i, where in enumerate(segments.slices):
+                output, w = divmod(i, len(segments))
+                own = columns[where, w * ns : (w + 1) * ns]
+                taken += float(np.sum(own * matmul_toeplitz(known[output][: len(own)], own)))
+        return 1 - taken / sum(map(len, self.states))
 
     def beside(self, noise: NoiseModel) -> Callable[[np.ndarray], np.ndarray]:
         """Return what takes from whitened signals (n,) or (n, m) all that refitting could explain of them.

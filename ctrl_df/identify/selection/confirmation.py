@@ -71,7 +71,8 @@ def confirmed(
     # what contains the baseline never errs more where both are fitted as well
     base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
     chosen, noise = ranked(base, others)
-    at = replace(at, data=data, base=base, noise=noise, floor=floor, farthest=fits[-1][0])
+    least = min((f for f in fits[0] if f is not None), key=lambda f: f.rmse)
+    at = replace(at, data=data, base=base, noise=noise, floor=floor, least=least, farthest=fits[-1][0])
     if at.grows:
         at = replace(at, farthest=_farthest(at, fits[-1]))
     if not chosen:

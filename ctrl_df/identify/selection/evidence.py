@@ -7,15 +7,19 @@ probable the recorded values are.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..data.derivatives import step_of
+from ..data.measurement import Measurement
 from ..estimation.segmented import CandidateFit
+from ..prediction.sensed import POSITION, sensed
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..thresholds import NOTHING
 from .rounding import rounding_evidence
-from .thresholds import REFUTED
+from .thresholds import FINE, REFUTED, SAME_STEP
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
@@ -39,6 +43,27 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
 def rounds(tried: CandidateFit) -> bool:
     """Whether what a candidate adds is a sensor that rounds: its errors are no noise."""
     return bool(tried.key) and _step(tried) > 0
+
+
+def step_as_recorded(tried: CandidateFit, records: Sequence[Measurement]) -> float:
+    """Return the resolution of the records where it is what a candidate adds, and fine; else 0.
+
+    All values lie on the grid, so that records say so themselves, without a model: rounding is their noise,
+    and no model lacks it. Values that crowd about the lines of a grid have a noise of their own; a coarse
+    grid changes what the sensor tells.
+    """
+    step = _step(tried) if rounds(tried) else 0.0
+    for known in map(sensed, records):
+        for y, column in zip(known.values, known.columns, strict=True):
+            fine = step <= FINE * float(np.std(y)) and abs(step_of(y) - step) <= SAME_STEP * step
+            if column == POSITION and not fine:
+                return 0.0
+    return step
+
+
+def rounding_error(tried: CandidateFit) -> float:
+    """Return the rms of the error that the rounding of a candidate makes; 0 if it does not round."""
+    return _step(tried) / math.sqrt(12) if rounds(tried) else 0.0
 
 
 def _step(tried: CandidateFit) -> float:

@@ -11,19 +11,27 @@ from ..prediction.segments import facts
 from ..residuals.missing_forces import MissingForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
-from ..thresholds import NOTHING
-from .evidence import rounds
+from ..shooting.noise_model import NoiseModel
+from ..thresholds import BY_CHANCE, NOTHING
+from .evidence import rounding_error, rounds
 from .search import Located, Remainder
-from .thresholds import FORCE_ALIKE, GROWN, LEFT, NOISIER
+from .thresholds import FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
 
 
 def remainder(
-    base: CandidateFit, best: CandidateFit, data: SegmentedData, noise, floor: float, significant: float
+    base: CandidateFit,
+    best: CandidateFit,
+    data: SegmentedData,
+    noise: NoiseModel,
+    colour: NoiseModel,
+    most: float,
+    significant: float,
 ) -> Remainder:
     """Return what the best model leaves.
 
     Structure shows on the segments fitted by what free forces explain, and on those held out by an error
-    beyond the noise: that of the fitted segments, times what the records' own noise floors say of the two.
+    beyond the noise and what the parameters are known to. The noise is that of the fitted segments, times
+    what its colour and the records' own noise floors say of the two.
 
     Parameters
     ----------
@@ -31,8 +39,10 @@ def remainder(
     data : SegmentedData
     noise : NoiseModel
         Of the best model's residual.
-    floor : float
-        Error that a fit can come down to at best.
+    colour : NoiseModel
+        The same as far as it may be slow.
+    most : float
+        Error over the segments fitted that noise alone may make.
     significant : float
         Evidence that free forces need [nats].
     """
@@ -40,11 +50,12 @@ def remainder(
     # rounded.
     rounded = rounds(best)
     missed = missing_forces(base if rounded else best, data, noise)
-    telling = bool(missed) and missed[0].evidence > significant
+    # what rounding errs by may go with the motion
+    telling = bool(missed) and missed[0].evidence > significant and missed[0].rms > rounding_error(best)
     structure = missed[0].rms if telling else 0.0
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
-        structure = max(structure, math.sqrt(max(best.train.rmse**2 - (GROWN * floor) ** 2, 0.0)))
+        structure = max(structure, math.sqrt(max(best.train.rmse**2 - most**2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, NOTHING))
     assert best.validation is not None and base.validation is not None
@@ -53,12 +64,38 @@ def remainder(
         for v in (data.train, data.validation)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
-    expected = NOISIER * spread * max(1.0, floors[1] / floors[0])
+    expected = _noisier(best, colour) * spread * max(1.0, floors[1] / floors[0])
+    if best.validation.rmse > expected:
+        expected = _at_most(expected, best, data, colour)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
     unexplained = telling if rounded else share > LEFT
     return Remainder(spread, max(structure, outside), unexplained, missed)
+
+
+def _noisier(best: CandidateFit, colour: NoiseModel) -> float:
+    """Return the error of noise alone held out over that on segments fitted, at most."""
+    assert best.validation is not None
+    shares = [colour.memory / f.spanned for f in (best.train, best.validation)]
+    return by_chance(min(2 / sum(shares), INDEPENDENT_MOST))
+
+
+def _at_most(expected: float, best: CandidateFit, data: SegmentedData, colour: NoiseModel) -> float:
+    """Return the error held out that noise makes, and parameters that are off by as much as may be chance.
+
+    `expected`: of noise that initial states take as much of as on the segments fitted.
+    """
+    names, covariance, held = best.train.names, best.train.covariance, best.validation
+    assert held is not None
+    there = data.fit(held.model, names, view=data.validation, starts=held.starts, iterations=0)
+    if there.sensitivity is None or best.train.sensitivity is None or len(there.slopes) != len(covariance):
+        return expected
+    left = there.sensitivity.left_by_starts(colour) / best.train.sensitivity.left_by_starts(colour)
+    columns = np.concatenate(there.sensitivity.parameters) / there.slopes
+    power = float(np.sum((columns @ covariance) * columns)) / len(columns) / there.unit**2
+    most = max(left, 1.0) * expected**2 + BY_CHANCE**2 * power
+    return math.sqrt(most) if math.isfinite(most) else math.inf
 
 
 def located(

@@ -190,6 +190,10 @@ class Search(ABC):
     def located(self, best, remainder: Remainder, unknown: bool) -> Located:
         """Return where the error is: of the model, or (`unknown`) of what is left."""
 
+    def as_recorded(self, judged) -> str:
+        """Return what a candidate adds, where that is noise that the records tell of without a model."""
+        return ""
+
     def exact(self) -> bool:
         """Whether the model errs by rounding alone."""
         return False

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
@@ -12,7 +15,7 @@ from ..prediction.values import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from .evidence import ranked
-from .thresholds import GROWN
+from .thresholds import GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,8 @@ class Standing:
         Of the best model's residual.
     floor : float
         Error that a fit can come down to at best; 0 where it is not known yet.
+    least : FitResult or None
+        The fit over the shortest segments that errs least; None where it is not known yet.
     farthest : FitResult or None
         The model refitted over the longest segments that may judge; None: not known yet.
     """
@@ -43,6 +48,7 @@ class Standing:
     nearest: FitResult
     noise: NoiseModel
     floor: float = 0.0
+    least: FitResult | None = None
     farthest: FitResult | None = None
 
     @property
@@ -50,7 +56,32 @@ class Standing:
         """Whether the model, refitted, errs over longer segments by more than slow noise does."""
         if self.data.disturbed or self.farthest is None:
             return False
-        return self.farthest.rmse > GROWN * self.nearest.rmse
+        return self.farthest.rmse > self.grown(self.nearest, self.farthest) * self.nearest.rmse
+
+    def colour(self, noise: NoiseModel) -> NoiseModel:
+        """Return the noise if it forgets within the shortest segments, else white noise.
+
+        What lasts longer is not told from something that is missing: nothing is conceded to it.
+        """
+        shortest = min(int(np.min(w.ends - w.begins)) for w in self.nearest.segments)
+        told = noise.memory <= shortest
+        return noise if told else NoiseModel(np.zeros(0), noise.sigma)
+
+    def by_noise(self, fit: FitResult, noise: NoiseModel) -> float:
+        """Return the error over the segments of a fit that noise alone may make, slow noise too."""
+        return self.floor * (GROWN if self.least is None else self.grown(self.least, fit, noise))
+
+    def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
+        """Return how many times larger noise alone may be over longer segments, by its colour and by chance.
+
+        Of slow noise the initial states of short ones take a part, the more of them the more. `noise`: None:
+        that which judges.
+        """
+        if near.sensitivity is None or far.sensitivity is None:
+            return GROWN
+        colour = self.colour(noise or self.noise)
+        left = far.sensitivity.left_by_starts(colour) / near.sensitivity.left_by_starts(colour)
+        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / colour.memory))
 
     def by_accelerations(self, free: tuple[str, ...]) -> Standing:
         """Return the same where disturbance forces drown all else over longer segments.

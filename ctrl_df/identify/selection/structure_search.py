@@ -13,18 +13,18 @@ from ..estimation.refit_records import blurred, refit_records
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
-from ..prediction.sensed import POSITION, sensed
+from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import grows
 from ..thresholds import GROWTH, PROCESS_NOISE, SIGNIFICANT, UNMOVED
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import breaks_away_only, indistinguishable
-from .evidence import ranked
+from .evidence import ranked, step_as_recorded
 from .first_look import FirstLook
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
 from .standing import Standing, begun
-from .thresholds import EXACT, FLOOR, GROWN, SETTLED, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EXACT, FLOOR, SETTLED, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -194,20 +194,30 @@ class StructureSearch(Search):
             return Remainder(0.0, error, False)
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
 
+    def as_recorded(self, judged):
+        """Return the resolution of the records, where a candidate adds just that; else nothing."""
+        fitted, held = self.records
+        step = step_as_recorded(judged, (*fitted, *held))
+        return f", whose values are rounded to {step:.3g} {place_unit(fitted[0])}" if step else ""
+
     def exact(self):
         """Whether the model errs by rounding alone."""
         return self.at.base.train.nrmse < EXACT and not self.at.data.disturbed
 
     def remainder(self, best, significant):
         """Return what the best model leaves."""
+        noise = self._noise(best)
         left = remainder(
-            self.at.base, best, self.at.data.fine, self._noise(best), self.at.floor, self.significant
-        )
+            self.at.base, best, self.at.data.fine, noise, self.at.colour(noise),
+            self.at.by_noise(best.train, noise), self.significant,
+        )  # fmt: skip
         if self.at.data.disturbed and not significant and self.at.nearest.nrmse > UNMOVED:
             # accelerations that are mostly noise do not speak for a model that does not even move
             return replace(left, unexplained=True)
         if self.at.grows:
             return self._growing(left, best) if significant else self._growing(left)
+        if not left.unexplained and self.as_recorded(best):
+            return replace(left, noise=self.at.base.train.rmse, structure=0.0)
         return left
 
     def _noise(self, judged):
@@ -225,7 +235,7 @@ class StructureSearch(Search):
             shortest, *_, longest = self.at.segmentations
             near, far = shortest.moved(best.train), longest.reached(best.train)
         assert far is not None
-        if far.rmse <= GROWN * near.rmse:
+        if far.rmse <= self.at.grown(near, far) * near.rmse:
             return left
         seconds = max(
             float(np.max(w.ends - w.begins)) * facts(r).dt

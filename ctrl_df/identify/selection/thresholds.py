@@ -58,12 +58,20 @@ unknown hidden leave more to whatever stands in for it, those of the library les
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
 
-NOISIER = round(math.exp(BY_CHANCE / math.sqrt(80)), 1)
-"""Error on held-out segments over that on fitted ones that may be chance for 80 effective samples, 1.4."""
+INDEPENDENT_MOST = 80
+"""Independent samples that noise is taken to have at most where records are compared: two of them of 80 each
+differ by a factor of 1.4 by chance, and levels of noise differ from record to record anyway."""
 
 GROWN = 2.0
-"""Error over the least that the shortest segments leave, up to which it may be noise: slow noise of thrice
-the power of the fast one, the only one that short segments do not absorb (rigs with coloured noise)."""
+"""Error over the least that the shortest segments leave, up to which it may be noise in any case: slow noise
+of thrice the power of the fast one, the only one that short segments do not absorb (rigs with coloured
+noise). Noise that is known to be slower may grow by more."""
+
+
+def by_chance(independent: float) -> float:
+    """Return how many times larger one rms of noise may be than another, of so many independent samples."""
+    return math.exp(BY_CHANCE / math.sqrt(independent))
+
 
 SETTLED = 600
 """Simulations at most that fit the parameters of the model that is named, as many as `refit` makes."""
@@ -77,6 +85,13 @@ COARSE = 0.4
 
 FINEST = 0.02
 """Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
+
+FINE = 0.1
+"""Step of a grid over the spread of the values up to which it is fine: a loop sees in it a gain of one within
+1 % (describing function of a quantizer, over amplitudes about the square root of two of the spread)."""
+
+SAME_STEP = 0.01
+"""Relative difference of two steps of the same grid."""
 
 STRAY = 1e-3
 """Share of rounded samples that may lie on any line."""

@@ -89,7 +89,8 @@ class _Asked:
             same = tuple(o.key for o in chosen if o is not judged and search.alike(judged, o))
             ranking.append(_entry(judged, search, weight, same))
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
-        significant = bool(ranking) and worth(ranking[0], search)
+        recorded = search.as_recorded(chosen[0]) if chosen else ""
+        significant = bool(ranking) and worth(ranking[0], search) and not recorded
         remainder = search.remainder(best, significant)
         if search.exact():
             verdict = NONE
@@ -114,7 +115,8 @@ class _Asked:
             settled = _entry(search.settled(best), search, first.probability, first.equivalents)
             ranking = [settled, *ranking[1:]]
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
-        return Diagnosed(replace(result, explanation=explain(result, search.words) + note), search)
+        words = replace(search.words, noise=search.words.noise + recorded)
+        return Diagnosed(replace(result, explanation=explain(result, words) + note), search)
 
     def _base(self) -> Baseline:
         search = self.search

@@ -96,6 +96,24 @@ class NoiseModel:
         impulse = self._impulse()
         return float(np.sum(impulse) ** 2 / np.sum(impulse**2))
 
+    def correlation(self, count: int) -> np.ndarray:
+        """Return the correlation of values 0 to ``count - 1`` samples apart."""
+        impulse = self._impulse()
+        power = np.abs(np.fft.rfft(impulse, 2 * max(len(impulse), count))) ** 2
+        found = np.fft.irfft(power)[:count]
+        return found / found[0]
+
+    @property
+    def memory(self) -> float:
+        """Variance of the mean square over that of white noise: samples per sample that tells it.
+
+        References
+        ----------
+        Bartlett (1946).
+        """
+        rho = self.correlation(len(self._impulse()))
+        return float(2 * rho @ rho - 1)
+
     def _impulse(self):
         from scipy.signal import lfilter
 
