@@ -34,8 +34,8 @@ def play(rig, plan, seed):
 
 
 CASES = [
-    # a shorter one leaves both fits beside their minimum with some BLAS kernels, and the two alike
-    ("stiction", "stribeck", 15, True, dict(duration=1.6)),
+    # seeds 15 to 18 are all told as stiction, 15 by 5 nats, the others by 38 to 167
+    ("stiction", "stribeck", 16, True, {}),
     ("linear_spring", "cubic_spring", 3, False, {}),
 ]
 
@@ -60,7 +60,7 @@ def test_it_separates_on_the_true_plant(hidden, other, seed, closed, asked):
     new = cdf.Measurement(plan.t, played["u"], played["y"])
     after = diagnose(rig.baseline, [record, new], candidates=(hidden, other))
     assert after.best.id == hidden
-    # the record alone may name the other one, as it does for seed 15: it is then overruled
+    # the record alone may name the other one, as it does for seed 17: it is then overruled
     assert after.ranking[0].evidence - after.ranking[1].evidence > 3
 
 

@@ -101,3 +101,13 @@ def test_what_cannot_be_used_is_refused(x):
         cdf.Measurement(T, U, np.where(T > 3, np.nan, x))
     with pytest.raises(ValueError, match="in_parts"):
         cdf.Measurement(T, U, x + 0.4 * (T > 3.0))
+
+
+def test_the_steps_of_a_coarse_sensor_are_no_resets():
+    rng, t = np.random.default_rng(3), np.arange(0, 4, 1e-3)
+    x = 0.1 * np.round(3.2 * np.sin(2 * t))
+    slow = np.cumsum(rng.standard_normal(t.size)) * 1e-5
+    for noise in (0 * t, 1e-4 * rng.standard_normal(t.size), slow):
+        cdf.Measurement(t, np.sin(2 * t), x + noise)
+    with pytest.raises(ValueError, match="without leaps"):
+        cdf.Measurement(t, np.sin(2 * t), np.sin(2 * t) - 0.5 * (t > 1) - 0.9 * (t > 2) + 0.7 * (t > 3))

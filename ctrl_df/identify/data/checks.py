@@ -8,7 +8,7 @@ import numpy as np
 
 from ...checks import is_number, shown
 from .derivatives import grain, step_of
-from .thresholds import BESIDE, FAST, LEAP, MINIMUM, USUAL_STEPS
+from .thresholds import BESIDE, FAST, LEAP, MINIMUM, SINGLE, USUAL_STEPS
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -154,6 +154,9 @@ def leaps(x: np.ndarray) -> np.ndarray:
     found = np.flatnonzero(alone & (steps > FAST * np.max(steps[~alone], initial=0.0)))
     jumps = np.zeros(len(steps))
     jumps[found] = np.diff(x)[found]
-    between = x[1:] - np.cumsum(jumps)
-    # a coarse sensor that rounds moves by its steps alone: nothing is seen between them
-    return found[np.minimum(steps[found], seen) < np.ptp(between)]
+    between = np.ptp(x[1:] - np.cumsum(jumps))
+    # A coarse sensor that rounds moves by its steps alone: nothing is seen between them, or, where noise
+    # comes after it, less than half a step. After a reset the next one leaps by what the machine moved.
+    if len(found) > SINGLE and between < 0.5 * np.min(steps[found]):
+        return found[:0]
+    return found[np.minimum(steps[found], seen) < between]

@@ -10,6 +10,9 @@ MINIMUM = 10
 BESIDE, LEAP, FAST = 5, 20.0, 5.0
 """Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
 
+SINGLE = 2
+"""Leaps up to which none is a step of a coarse sensor: there and back again is no motion."""
+
 USUAL_STEPS = (0.05, 0.95)
 """Quantiles between which steps of time lie that are usual."""
 

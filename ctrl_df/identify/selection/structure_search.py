@@ -178,7 +178,11 @@ class StructureSearch(Search):
         there = data.as_it_is(found)
         there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
         settled = data.validate(replace(judged, train=there))
-        return settled if settled.size <= GROWTH**2 * judged.size else judged
+        if settled.size > GROWTH**2 * judged.size:
+            return judged
+        # where parts of the records are held out, this fit has seen them: what is told of them is of the last
+        # one that has not
+        return settled if self.records[1] else replace(settled, validation=judged.validation)
 
     def predicted(self, judged):
         """Return the model and the records held out (angles as these have them), or those fitted."""
