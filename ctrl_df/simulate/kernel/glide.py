@@ -176,14 +176,17 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                     state[RANK] -= 1.0
                     state[LEFT] = RANK_PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
-            if store.ready[place] != USABLE or not share >= bent_step(
-                prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
-                state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
-                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
-            ):  # fmt: skip
+            error = math.inf
+            if store.ready[place] == USABLE:
+                error = bent_step(
+                    prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
+                    state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
+                    place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
+                )  # fmt: skip
+            if not error <= share:
                 place = _again(
                     prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share,
-                    ny,
+                    error, ny,
                 )  # fmt: skip
             if place < 0 or narrow(prog, x, ahead):
                 break
@@ -361,10 +364,13 @@ def _straight(
 
 
 @part
-def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
+def _again(
+    prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, error, ny
+):  # fmt: skip
     """Try again a curved step that failed: with matrices not made yet, with K taken anew, with more parts.
 
-    Returns the propagator that it succeeded with, -1 where none will do.
+    `error`: by which it failed with the matrices there were. The same is tried whether a run before this one
+    has had them made or not. Returns the propagator that it succeeded with, -1 where none will do.
     """
     state, h = bend.state[slot], tracks.length[which]
     first = rank = int(state[RANK])
@@ -372,7 +378,6 @@ def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol,
     before = math.inf
     while True:
         place = (slot * LENGTHS + which) * RANKS + rank
-        error = 0.0
         if store.ready[place] == 0:
             _make(store, tracks, bend, place, slot, h, x.shape[0], store.b.shape[2], ny)
             tried = True
