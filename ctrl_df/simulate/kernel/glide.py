@@ -176,17 +176,14 @@ def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index
                     state[RANK] -= 1.0
                     state[LEFT] = RANK_PATIENCE
             place = (slot * LENGTHS + which) * RANKS + int(state[RANK])
-            error = math.inf
-            if store.ready[place] == USABLE:
-                error = bent_step(
-                    prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
-                    state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
-                    place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
-                )  # fmt: skip
-            if not error <= share:
+            if store.ready[place] != USABLE or not share >= bent_step(
+                prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
+                state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, place % RANKS),
+                place == before, t, tracks.length[which], here, ahead, size, grain, rtol, atol,
+            ):  # fmt: skip
                 place = _again(
                     prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share,
-                    error, ny,
+                    ny,
                 )  # fmt: skip
             if place < 0 or narrow(prog, x, ahead):
                 break
@@ -364,13 +361,11 @@ def _straight(
 
 
 @part
-def _again(
-    prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, error, ny
-):  # fmt: skip
+def _again(prog, node, store, tracks, bend, slot, which, t, x, mode, rtol, atol, size, grain, share, ny):
     """Try again a curved step that failed: with matrices not made yet, with K taken anew, with more parts.
 
-    `error`: by which it failed with the matrices there were. The same is tried whether a run before this one
-    has had them made or not. Returns the propagator that it succeeded with, -1 where none will do.
+    What is tried does not hang on whether a run before this one has had matrices made: by how much the first
+    ones err is not asked. Returns the propagator that it succeeded with, -1 where none will do.
     """
     state, h = bend.state[slot], tracks.length[which]
     first = rank = int(state[RANK])
@@ -378,12 +373,12 @@ def _again(
     before = math.inf
     while True:
         place = (slot * LENGTHS + which) * RANKS + rank
-        if store.ready[place] == 0:
+        error, made = 0.0, store.ready[place] == 0
+        if made:
             _make(store, tracks, bend, place, slot, h, x.shape[0], store.b.shape[2], ny)
-            tried = True
         if store.ready[place] != USABLE:
             return -1
-        if tried:
+        if tried or made:
             error = bent_step(
                 prog, node, mode, store.acting, bend.push, bend.dx, bend.nodes, bend.slope[slot],
                 state[0] != 0.0, bend.base[place], bend.gain[place], parts(store, rank), False, t, h,
@@ -392,6 +387,8 @@ def _again(
             if error <= share:
                 state[RANK] = rank
                 return place
+        if not tried:
+            error = 0.0
         tried = True
         if lag < 0.0:
             lag = contraction(prog, node, store, bend, slot, t, h, x, mode, size)
