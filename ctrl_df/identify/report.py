@@ -53,7 +53,7 @@ def render(study) -> str:
         records=f"Fitted to {names}. Held out: {held}.",
         verdict=_VERDICTS[study.verdict],
         lead=study.summary().split("\n")[0],
-        errors=_ERRORS[study.measure],
+        errors=study.model.coordinates.text(_ERRORS[study.measure]),
         as_drawn=f"over {drawn[0].over}, of {_shown(study).name} alone",
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
         steps=_steps(study, drawn),

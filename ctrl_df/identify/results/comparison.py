@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...drawing import draw
 from ..data.derivatives import automatic_cutoff, derivative
 from ..data.imposed import imposed_motion
@@ -277,7 +278,7 @@ class Comparison(ComparisonBase):
         imposed = next((r.record for r in self.records if facts(r.record).imposed), None)
         how = "free run from fitted initial states"
         if imposed is not None:
-            how = f"in force, {imposed_motion(imposed)}"
+            how = moving_in(imposed.input_unit).text(f"in force, {imposed_motion(imposed)}")
         elif self.mode == "windows":
             lengths = [float(np.ptp(r.record.t)) / r.windows for r in self.records]
             how = (

@@ -61,7 +61,7 @@ def explain(d, words) -> str:
             f"error from {size}.{same}{doubts} next_experiment gives {words.separates} that would separate "
             "them."
         )
-    where, shows = places(d.where), words.shows.format(first.effect.shows)
+    where, shows = places(d.where), words.shows.format(first.model.coordinates.text(first.effect.shows))
     doubts = "".join(f" {s}" for s in d.doubts)
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "

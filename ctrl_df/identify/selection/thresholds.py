@@ -73,8 +73,8 @@ def by_chance(independent: float) -> float:
     return math.exp(BY_CHANCE / math.sqrt(independent))
 
 
-SETTLED = 600
-"""Simulations at most that fit the parameters of the model that is named, as many as `refit` makes."""
+REFIT_MOST = 600
+"""Simulations at most that refit a model that may be named, as many as `refit` makes."""
 
 ANOTHER_START = (1.5, 0.02)
 """Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
