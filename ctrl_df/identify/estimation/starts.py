@@ -26,7 +26,7 @@ def least_begins(one: FitResult, other: FitResult) -> list[np.ndarray]:
     starts = []
     for k, segments in enumerate(one.segments):
         errors = [[np.sum(f.residual[k][where] ** 2) for where in segments.places] for f in (one, other)]
-        less = np.less_equal(*errors)[:, None]
+        less = np.less_equal(errors[0], errors[1])[:, None]
         starts.append(np.where(less, one.starts[k], other.starts[k]))
     return starts
 

@@ -98,6 +98,23 @@ def grows(short: float, error: float, seconds: float, effect=None) -> str:
     )
 
 
+def explains_nothing() -> str:
+    """Return that a model makes nothing of the motion, whatever its parameters."""
+    return f"It explains nothing of this motion. {_UNITS}"
+
+
+def far_off(judged, names, stated) -> str:
+    """Return that the model without an effect explains more with parameters far from those stated."""
+    now, before = judged.block.parameters, stated.parameters
+    values = ", ".join(
+        f"{k} {now[k].value:.3g} {now[k].unit} in place of {before[k].value:.3g}" for k in names
+    )
+    return f"With {values} the model errs by {judged.train.nrmse:.2%} without any effect. {_UNITS}"
+
+
+_UNITS = "Do record and model agree in their units?"
+
+
 def undetermined(first) -> str:
     """Return which parameters of an effect the data do not determine."""
     names = " and ".join(k.replace("_", " ") for k in first.undetermined)

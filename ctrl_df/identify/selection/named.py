@@ -1,4 +1,4 @@
-"""Candidates that may be named, refitted as `refit` does and ranked by that."""
+"""Models that may be named, refitted as `refit` does and ranked by that."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..estimation.segmented import CandidateFit
 from ..thresholds import GROWTH, RULED_OUT
 from .evidence import ranked
 from .standing import Standing
-from .thresholds import FLOOR, REFIT_MOST
+from .thresholds import FLOOR, ON_LIMIT, REFIT_MOST
 
 
 def refitted(
@@ -43,7 +43,7 @@ def refitted(
     return replace(at, noise=noise), chosen
 
 
-def whole_refit(at: Standing, tried: CandidateFit, prior, own_holdout: bool) -> CandidateFit:
+def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> CandidateFit:
     """Return a candidate with the values that `refit` finds from its own.
 
     It stays as it is where the segments that judge speak against these.
@@ -52,9 +52,9 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, own_holdout: bool) -> 
     ----------
     prior : mapping or None
         Value and standard deviation of parameters known beforehand, by name.
-    own_holdout : bool
-        Whether records of their own are held out. Of parts of those fitted this fit has seen all: what is
-        told of them is of the last fit that has not.
+    seen : bool
+        Whether what is held out may be judged by this fit: it has seen all of the records fitted. Of parts
+        of them that are held out, what is told else is of the last fit that has not.
     """
     data, names = at.data.fine, tried.train.names
 
@@ -73,4 +73,26 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, own_holdout: bool) -> 
     other = data.validate(replace(tried, train=there))
     if other.size > GROWTH**2 * tried.size:
         return tried
-    return other if own_holdout else replace(other, validation=tried.validation)
+    return other if seen else replace(other, validation=tried.validation)
+
+
+def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Callable):
+    """Return the model without an effect, refitted without limits, where that explains more than the best.
+
+    Fits keep the model's own parameters within a range of what they were stated to be. Where one ends there,
+    a record or a model in other units than it says is as likely as a missing effect.
+
+    Returns
+    -------
+    tuple of (CandidateFit, tuple of str) or None
+        With the parameters that left their range; None: all are within, or it explains no more.
+    """
+    values = {k: p.value for k, p in at.base.block.parameters.items()}
+    spans = {k: span for k, span in at.data.limits.items() if k in at.base.train.names}
+    if at.data.disturbed or all(a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items()):
+        return None
+    other = refit(replace(at, data=replace(at.data, limits={})), at.base, seen=True)
+    values = {k: p.value for k, p in other.block.parameters.items()}
+    left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)
+    (judged,), _ = ranked(at.base, [other])
+    return (other, left) if left and judged.evidence > best.evidence + significant else None

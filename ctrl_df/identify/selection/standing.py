@@ -14,6 +14,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
+from ..thresholds import UNMOVED
 from .evidence import ranked
 from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
@@ -57,6 +58,19 @@ class Standing:
         if self.data.disturbed or self.farthest is None:
             return False
         return self.farthest.rmse > self.grown(self.nearest, self.farthest) * self.nearest.rmse
+
+    def unmoved(self, significant: float) -> bool:
+        """Whether disturbance forces prevail and the model explains no motion.
+
+        Then its accelerations say no more of those recorded than none at all would, or it does not follow
+        the shortest segments: accelerations that are mostly noise do not speak for such a model.
+
+        `significant`: evidence that tells something from nothing [nats].
+        """
+        if not self.data.disturbed:
+            return False
+        base = self.base.train
+        return self.nearest.nrmse > UNMOVED or -base.count * math.log(base.nrmse) < significant
 
     def colour(self, noise: NoiseModel) -> NoiseModel:
         """Return the noise if it forgets within the shortest segments, else white noise.

@@ -14,14 +14,14 @@ from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
-from ..results.explain import grows
-from ..thresholds import PROCESS_NOISE, SIGNIFICANT, UNMOVED
+from ..results.explain import explains_nothing, far_off, grows
+from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import breaks_away_only, indistinguishable
 from .evidence import ranked, step_as_recorded
 from .first_look import FirstLook
-from .named import refitted, whole_refit
+from .named import beyond_range, refitted, whole_refit
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
 from .standing import Standing, begun
@@ -113,9 +113,11 @@ class StructureSearch(Search):
         course = course or Course()
         at, chosen = confirmed(self.at, found, self.stages, partial(self._told, course), course.stage)
         course.stage("the parameters of those that may be named")
-        whole = partial(whole_refit, prior=self.prior, own_holdout=bool(self.records[1]))
-        at, chosen = refitted(at, chosen, self.significant, whole)
+        at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen
+
+    def _whole_refit(self, at: Standing, tried: CandidateFit, seen: bool = False) -> CandidateFit:
+        return whole_refit(at, tried, self.prior, seen or bool(self.records[1]))
 
     def _look(self, classes, executor) -> FirstLook:
         nominal = {k: p.value for k, p in self.block.parameters.items()}
@@ -191,9 +193,11 @@ class StructureSearch(Search):
             self.at.base, best, self.at.data.fine, noise, self.at.colour(noise),
             self.at.by_noise(best.train, noise), self.significant,
         )  # fmt: skip
-        if self.at.data.disturbed and not significant and self.at.nearest.nrmse > UNMOVED:
-            # accelerations that are mostly noise do not speak for a model that does not even move
-            return replace(left, unexplained=True)
+        if not significant and self.at.unmoved(self.significant):
+            return replace(left, unexplained=True, doubt=explains_nothing())
+        if far := beyond_range(self.at, best, self.significant, self._whole_refit):
+            other, names = far
+            return replace(left, unexplained=True, doubt=far_off(other, names, self.block))
         if self.at.grows:
             return self._growing(left, best) if significant else self._growing(left)
         if not left.unexplained and self.as_recorded(best):

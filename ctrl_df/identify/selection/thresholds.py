@@ -76,6 +76,9 @@ def by_chance(independent: float) -> float:
 REFIT_MOST = 600
 """Simulations at most that refit a model that may be named, as many as `refit` makes."""
 
+ON_LIMIT = 1.001
+"""Factor to the end of its range within which a parameter has come there: fits go on to a thousandth."""
+
 ANOTHER_START = (1.5, 0.02)
 """Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
 (rigs). Only work depends on it."""
