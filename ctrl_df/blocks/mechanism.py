@@ -191,8 +191,8 @@ class Mechanism(ct.NonlinearIOSystem):
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""
         return self._make(self._values, self._effects, measured, self._given_name)
 
-    def _named(self, name) -> Mechanism:
-        """Return the same block under another name."""
+    def with_name(self, name: str) -> Mechanism:
+        """Return the block under another name."""
         return self._make(self._values, self._effects, self._measured, name)
 
     def _changed(self, values: Mapping[str, float]):

@@ -16,7 +16,7 @@ from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import UNMOVED
 from .evidence import ranked
-from .thresholds import GROWN, by_chance
+from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class Standing:
         for best in found[:2]:
             values = {k: best.block.parameters[k].value for k in free}
             again = self.data.fit(
-                base.block.with_parameters(feasible(base.block, values)), free, iterations=8
+                base.block.with_parameters(feasible(base.block, values)), free, iterations=BASE_STEPS
             )
             if again.rmse < base.train.rmse:
                 base = CandidateFit("", again)
@@ -130,6 +130,8 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:
         begins.append(block.with_parameters(feasible(block, guess)))
-    fits = [data.moved(shortest.fit(begin, free, iterations=8), 12) for begin in begins]
+    fits = [
+        data.moved(shortest.fit(begin, free, iterations=BASE_STEPS), BASE_LONGER_STEPS) for begin in begins
+    ]
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
     return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])

@@ -130,3 +130,10 @@ that begin."""
 
 LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
 """Of the mass behind the joints that are tried."""
+
+BASE_STEPS, BASE_LONGER_STEPS = 8, 12
+"""Steps of the refitted model over short segments, and moved to longer ones: every candidate is judged beside
+it, so that it goes on for twice as long as a candidate does at first."""
+
+RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
+"""Steps of the models among which rivals of one more effect are sought: their errors are compared only."""
