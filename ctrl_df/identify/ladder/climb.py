@@ -127,7 +127,9 @@ class Climb:
             self.best = None
             if other is not None:
                 end, around = self._settled(self._on(other))
-        return self._study(self._in_full(end), end.search, COMPLETE, around)
+        steps = self._in_full(end)
+        around = replace(around, nrmse=steps[-1].nrmse, nrmse_holdout=steps[-1].nrmse_holdout)
+        return self._study(steps, end.search, COMPLETE, around)
 
     def _in_full(self, end: Rung) -> tuple[Step, ...]:
         """Return the steps to an end, the last with the parameters that a whole refit finds.
