@@ -11,7 +11,7 @@ from ..checks import place_to_write
 from .thresholds import REPORT_BUDGET, REPORT_DPI
 
 _ERRORS = {
-    "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
+    "output": "over the rms of the centred output, over segments each of which starts from a fitted state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
     "model has, such as friction that varies, are larger here than the noise of the sensor",
     "N": "of |N|",

@@ -70,7 +70,7 @@ def orbit_family(
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 
     Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the answer
-    is the one reached that way. `orbit_attractors` lists the others.
+    is the one reached that way.
 
     Parameters
     ----------

@@ -104,7 +104,7 @@ class RecordComparison:
 
     @property
     def windows(self) -> int:
-        """Number of windows; 1: a free run."""
+        """Number of segments; 1: a free run."""
         return len(self.edges) - 1
 
     @cached_property
@@ -235,7 +235,7 @@ class Comparison(ComparisonBase):
 
     @property
     def windows(self) -> int:
-        """Number of windows of all records together."""
+        """Number of segments of all records together."""
         return sum(r.windows for r in self.records)
 
     @property
@@ -246,7 +246,7 @@ class Comparison(ComparisonBase):
     @property
     def over(self) -> str:
         """What the model was judged over, in words."""
-        return "a free run" if self.mode == "free" else f"{self.windows} windows"
+        return "a free run" if self.mode == "free" else f"{self.windows} segments"
 
     def report(self) -> str:
         """Return the comparison as text: each record, the tests, the regions."""
@@ -282,7 +282,7 @@ class Comparison(ComparisonBase):
         elif self.mode == "windows":
             lengths = [float(np.ptp(r.record.t)) / r.windows for r in self.records]
             how = (
-                f"{self.windows} windows of {np.mean(lengths):.3g} s, each from a fitted initial state "
+                f"{self.windows} segments of {np.mean(lengths):.3g} s, each from a fitted initial state "
                 "(nothing holds this model in place: over a free run it would drift)"
             )
         if worst.record.note:

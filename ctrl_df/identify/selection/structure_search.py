@@ -16,9 +16,9 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
+from .alike import breaks_away_only, indistinguishable
 from .attempts import own_names
 from .confirmation import confirmed, stages
-from .equivalence import breaks_away_only, indistinguishable
 from .evidence import ranked, step_as_recorded
 from .first_look import FirstLook
 from .named import beyond_range, refitted, whole_refit
