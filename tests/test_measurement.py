@@ -148,7 +148,8 @@ def test_csv_units_in_the_header_decimal_commas_and_text_columns(tmp_path):
     path.write_text("time [ms];F (kN);x [mm];state\n" + "\n".join(lines))
     m = Measurement.from_csv(path, time="time", input="F", output="x")
     assert np.allclose(m.t, t) and np.allclose(m.u, 1e3 * u, atol=1e-3) and np.allclose(m.y, y, atol=1e-8)
-    forced = Measurement.from_csv(path, time="time", input="F", output="x", output_unit="m")
+    with pytest.warns(UserWarning, match="the header of output says mm, output_unit='m' is taken"):
+        forced = Measurement.from_csv(path, time="time", input="F", output="x", output_unit="m")
     assert np.allclose(forced.y, 1e3 * y, atol=1e-5)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -175,8 +176,15 @@ def select(
 
     for field, wanted in wanted_of.items():
         chosen[field], unit = take(wanted, said[field])
-        if unit and keywords.get(unit_of[field]) is None:
+        stated = keywords.get(unit_of[field])
+        if unit and stated is None:
             chosen[unit_of[field]] = unit
+        elif unit and stated != unit:
+            warnings.warn(
+                f"{source}: the header of {said[field]} says {unit}, {unit_of[field]}={stated!r} is taken. "
+                f"Leave {unit_of[field]} out, or mend the header.",
+                stacklevel=3,
+            )
     if outputs is not None:
         chosen["outputs"] = {}
         for word, given in mapping("a record", "outputs", outputs, "{'x': 'pos', 'v': 'tacho'}").items():
