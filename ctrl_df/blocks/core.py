@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .effect import Effect, known
+from .effect import Effect
 from .primitives import Delay, Lag, Play, Primitive, RateLimiter
+from .stated import known
 
 RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
 BOTH = -1

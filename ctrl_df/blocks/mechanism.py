@@ -16,10 +16,11 @@ from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
-from .effect import Effect, share_name, stated_parameters, static_levels
+from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Viscous
 from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
+from .stated import share_name, stated_parameters, static_levels
 
 _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...blocks.core import level
-from ...blocks.effect import static_levels
+from ...blocks.stated import static_levels
 from ..estimation.segmented import CandidateFit
 from ..shooting.noise_model import NoiseModel, whitened_power
 from ..thresholds import NOTHING, TOLD_APART

@@ -10,8 +10,8 @@ import control as ct
 import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, RIGID, Core
-from ...blocks.effect import stated_parameters
 from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
+from ...blocks.stated import stated_parameters
 from ...checks import returned, shown
 from ..thresholds import PROBED
 from . import layout as L
