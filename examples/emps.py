@@ -196,7 +196,7 @@ def main(folder, report=None):
         print("\n".join(f"    {p}" for p in fit.parameters.values()), flush=True)
 
     # our own effect in place of what bends the friction; a tenth of a second at a time, as slow changes of
-    # friction (a newton from one record to the other) drowns all else over longer windows
+    # friction (a newton from one record to the other) drowns all else over longer segments
     plain = study.model.without_effect("stribeck") if "stribeck" in study.effects else study.model
     friction = published.parameters["coulomb.level"].value
     start = {"coulomb.level": 0.6 * friction, "viscous.coefficient": 200.0}

@@ -23,7 +23,7 @@ Carried is what passes through the gears: the drive's torque where all inertia l
 where none does, a share of each in between.
 
 **Method.** Weight and arm are known, and so is the torque of gravity: it is the scale by which volts become
-torques. The rest is refitted on the records of the lower gain, over windows of half a second, with and
+torques. The rest is refitted on the records of the lower gain, over segments of half a second, with and
 without the friction that carries load, and judged on those of the higher gain; beside it, refitted in the
 same way, the law that BAM prefers, whose bump at low speed grows with the load as well. Then the same as if
 nobody had weighed the pendulum: the published constant of the motor is the scale, and inertia and torque of

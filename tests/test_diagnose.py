@@ -178,6 +178,20 @@ def test_nothing_hidden_is_none(draw):
     assert found.next_experiment is None
 
 
+@pytest.mark.parametrize("lengths", [1e3, 1e-3])
+def test_a_length_in_another_unit_is_no_missing_effect(lengths):
+    t = np.arange(0, 4, 0.005)
+    force = 9 * np.sin(3 * t)
+    (x,) = np.asarray(cdf.event_response(cdf.friction_mass(2.2, 3, 6), t, force).outputs)[:1]
+    x = x + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
+    model = cdf.friction_mass(2, 2.5, 5)
+    found = diagnose(model, Measurement(t, force, lengths * x), candidates=["backlash", "linear_spring"])
+    assert found.verdict == "unknown" and "units" in found.explanation
+    # none of the motion is left to explain: a time of 1000 s for one of 1 s
+    slow = diagnose(model, Measurement(1e3 * t, force, x), candidates=["input_lag"])
+    assert slow.verdict == "unknown" and "units" in slow.explanation
+
+
 def test_one_record_alone():
     rig = rigs.draw("linear_spring", 14, snr_db=60, n=4000)
     found = diagnose(rig.baseline, of(rig)[0], candidates=("linear_spring", "constant_force"))

@@ -121,3 +121,10 @@ def test_guess_of_the_wrong_kind():
     loop = cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))
     with pytest.raises(TypeError, match="a guess must be"):
         cdf.find_limit_cycle(loop, guess="near 14 rad/s")
+
+
+def test_a_guess_at_which_nothing_moves_finds_no_orbit():
+    axis = cdf.Mass(20, [cdf.Coulomb(25), cdf.Viscous(20), cdf.Stiction(35)])
+    loop = cdf.closed_loop(cdf.pid(2000, 3000, 130), axis)
+    assert not cdf.find_limit_cycle(loop, guess=(0.01, 3))
+    assert cdf.find_limit_cycle(loop, guess=(60, 3)).stable

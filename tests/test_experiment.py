@@ -12,7 +12,7 @@ import test_frequency as tables
 
 import ctrl_df as cdf
 from ctrl_df.identify.diagnose import diagnose
-from ctrl_df.identify.experiment import next_experiment
+from ctrl_df.identify.experiment import Experiment, next_experiment
 from ctrl_df.identify.planning.inputs import _fastest_gain
 
 
@@ -81,6 +81,13 @@ def test_a_plan_is_ready_to_be_played():
         next_experiment(found, loop=rig.baseline)
     with pytest.raises(TypeError, match="unrecognized keyword"):
         next_experiment(found, stroek=1.0)
+
+
+def test_it_prints_as_a_sentence():
+    t = 0.01 * np.arange(400)
+    plan = Experiment(t, np.sin(t), "chirp", ("coulomb",), 3.0, 0.1, "chirp of up to 1 N m: ...")
+    assert str(plan) == "chirp of up to 1 N m: ... 400 samples, one every 0.01 s."
+    assert repr(plan) == f"<Experiment: {plan}>" and len(repr(plan)) < 200
 
 
 def test_tables_ask_for_sines():

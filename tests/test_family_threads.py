@@ -6,8 +6,6 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.df import threads, work
 from ctrl_df.df.dispatch import method_for
-from ctrl_df.df.forced_orbit import attractors
-from ctrl_df.df.forced_orbit.attractors import orbit_attractors
 from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.simulate.beside import flow
 from ctrl_df.simulate.engine import Engine, constant_drive
@@ -28,17 +26,6 @@ def test_a_family_does_not_depend_on_the_number_of_threads(block, monkeypatch):
         assert np.array_equal(other.harmonics, families[0].harmonics, equal_nan=True)
         assert np.array_equal(other.regime, families[0].regime)
         assert np.array_equal(other.residual, families[0].residual, equal_nan=True)
-
-
-def test_coexisting_motions_do_not_depend_on_the_number_of_threads(monkeypatch):
-    found = []
-    for count in (1, 2):
-        monkeypatch.setattr(attractors, "processors", lambda count=count: count)
-        found.append(orbit_attractors(HARDENING, 40.0, 12.0, starts=12))
-    assert len(found[0]) == 2
-    for one, other in zip(*found, strict=True):
-        assert (one.regime, one.share) == (other.regime, other.share)
-        assert np.array_equal(one.harmonics, other.harmonics)
 
 
 def test_a_law_that_calls_python_is_asked_in_one_thread():

@@ -7,7 +7,7 @@ import pytest
 from legible import illegible
 
 import ctrl_df as cdf
-from ctrl_df.gains.border import Border, refined, spread_points
+from ctrl_df.gains.border import Border, distinct, refined, spread_points
 
 FRICTION = cdf.friction_mass(9, 5, 0.5)
 STICTION = cdf.friction_mass(9, 5, 0.5, static=5.5)
@@ -167,6 +167,19 @@ def test_a_border_is_closed_in_on():
     # a model that is right everywhere tells where the border runs between few points
     known = refined(spread_points(12, 0), 16, inside, lambda p: inside(p)[:, 0], nothing)
     assert (known(places, nothing(places), no[:, 0])[:, 0] == no[:, 0]).mean() > 0.95
+
+
+def test_no_point_is_asked_twice():
+    points = np.array([[0, 0], [0.5, 0.5], [0.5, 0.5], [1, 1e-9], [1, 0]])
+    assert distinct(points).tolist() == points[[0, 1, 3]].tolist()
+
+    def beside(p):
+        return np.where(np.abs(p[:, 0] - 0.5) < 1e-9, -1, p[:, 0] > 0.5)
+
+    # the middle of two corners lies on a line known beforehand, and has been asked
+    first = np.concatenate([spread_points(4, 0), [[0.5, 0.0], [0.5, 0.5]]])
+    border = refined(first, 40, lambda p: p[:, :1] > 0.3, lambda p: p[:, 0] > 0.3, beside)
+    assert len(distinct(border.points)) == len(border.points)
 
 
 def test_sides_do_not_speak_for_each_other():

@@ -11,7 +11,6 @@ import ctrl_df as cdf
 from ctrl_df.blocks.mechanism import Mass, TwoMass, backlash_masses, friction_mass
 from ctrl_df.df.closed_form.backlash import BACKLASH_REGIMES, backlash_family
 from ctrl_df.df.closed_form.friction import FRICTION_REGIMES, friction_family
-from ctrl_df.df.forced_orbit.attractors import orbit_attractors
 from ctrl_df.df.forced_orbit.orbits import ORBIT_REGIMES, OrbitSolver, orbit_family
 from ctrl_df.simulate.sampled import sampled
 
@@ -404,17 +403,6 @@ def test_velocity_output_of_a_python_system():
     x, _, _ = one(duffing(), 3.0, 2.0)
     v, regime, _ = one(duffing(), 3.0, 2.0, output="y[1]")
     assert regime in ("smooth", "asymmetric") and abs(abs(v[1] / x[1]) / 2 - 1) < 1e-8
-
-
-def test_attractors_lists_coexisting_motions():
-    found = orbit_attractors(backlash_masses(1, 8, 0.018, 0.2), 10.0, 40.0, starts=10)
-    names = [f.regime for f in found]
-    assert "impact" in names or "contact" in names
-    assert sum(f.share for f in found) == pytest.approx(1)
-    N = next(f for f in found if f.regime != "free").harmonics[1]
-    assert abs(N / (-6.036127e-5 + 9.377614e-5j) - 1) < 2e-6
-    wells = orbit_attractors(duffing(), 0.2, 1.2, starts=5)
-    assert wells[0].regime == "asymmetric" and wells[0].share > 0.5
 
 
 # --- bad input ----------------------------------------------------------------------------------------------

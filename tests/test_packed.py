@@ -68,9 +68,9 @@ def test_words_keep_their_arrays_alive():
 def test_steps_at_a_pace_are_asked_for_by_runs_that_have_one():
     engine = Engine(AXIS)
     engine.run(engine.start(), 0.1)
-    assert engine._space.paced[0] == 0
+    assert engine.space.paced[0] == 0
     engine.run(engine.start(), 0.1, None, np.linspace(0, 0.1, 20))
-    assert engine._space.paced[0] != 0
+    assert engine.space.paced[0] != 0
 
 
 def test_samples_with_and_without_outputs_give_the_same_bits():

@@ -1,10 +1,13 @@
 """A machine that turns is the same machine, in words and units of rotation."""
 
+import re
+
 import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.blocks.coordinates import AXIS
+from ctrl_df.blocks.coordinates import AXIS, LINE, moving_in
+from ctrl_df.blocks.effect import stated_parameters
 from ctrl_df.units import dimension, over, si_unit, turning
 
 EFFECTS = [
@@ -74,6 +77,27 @@ def test_names_stay():
 def test_refusals_speak_of_rotation():
     with pytest.raises(ValueError, match=r"inertia.*kg m\^2"):
         cdf.Inertia(0.0)
+    geared = cdf.TwoInertias(1.0, 8.0, [cdf.Backlash(0.01), cdf.Coulomb(0.5)])
+    with pytest.raises(ValueError, match="unit rad.*got gap=-1"):
+        geared.with_parameters({"backlash.gap": -1})
+    with pytest.raises(TypeError, match=r"\[N m\]"):
+        geared.with_parameters({"coulomb.level": "half"})
+    with pytest.raises(ValueError, match="unit m.*got gap=-1"):
+        cdf.TwoMass(1.0, 8.0, [cdf.Backlash(0.01)]).with_parameters({"backlash.gap": -1})
+
+
+def test_sentences_speak_of_rotation():
+    said = "A force bound to a position; forces grow with the mass, masses and velocities."
+    assert LINE.text(said) == said
+    assert AXIS.text(said) == (
+        "A torque bound to an angle; torques grow with the inertia, inertias and speeds."
+    )
+    assert AXIS.text("constant_force is forced") == "constant_force is forced"
+    assert moving_in("rad") is moving_in("rad/s") is AXIS and moving_in("m") is LINE
+    for effect in cdf.effect_library().values():
+        assert not re.search(r"\b(force|position|velocity|mass)", AXIS.text(effect.shows)), effect
+        stated = dict(stated_parameters(effect))
+        assert not any(re.search(r"\b[xv]\b", spec["meaning"]) for spec in stated.values()), effect
 
 
 @pytest.mark.parametrize("unit", ["furlong", "N//m", "N/", "N/m^x", "(m", "m s)", "5", "m^"])
@@ -124,7 +148,31 @@ def test_a_diagnosis_is_that_of_the_line_in_units_of_rotation():
         model = cls(0.022, [cdf.Coulomb(0.04), cdf.Viscous(0.04)])
         found.append(cdf.diagnose(model, data, candidates=["linear_spring", "quadratic_drag"]))
     line, axis = found
+    compared = cdf.compare(model, data)
     assert line.best.id == axis.best.id == "linear_spring" and line.verdict == axis.verdict
     assert axis.best.evidence == pytest.approx(line.best.evidence, rel=1e-3)
     assert "N m/rad" in axis.explanation and "N/m" not in axis.explanation
     assert axis.best.model.parameters["inertia"].value == pytest.approx(0.02, rel=5e-3)
+    told = " ".join(compared.places) + compared.missing_force.summary() + axis.explanation
+    assert "error proportional to angle" in told and "torque recorded" in told
+    assert not re.search(r"\b(force|position|velocity|F|v|N/m)\b", told)
+    ax = compared.missing_force.plot("velocity").axes[0, 0]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("speed [rad/s]", "missing torque [N m]")
+
+
+def test_what_nothing_explains_is_said_in_torques():
+    """Over the whole library's silence: the free torques that fit what remains."""
+    data = {}
+    for cls, units in ((cdf.Mass, {}), (cdf.Inertia, dict(input_unit="N m", output_unit="rad"))):
+        t = np.arange(0, 4, 4e-3)
+        u = sum(0.3 * np.sin(w * t + w) for w in (2.1, 5.3, 9.7, 17.0))
+        true = cls(0.02, [cdf.Coulomb(0.05), cdf.Viscous(0.03), cdf.LinearSpring(0.4)])
+        y = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
+        record = cdf.Measurement(
+            t, u, y + 1e-3 * y.std() * np.random.default_rng(0).normal(size=t.size), **units
+        )
+        model = cls(0.022, [cdf.Coulomb(0.04), cdf.Viscous(0.04)])
+        data[cls] = cdf.diagnose(model, record, candidates=["quadratic_drag"])
+    line, axis = data.values()
+    assert line.verdict == axis.verdict == "unknown"
+    assert "acts like a force" in line.remains and "acts like a torque" in axis.remains

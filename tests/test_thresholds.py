@@ -45,10 +45,12 @@ PER_CENT = 100.0
 
 ROOMS = (
     "",
+    "data",
     "datasets",
     "estimation",
     "ladder",
     "planning",
+    "prediction",
     "residuals",
     "results",
     "selection",

@@ -39,7 +39,9 @@ def test_other_units_alter_nothing(hidden, scale):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("hidden", "scale"), [("stiction", SCALES[0]), ("loose_linkage", SCALES[1])])
+@pytest.mark.parametrize(
+    ("hidden", "scale"), [("stiction", SCALES[0]), ("loose_linkage", SCALES[1]), ("backlash", SCALES[2])]
+)
 def test_events_are_no_matter_of_rounding(hidden, scale):
     near(first(hidden), diagnosed(hidden, (candidate(hidden),), *scale), scale)
 

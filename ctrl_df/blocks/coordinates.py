@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
-from ..units import turning
+from ..units import dimension, turning
 
 
 @dataclass(frozen=True)
@@ -37,11 +38,38 @@ class Coordinates:
         """Return the unit that stands for one of a machine on a line, such as N m/rad for N/m."""
         return unit if self is LINE else turning(unit)
 
+    def text(self, words: str) -> str:
+        """Return words about a machine on a line as those about this one: ``a torque`` for ``a force``."""
+        return words if self is LINE else _SAID.sub(self._said, words)
+
+    def _said(self, found: re.Match) -> str:
+        article, word, plural = found["article"] or "", found["word"], found["plural"]
+        other = getattr(self, _QUANTITIES[word.lower()])
+        other = other.capitalize() if word[0].isupper() else other
+        if article:
+            article = article[0] + ("n " if other[0] in "aeiou" else " ")
+        if not plural:
+            return article + other
+        return article + (f"{other[:-1]}ies" if other.endswith("y") else f"{other}s")
+
     @property
     def force_unit(self) -> str:
         """Unit of the input."""
         return self.unit_of("N")
 
 
+_QUANTITIES = {
+    "position": "position", "velocity": "velocity", "velocitie": "velocity", "force": "force",
+    "mass": "inertia",
+}  # fmt: skip
+_SAID = re.compile(
+    rf"\b(?P<article>[Aa]n? )?(?P<word>{'|'.join(_QUANTITIES)})(?P<plural>e?s)?\b", re.IGNORECASE
+)
+
 LINE = Coordinates("position", "velocity", "force", "mass", "m")
 AXIS = Coordinates("angle", "speed", "torque", "inertia", "rad", {"x": "angle", "v": "speed", "F": "torque"})
+
+
+def moving_in(unit: str) -> Coordinates:
+    """Return how what has a position in this unit moves; for records, which say it by their units."""
+    return AXIS if "rad" in dimension(unit) else LINE

@@ -161,9 +161,11 @@ class Mechanism(ct.NonlinearIOSystem):
         return MappingProxyType(table)
 
     def _own(self, parameter: Parameter) -> Parameter:
-        """Return a parameter in the units of this machine."""
-        unit = self._coordinates.unit_of(parameter.unit)
-        return parameter if unit == parameter.unit else replace(parameter, unit=unit)
+        """Return a parameter in the units and words of this machine."""
+        mine = self._coordinates
+        if mine is LINE:
+            return parameter
+        return replace(parameter, unit=mine.unit_of(parameter.unit), meaning=mine.text(parameter.meaning))
 
     def with_effect(self, effect: Effect) -> Mechanism:
         """Return the block with one more effect."""
@@ -191,8 +193,8 @@ class Mechanism(ct.NonlinearIOSystem):
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""
         return self._make(self._values, self._effects, measured, self._given_name)
 
-    def _named(self, name) -> Mechanism:
-        """Return the same block under another name."""
+    def with_name(self, name: str) -> Mechanism:
+        """Return the block under another name."""
         return self._make(self._values, self._effects, self._measured, name)
 
     def _changed(self, values: Mapping[str, float]):
@@ -203,8 +205,21 @@ class Mechanism(ct.NonlinearIOSystem):
         effects = []
         for key, effect in zip(self._keys, self._effects, strict=True):
             mine = {n.split(".", 1)[1]: v for n, v in values.items() if n.startswith(key + ".")}
-            effects.append(effect.replace(**mine) if mine else effect)
+            effects.append(self._replaced(effect, mine) if mine else effect)
         return inertias, tuple(effects)
+
+    def _replaced(self, effect: Effect, values: dict[str, Any]) -> Effect:
+        """Return an effect of this machine with other values; what is refused has the machine's units."""
+        try:
+            return effect.replace(**values)
+        except (TypeError, ValueError) as error:
+            refused = error
+        stated = dict(stated_parameters(type(effect)))
+        for name, value in values.items():
+            spec, mine = stated[name], self._coordinates
+            own = {**spec, "unit": mine.unit_of(spec["unit"]), "meaning": mine.text(spec["meaning"])}
+            checked(type(effect).__name__, name, value, own, effect.remedy)
+        raise refused
 
     def _remade(self, inertias, effects) -> Mechanism:
         return self._make(inertias, effects, self._measured, self._given_name)

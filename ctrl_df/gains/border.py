@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import Delaunay, KDTree
 from scipy.stats import qmc
 
-from .thresholds import COARSE, LEAST_SHARE, ON_RIM, ROUND, WITHIN_RIM, WORTH
+from .thresholds import APART, COARSE, LEAST_SHARE, ON_RIM, ROUND, WITHIN_RIM, WORTH
 
 
 def spread_points(count: int, seed: int) -> np.ndarray:
@@ -37,6 +37,12 @@ def deep_points(predicted) -> np.ndarray:
     return np.array([place for _, place in found]).reshape(-1, 2) / size
 
 
+def distinct(points) -> np.ndarray:
+    """Return points of the unit square (n, 2) without those that lie as good as on one before them."""
+    near = KDTree(points).query_pairs(APART)
+    return np.delete(points, list({later for _, later in near}), axis=0)
+
+
 class Border:
     """Answers at points of the unit square, and what they say between.
 
@@ -59,6 +65,7 @@ class Border:
         self.side, self.predicted = np.asarray(side, int), np.asarray(predicted, bool)
         self.right = self.predicted == (self.answers[:, 0] > 0.5)
         self.inner = np.flatnonzero(self.side >= 0)
+        self._near = KDTree(self.points)
         self.mesh = Delaunay(self.points[self.inner], qhull_options="QJ")
 
     def __call__(self, places, side, predicted) -> np.ndarray:
@@ -110,6 +117,8 @@ class Border:
         chosen: list[np.ndarray] = []
         for k in np.argsort(-worth):
             middle = 0.5 * (self.points[one[k]] + self.points[other[k]])
+            if self._near.query(middle)[0] < APART:
+                continue  # one on a line known beforehand, of which the mesh does not know
             if all(np.linalg.norm(middle - c) > 0.5 * length[k] for c in chosen):
                 chosen.append(middle)
             if len(chosen) == count:

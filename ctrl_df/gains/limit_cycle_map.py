@@ -10,7 +10,7 @@ import numpy as np
 from ..checks import count, number, unknown_keywords
 from ..df.work import progress_bar
 from .arguments import bounds, box_of
-from .border import deep_points, refined, spread_points
+from .border import deep_points, distinct, refined, spread_points
 from .controller import GAINS, Structure
 from .folds import folds
 from .map import LimitCycleMap, corrected
@@ -18,7 +18,7 @@ from .plane import plane_of, require_linear
 from .predicted import at_one, over_grid, summed_up
 from .simulated import Simulated, all_simulated
 from .stability import linear_border, unstable_poles
-from .thresholds import APART, CHECKS_LEAST, SPREAD
+from .thresholds import CHECKS_LEAST, SPREAD
 
 _OWNER = "limit_cycle_map"
 
@@ -153,10 +153,7 @@ def limit_cycle_map(
 def _checked(plane, box, predicted, budget, seed, progress):
     """Simulate at points spread and at points where the answer changes; see `border.refined`."""
     even = box.off_the_rim(spread_points(max(int(SPREAD * budget), 4), seed))
-    deep = [
-        d for d in deep_points(predicted)[: budget // 8] if np.linalg.norm(even - d, axis=1).min() > APART
-    ]
-    first = np.concatenate([even, *(d[None] for d in deep), box.rim()])
+    first = distinct(np.concatenate([even, deep_points(predicted)[: budget // 8], box.rim()]))
     found: list[Simulated] = []
     with progress_bar(budget, progress, "simulating gains", "point") as bar:
 

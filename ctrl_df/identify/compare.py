@@ -22,11 +22,11 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     data : Measurement, FrequencyMeasurement or sequence of them
         What was recorded; tables N(A, omega) are compared with the describing function of the block.
     mode : {'auto', 'free', 'windows'}
-        One run from a fitted initial state; or windows, each from an initial state of its own. Auto: a free
-        run for loops, for models that a spring holds in place, and for short records; windows for the rest,
+        One run from a fitted initial state; or segments, each from an initial state of its own. Auto: a free
+        run for loops, for models that a spring holds in place, and for short records; segments for the rest,
         as an inertia without a spring drifts whatever its parameters.
     window : float or None
-        Length of the windows [s]; None: two to-and-fro motions.
+        Length of the segments [s]; None: two to-and-fro motions.
 
     Returns
     -------

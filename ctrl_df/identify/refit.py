@@ -41,7 +41,7 @@ def refit(
     """Adjust parameters until the simulated output fits the records best.
 
     The sum of squared differences of measured and simulated output is minimized; the model starts anew in
-    each window, from states that are fitted along (multiple shooting), first over short windows, then over
+    each segment, from states that are fitted along (multiple shooting), first over short segments, then over
     those `mode` asks for. A loop of `ctrl_df.closed_loop` whose records hold the reference in a channel is
     fitted through its block, driven by the recorded force.
 
@@ -65,10 +65,10 @@ def refit(
         model's own values count, each known within a factor of three (one standard deviation): no more than
         one sample does.
     start : mapping or None
-        Start values other than the model's; the short windows are then left out.
+        Start values other than the model's; the short segments are then left out.
     mode, window
         As for `ctrl_df.compare`; where disturbance forces (friction that drifts) outweigh the noise of
-        the sensor, "auto" fits over windows of some ten samples, in which slow forces move nothing far, and
+        the sensor, "auto" fits over segments of some ten samples, in which slow forces move nothing far, and
         compares over the usual ones.
     robust : bool
         Whether outliers beyond four median deviations count linearly only.

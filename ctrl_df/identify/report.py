@@ -11,7 +11,7 @@ from ..checks import place_to_write
 from .thresholds import REPORT_BUDGET, REPORT_DPI
 
 _ERRORS = {
-    "output": "over the rms of the centred output, over windows each of which starts from a fitted state",
+    "output": "over the rms of the centred output, over segments each of which starts from a fitted state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
     "model has, such as friction that varies, are larger here than the noise of the sensor",
     "N": "of |N|",
@@ -53,7 +53,7 @@ def render(study) -> str:
         records=f"Fitted to {names}. Held out: {held}.",
         verdict=_VERDICTS[study.verdict],
         lead=study.summary().split("\n")[0],
-        errors=_ERRORS[study.measure],
+        errors=study.model.coordinates.text(_ERRORS[study.measure]),
         as_drawn=f"over {drawn[0].over}, of {_shown(study).name} alone",
         ladder=_picture(study.plot, "Error of every step, beside the noise"),
         steps=_steps(study, drawn),

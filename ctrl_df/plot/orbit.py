@@ -10,6 +10,7 @@ from .parts.events import mark_events, shade_sticking
 from .parts.page import legend_above, page
 
 _SMALL = 0.1  # [m, rad]: below it motions are drawn in thousandths
+_CLOSED = 1e-3  # gap between the ends of an orbit, over its swing, that nobody sees
 
 
 def orbit_plot(orbit, *, ax=None, title=None, width=None, **line) -> ct.ControlPlot:
@@ -56,7 +57,7 @@ def orbit_plot(orbit, *, ax=None, title=None, width=None, **line) -> ct.ControlP
         legend_above(axes[0], columns=5)
         mechanical = bool(force)
         x, name, unit = (output, names[0], length) if mechanical else (drive, names[-1], "")
-        lines.append(axes[2].plot(x, np.gradient(x, orbit.time), **style))
+        lines.append(axes[2].plot(x, _rate(x, orbit.time), **style))
         axes[2].set_xlabel(name + (f" [{unit}]" if unit else ""))
         rate = f"d{name}/dt" if len(name) == 1 else f"rate of {name}"
         axes[2].set_ylabel(rate + (f" [{unit}/s]" if unit else " [1/s]"))
@@ -66,6 +67,18 @@ def orbit_plot(orbit, *, ax=None, title=None, width=None, **line) -> ct.ControlP
             size = f"{scale * orbit.output_amplitude:.4g} {length}".strip()
             title = f"{kind} limit cycle, {orbit.omega:.5g} rad/s, fundamental of {names[0]} {size}"
         return drawn.finished(lines, title)
+
+
+def _rate(x, time) -> np.ndarray:
+    """Return the rate of a signal over one period, whose last sample is the first of the next.
+
+    Where the orbit is none that closes its ends stay one-sided.
+    """
+    if abs(x[-1] - x[0]) > _CLOSED * np.ptp(x):
+        return np.gradient(x, time)
+    period = time[-1] - time[0]
+    around = np.concatenate((x[-2:-1], x, x[1:2]))
+    return np.gradient(around, np.concatenate((time[-2:-1] - period, time, time[1:2] + period)))[1:-1]
 
 
 def _units(orbit, names) -> tuple[float, str, str]:

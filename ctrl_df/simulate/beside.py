@@ -31,7 +31,7 @@ def flow(engine: Engine, state: State, x, span: float, drive: Drive, rtol: float
     with pointers.interruptible():
         _flow(
             driver.address(), engine.program, drive, clock, x, state.mode, state.time + span, rtol,
-            max(rtol, HEIGHT), scale, int(state.fresh), engine._space.at, np.zeros(0),
+            max(rtol, HEIGHT), scale, int(state.fresh), engine.space.at, np.zeros(0),
             np.zeros((0, engine.nstates)), np.zeros((0, engine.noutputs)), np.zeros(1), np.zeros(1, np.int64),
             np.zeros(1, np.int64), np.zeros(engine.nstates), np.zeros((engine.noutputs, 0), complex),
             clock.copy(), state.mode.copy(), scale.copy(),

@@ -153,7 +153,7 @@ class Engine:
         self.ninputs, self.noutputs = int(self.program.ints[layout.H_NR]), int(self.program.ints[layout.H_NY])
 
     @cached_property
-    def _space(self) -> Space:
+    def space(self) -> Space:
         """Scratch of runs made from here; `ctrl_df.simulate.runs` has its own."""
         return workspace(self.program, delays=True)
 
@@ -171,7 +171,7 @@ class Engine:
         )
 
     @property
-    def _modes(self) -> np.ndarray:
+    def modes(self) -> np.ndarray:
         """Modes of a fresh state, for those who set states by themselves: not possible with a history."""
         if self.delayed:
             workspace(self.program)
@@ -261,7 +261,7 @@ class Engine:
         fresh = int(now.fresh)
         pointers.raised.clear()
         pointers.gave_nan.clear()
-        space = self._space
+        space = self.space
         memo = space.memo
         memo[2] = 0.0
         if len(times) + len(drive.time) > 2:

@@ -107,7 +107,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
             "loop, D != 0), so the loop has no order of steps; give the controller one sample of delay."
         )
     control = _controller(proper, kd, dt, force, name="controller")
-    plant = block._named("plant") if isinstance(block, Mechanism) else block.copy(name="plant")
+    plant = block.with_name("plant") if isinstance(block, Mechanism) else block.copy(name="plant")
     connections = [["controller.e", f"-plant.{fed_back}"], [f"plant.{force}", f"controller.{force}"]]
     if kd != 0:
         connections.append(["controller.v", f"plant.{rate}"])

@@ -28,7 +28,7 @@ class AsymmetricCoulomb(Effect):
     'N'
     """
 
-    difference: float = parameter("N", lower=-math.inf, meaning="level for v > 0 minus level for v < 0")
+    difference: float = parameter("N", lower=-math.inf, meaning="level forward minus level backward")
 
     role: ClassVar[str] = "friction"
     proportional: ClassVar[bool] = True

@@ -25,7 +25,7 @@ class AsymmetricViscous(Effect):
     [0.2, -0.55]
     """
 
-    difference: float = parameter("N s/m", lower=-math.inf, meaning="slope for v > 0 minus slope for v < 0")
+    difference: float = parameter("N s/m", lower=-math.inf, meaning="slope forward minus slope backward")
 
     role: ClassVar[str] = "force"
     place_free: ClassVar[bool] = True

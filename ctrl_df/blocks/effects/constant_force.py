@@ -25,7 +25,7 @@ class ConstantForce(Effect):
     -9.8
     """
 
-    force: float = parameter("N", lower=-math.inf, meaning="constant force along +x")
+    force: float = parameter("N", lower=-math.inf, meaning="constant force in the positive direction")
 
     role: ClassVar[str] = "force"
     place_free: ClassVar[bool] = True

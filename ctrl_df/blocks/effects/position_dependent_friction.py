@@ -36,7 +36,9 @@ class PositionDependentFriction(Effect):
 
     amplitude: float = parameter("N", meaning="by how much the level rises and falls")
     wavelength: float = parameter("m", strict=True, default=0.1, meaning="period over position")
-    phase: float = parameter("rad", lower=-math.inf, default=0.0, meaning="phase at x = 0", per_record=True)
+    phase: float = parameter(
+        "rad", lower=-math.inf, default=0.0, meaning="phase at position 0", per_record=True
+    )
 
     role: ClassVar[str] = "friction"
     asks: ClassVar[tuple[str, ...]] = ("x",)

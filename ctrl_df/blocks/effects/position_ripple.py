@@ -31,7 +31,9 @@ class PositionRipple(Effect):
 
     amplitude: float = parameter("N", meaning="ripple amplitude")
     wavelength: float = parameter("m", strict=True, default=0.01, meaning="period over position")
-    phase: float = parameter("rad", lower=-math.inf, default=0.0, meaning="phase at x = 0", per_record=True)
+    phase: float = parameter(
+        "rad", lower=-math.inf, default=0.0, meaning="phase at position 0", per_record=True
+    )
 
     role: ClassVar[str] = "force"
     multimodal: ClassVar[bool] = True

@@ -32,7 +32,7 @@ class Stiction(Effect):
     multimodal: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     rank: ClassVar[int] = 1
-    shows: ClassVar[str] = "error just after standstill: the real mass stays longer at rest, then jumps off"
+    shows: ClassVar[str] = "error just after standstill: the real body stays longer at rest, then jumps off"
     source: ClassVar[str] = "Karnopp (1985)"
 
     @staticmethod

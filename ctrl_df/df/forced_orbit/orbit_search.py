@@ -233,7 +233,7 @@ class OrbitSearch:
 
     def _state(self, y, mode=None):
         """State at coordinates y."""
-        x, mode = np.zeros(len(y)), self.engine._modes.copy() if mode is None else mode.copy()
+        x, mode = np.zeros(len(y)), self.engine.modes.copy() if mode is None else mode.copy()
         set_state(self.shot.at, np.array(y, float), x, mode)
         return State(0.0, x, mode)
 

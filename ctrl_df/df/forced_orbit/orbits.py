@@ -70,7 +70,7 @@ def orbit_family(
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 
     Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the answer
-    is the one reached that way. `orbit_attractors` lists the others.
+    is the one reached that way.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class OrbitSolver(OrbitSearch):
         if self.linear is not None:
             self.simple = False
             y, name, x = self.linear.answer(A, omega, orders)
-            self.previous = None if x is None else State(0.0, x, self.engine._modes.copy())
+            self.previous = None if x is None else State(0.0, x, self.engine.modes.copy())
             return self._finished(y, name), name, np.nan if np.isnan(y[1]) else 0.0
         try:
             y, name, residual = self._answer(orders)

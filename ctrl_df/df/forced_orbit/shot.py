@@ -88,12 +88,12 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     n, nf = engine.nstates, len(symmetries.free)
     ng = int(engine.program.ints[L.H_NG]) + 1
     s = symmetries
-    modes = engine._modes.copy()
+    modes = engine.modes.copy()
     none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
     no_spectrum = np.zeros((rows, 0), complex)
     log_t, log_n, log_k = (np.zeros(SHOT_EVENTS, kind) for kind in (float, np.int64, np.int64))
     shot = Shot(
-        driver.address(), 0, engine.program, engine._space, np.zeros((4, ng)), np.zeros(10),
+        driver.address(), 0, engine.program, engine.space, np.zeros((4, ng)), np.zeros(10),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
         np.full((nf, nf), np.nan), np.zeros((14, max(n, 1))), np.zeros((4, len(modes)), np.int64),

@@ -132,7 +132,7 @@ class Probe:
         dx, g, y = np.zeros(x.shape), np.full((m, self.ng + 1), np.inf), np.zeros((m, engine.noutputs))
         drive, times = constant_drive(np.zeros(engine.ninputs)), np.broadcast_to(t, m).astype(float)
         inputs = np.asarray(u, float)
-        look_at(prog, drive, times, x, inputs, engine._modes, engine._space.work, dx, g, y)
+        look_at(prog, drive, times, x, inputs, engine.modes, engine.space.work, dx, g, y)
         for node in prog.nodes:
             mine = slice(node[L.G], node[L.G] + node[L.NG])
             # what a quantizer does with its steps shows in the rates, or it does nothing

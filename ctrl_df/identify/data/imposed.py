@@ -12,10 +12,7 @@ from ...simulate.imposed import Path, path_of
 from ...units import dimension
 from . import derivatives
 from .measurement import Measurement
-
-STILL, SLOW = 6.0, 3.0
-"""Standard deviations of the smoothed position's noise, three to either side, up to which a way back is none;
-of the speed's, up to which its direction is not known."""
+from .thresholds import SLOW, STILL
 
 _MOTIONS: WeakKeyDictionary[Measurement, ImposedMotion] = WeakKeyDictionary()
 

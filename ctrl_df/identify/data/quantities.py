@@ -37,9 +37,9 @@ def quantity_of(unit: str) -> str:
     return next((q for q, units in UNITS.items() if any(dimension(u) == powers for u in units)), OTHER)
 
 
-def word_of(unit: str) -> str:
+def word_of(unit: str, usual: str = "output") -> str:
     """Return what a channel in this unit is called: a velocity, or a speed where something turns."""
-    return next((word for word, (_, own) in _WORDS.items() if own == unit), "output")
+    return next((word for word, (_, own) in _WORDS.items() if own == unit), usual)
 
 
 def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tuple[str, float, str]:

@@ -61,3 +61,9 @@ LONG, CUTOFFS_KEPT = 100_000, 3.0
 """Samples beyond which a record is decimated if it loses nothing: a diagnosis of so many takes minutes. Band
 that is kept over the frequency at which the outputs have sunk into their noise: forces that change at once
 reach beyond it, two octaves lower in a position for every one above."""
+
+# --- a motion that is imposed -----------------------------------------------------------------------
+
+STILL, SLOW = 6.0, 3.0
+"""Standard deviations of the smoothed position's noise, three to either side, up to which a way back is none;
+of the speed's, up to which its direction is not known."""

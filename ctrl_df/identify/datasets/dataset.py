@@ -61,7 +61,7 @@ class Dataset(ABC):
 
     Attributes
     ----------
-    records, held : tuples
+    records, validation : tuples
         To fit; to validate on (may be empty: a part of `records` is then held out).
     prior : mapping of str to (float, float)
         Value and standard deviation of parameters known beforehand.

@@ -16,6 +16,7 @@ from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
+from ..prediction.thresholds import SEGMENT_LEAST
 from ..prediction.values import block_of, with_values
 from ..shooting.multiple_shooting import Solution, Stage
 from ..shooting.noise_model import NoiseModel
@@ -382,7 +383,7 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         stiff = stiffness(joint, simulator.facts.force)
         first = [min(f, 4 * 2 * math.pi * math.sqrt(mass / max(stiff, NOTHING))) for f in first]
-    first = [max(f, 40 * facts(r).dt) for f, r in zip(first, records, strict=True)]
+    first = [max(f, SEGMENT_LEAST * facts(r).dt) for f, r in zip(first, records, strict=True)]
     stages: list[list[float | None]] = []
     factor = 1.0
     while any(1.5 * factor * f < span for f, span in zip(first, spans, strict=True)) and len(stages) < 4:

@@ -23,7 +23,11 @@ from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
 from .thresholds import (
+    GLANCE,
+    GLANCED_ON,
     MOTOR_LEAST,
+    NEAR,
+    NEAR_STATES,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
@@ -68,7 +72,9 @@ def restarted(
             _moved(found.model, name, _within(found, name, factor * at))
             for factor in (STATIC_FACTORS if found.model.parameters[name].threshold else RESTART_FACTORS)
         ]
-        starts_only = functools.partial(fit, names=(), starts=found.starts, iterations=2, hopeless=hopeless)
+        starts_only = functools.partial(
+            fit, names=(), starts=found.starts, iterations=GLANCE, hopeless=hopeless
+        )
         begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
         on = functools.partial(_on, fit=fit, hopeless=hopeless, names=found.names)
         for tried in side_by_side(on, begun):
@@ -89,7 +95,7 @@ def beyond(found: FitResult, least: float) -> float:
 
 
 def _on(begun: FitResult, fit, names, hopeless) -> FitResult:
-    return fit(begun.model, names, starts=begun.starts, iterations=4, hopeless=hopeless)
+    return fit(begun.model, names, starts=begun.starts, iterations=GLANCED_ON, hopeless=hopeless)
 
 
 def all_restarted(fits, data: SegmentedData, floor: float) -> list:
@@ -118,8 +124,8 @@ def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> Fi
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
         model = found.model.with_parameters(feasible(found.model, shared))
-        near = data.fit(model, (), starts=found.starts, iterations=4, hopeless=hopeless)
-        again = data.fit(model, found.names, starts=near.starts, iterations=6, hopeless=hopeless)
+        near = data.fit(model, (), starts=found.starts, iterations=NEAR_STATES, hopeless=hopeless)
+        again = data.fit(model, found.names, starts=near.starts, iterations=NEAR, hopeless=hopeless)
         found = min(found, again, key=lambda f: f.rmse)
     return restarted(found, data.fit, own(found), hopeless)
 
@@ -145,10 +151,10 @@ def cross_started(
     elif not frictions or not any(name.startswith(f"{mine}.") for name in values):
         return None
     block = tried.block.with_parameters(feasible(tried.block, values))
-    near = data.fit(block, (), starts=best.train.starts, iterations=4)
+    near = data.fit(block, (), starts=best.train.starts, iterations=NEAR_STATES)
     if near.rmse > HOPELESS * best.train.rmse:
         return None
-    return data.fit(block, tried.train.names, starts=near.starts, iterations=6)
+    return data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
 
 
 def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> CandidateFit:
@@ -163,9 +169,9 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
     shared = {name: known[name] for name in tried.train.names if name in known}
     block = tried.block.with_parameters(feasible(tried.block, shared))
     starts = data.starts_as(block, data.train.records, nearer.train)
-    near = data.fit(block, (), starts=starts, iterations=4, hopeless=tried.train.rmse)
+    near = data.fit(block, (), starts=starts, iterations=NEAR_STATES, hopeless=tried.train.rmse)
     if near.rmse < BETTER * tried.train.rmse:
-        fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=6)
+        fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
         if fitted.rmse < BETTER * tried.train.rmse:
             return data.validate(replace(tried, train=fitted))
     return tried
@@ -207,7 +213,7 @@ def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> t
         for reach in OPEN_RANGE:
             value = (1 + sign * reach) * at
             moved = _moved(found.model, name, value)
-            if fit(moved, (), starts=found.starts, iterations=2).rmse > SAME * found.rmse:
+            if fit(moved, (), starts=found.starts, iterations=GLANCE).rmse > SAME * found.rmse:
                 break
             edge = moved.parameters[name].value
         edges.append(edge)

@@ -26,7 +26,7 @@ from ..shooting.variables import Prior, RecordScales, priors
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
-from .starts import carried, same_begins
+from .starts import carried, least_begins, same_begins
 from .thresholds import (
     BRIEF,
     EFFORT_OWN,
@@ -296,9 +296,15 @@ class SegmentedData:
         )  # fmt: skip
 
     def as_it_is(self, found: FitResult) -> FitResult:
-        """Return a model found over other segments over these, with initial states of its own alone."""
-        states = self.states_of(found.model, starts=same_begins(found, self.train.segments))
-        return self.fit(found.model, found.names, starts=states.starts, iterations=0)
+        """Return a model found over other segments over these, with initial states of its own alone.
+
+        Each segment begins as the fit found does or as short ones tell, whichever errs less.
+        """
+        begun = self.states_of(found.model, starts=same_begins(found, self.train.segments))
+        told = self._ran(found.model, "train")
+        begins = (begun.starts, told.starts, least_begins(begun, told))
+        fits = [self.fit(found.model, found.names, starts=starts, iterations=0) for starts in begins]
+        return min(fits, key=lambda f: f.rmse)
 
     def reached(self, found: FitResult, hopeless=math.inf) -> FitResult:
         """As `moved`, and begun once more where the error grows: the model may have left its minimum.

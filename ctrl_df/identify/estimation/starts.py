@@ -21,6 +21,16 @@ def same_begins(found: FitResult, segments) -> list[np.ndarray]:
     return starts
 
 
+def least_begins(one: FitResult, other: FitResult) -> list[np.ndarray]:
+    """Return the initial states of two fits over the same segments: of each segment those that err less."""
+    starts = []
+    for k, segments in enumerate(one.segments):
+        errors = [[np.sum(f.residual[k][where] ** 2) for where in segments.places] for f in (one, other)]
+        less = np.less_equal(errors[0], errors[1])[:, None]
+        starts.append(np.where(less, one.starts[k], other.starts[k]))
+    return starts
+
+
 def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
     """Return one model's initial states as those of another: what the first lacks begins as usual."""
     given = dict(zip(before.nuisances, starts.T, strict=True))

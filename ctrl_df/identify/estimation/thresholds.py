@@ -109,3 +109,13 @@ as much a step there has to be 3000 times as long."""
 
 FREEDOM_MOST = 1e6
 """Degrees of freedom of a normal distribution."""
+
+# --- steps of fits that begin beside another ----------------------------------------------------------
+
+GLANCE, GLANCED_ON = 2, 4
+"""Steps of initial states alone, after which starts are told from each other, and steps by which the best of
+them go on: those that lead nowhere show it by then."""
+
+NEAR_STATES, NEAR = 4, 6
+"""Steps of a fit with values of another: of initial states alone, which settles what these values moved, then
+of all. It is near its minimum, or it is dropped."""

@@ -15,14 +15,17 @@ from ..results.experiment import Experiment, separated
 from ..thresholds import NOTHING
 from .thresholds import (
     PLAN_BAND,
+    PLAN_LEAST,
     PLAN_MARGIN,
     PLAN_MOVES,
+    PLAN_SAMPLES,
     PLAN_SINES,
     PLAN_SIZES,
     PLAN_SLACK,
     PLAN_STEP_RATE,
     PLAN_STEP_SIZES,
     PLAN_STEPS,
+    PLAN_SWING,
     PLAN_TRIANGLE,
 )
 
@@ -49,10 +52,10 @@ def input_that_separates(
     centre = float(place[0])
     reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(place - centre)))
     duration, dt = float(duration or record.duration), float(dt or record.dt)
-    if not (force > 0 and reach > 0 and duration > 20 * dt):
+    if not (force > 0 and reach > 0 and duration > PLAN_LEAST * dt):
         raise ValueError(
-            f"next_experiment needs force > 0, stroke > 0 and duration > 20 dt; got {force}, {reach}, "
-            f"{duration}, {dt}."
+            f"next_experiment needs force > 0, stroke > 0 and duration > {PLAN_LEAST} dt; got {force}, "
+            f"{reach}, {duration}, {dt}."
         )
     t = dt * np.arange(int(round(duration / dt)))
     play = (
@@ -103,7 +106,7 @@ class _Free:
         self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
 
     def __call__(self, u):
-        thin = max(1, len(self.t) // 2500)
+        thin = max(1, len(self.t) // PLAN_SAMPLES)
         played = _played(self.record, self.t, u, self.scale)
         ys = [free_run(m, played, position=self.centre, thin=thin) for m in self.models]
         gaps = [_apart(self.record, self.t, a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
@@ -131,8 +134,8 @@ class _Loop:
         self.models, self.record, self.centre = models, record, centre
         self.moves = parts.block.coordinates
         self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
-        self.t = t[:: max(1, len(t) // 2500)]
-        self.thin = max(1, len(t) // 2500)
+        self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]
+        self.thin = max(1, len(t) // PLAN_SAMPLES)
         # The controller passes the noise of the sensor on to the drive.
         self.tremor = 4 * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 
@@ -196,7 +199,7 @@ def _rms(values) -> float:
 
 def _references(t, record):
     """Return references of peak one that begin at rest and turn no faster than the records did."""
-    swing = max(facts(record).swing, 40 * (t[1] - t[0]))
+    swing = max(facts(record).swing, PLAN_SWING[0] * (t[1] - t[0]))
     half = max(int(round(0.25 * swing / (t[1] - t[0]))), 1)
     window = np.hanning(2 * half + 1)
     fade = np.sin(0.5 * math.pi * np.clip((t - t[0]) / swing, 0, 1)) ** 2
@@ -209,7 +212,7 @@ def _references(t, record):
 
 def _shapes(t, record):
     """Return inputs of peak one, each ending its motion near where it began."""
-    f0 = 1.0 / max(facts(record).swing, 10 * (t[1] - t[0]))
+    f0 = 1.0 / max(facts(record).swing, PLAN_SWING[1] * (t[1] - t[0]))
     span, (lowest, many, highest) = t[-1] + t[1], PLAN_BAND
     rng = np.random.default_rng(0)
     k = np.unique(np.round(np.geomspace(max(lowest * f0 * span, 1), many * f0 * span, PLAN_SINES)))

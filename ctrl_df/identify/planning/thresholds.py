@@ -28,3 +28,12 @@ PLAN_TRIANGLE = 0.4
 
 SIGMA_LEAST = 1e-6
 """Relative noise of a table that plans count with at least."""
+
+PLAN_SAMPLES = 2500
+"""Samples of an input that is tried, about: as many as candidates are screened with."""
+
+PLAN_LEAST = 20
+"""Samples of an input at least: two swings of ten."""
+
+PLAN_SWING = (40, 10)
+"""Samples of a swing at least: of a reference, which a controller has to follow, and of an input."""

@@ -14,6 +14,7 @@ from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
 from ..thresholds import NOISE_FREE, NOTHING, UNPLACED
 from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
+from .thresholds import SEGMENT_LEAST, TURNS_SAMPLES
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def _of_imposed(record: Measurement) -> Facts:
 
 def _turns(y) -> int:
     """Count the turning points between strokes longer than half the rms, so that noise adds none."""
-    y = y[:: max(len(y) // 2000, 1)]
+    y = y[:: max(len(y) // TURNS_SAMPLES, 1)]
     least, top, low, up, count = 0.5 * float(np.std(y)), y[0], y[0], 0, 0
     for value in y.tolist():
         top, low = max(top, value), min(low, value)
@@ -216,7 +217,7 @@ class Segments:
 def usual_segment(record: Measurement) -> float:
     """Return a length of segment [s] that shows two to-and-fro motions, 40 samples at least."""
     known = facts(record)
-    return max(2 * known.swing, 40 * known.dt)
+    return max(2 * known.swing, SEGMENT_LEAST * known.dt)
 
 
 def make_segments(record: Measurement, length: float | None = None) -> Segments:

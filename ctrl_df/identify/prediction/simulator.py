@@ -21,13 +21,18 @@ from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
-from .thresholds import RESTORING
+from .thresholds import RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
 from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
 
 _PREPARED = 16  # parameter sets whose models are kept ready: those of a Jacobian, and the one they are about
+
+
+def most_steps(samples):
+    """Return how many steps a run over so many samples may take; an integer, or an array of them."""
+    return STEPS_PER_SAMPLE * samples + STEPS_AT_LEAST
 
 
 class Simulator:
@@ -162,7 +167,7 @@ class Simulator:
             One for each that is asked for.
         """
         self.runs += len(asked)
-        parts = [self._prepare(values) for _, values, _ in asked]
+        parts = [self.prepared(values) for _, values, _ in asked]
         if self.continued:
             outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
         else:
@@ -191,7 +196,7 @@ class Simulator:
                         row[where] = run.outputs[: where.stop - where.start, column]
                         if not run.status.ok:
                             row[where.start + run.recorded : where.stop] = np.nan
-                if follows and run.status.ok and delay == self._late(part):
+                if follows and run.status.ok and delay == self.late(part):
                     came = self._arrival(part, segments, w + 1, run)
             hidden = {k: came[k] for k in carried if k in came}
         return out.reshape(-1)
@@ -214,7 +219,7 @@ class Simulator:
         drives: dict[tuple[int, int], int] = {}  # shared by all segments, and by parts of one drive
         for part, (segments, _, start) in zip(parts, asked, strict=True):
             x0.append(self._starts(part, segments, start))
-            begins.append(self.record.t[segments.begins] - self._late(part))
+            begins.append(self.record.t[segments.begins] - self.late(part))
             lengths.append(segments.counts)
             inputs = id(part.drive_time), id(part.drive_value)
             drive.append(np.full(len(segments), drives.setdefault(inputs, len(drives))))
@@ -232,7 +237,7 @@ class Simulator:
             result = run_many(
                 groups, np.concatenate(x0), np.concatenate(begins), every[first + length - 1], every, sampled,
                 drive=np.concatenate(drive), first=first, count=length, order=5, rtol=self.rtol,
-                max_steps=60 * length + 20_000,
+                max_steps=most_steps(length),
             )  # fmt: skip
             for error in result.errors.values():
                 raise error
@@ -255,7 +260,7 @@ class Simulator:
             self._kept_drives = inputs, sampled
         return sampled
 
-    def _late(self, part) -> float:
+    def late(self, part) -> float:
         """Return by how much what is seen first of a segment lies before its first sample [s]."""
         return part.delay if POSITION in self.sensed.columns else 0.0
 
@@ -319,7 +324,7 @@ class Simulator:
 
     def at_rest(self, segments: Segments, values) -> np.ndarray:
         """Return the initial states (nw, number of nuisances) with which every segment begins at rest."""
-        part, rows = self._prepare(values), []
+        part, rows = self.prepared(values), []
         for w in range(len(segments)):
             given = initial_states.at_rest(part.core, self._usual(part, segments, w), self.facts.speed)
             rows.append([given[name] for name in self.nuisances])
@@ -333,12 +338,12 @@ class Simulator:
         (nw, number of nuisances) array
             NaN for segments that follow no other.
         """
-        part, found = self._prepare(values), np.full_like(start, np.nan)
+        part, found = self.prepared(values), np.full_like(start, np.nan)
         follows = np.flatnonzero(segments.ends[:-1] == segments.begins[1:])
         if part.core is None or not follows.size:
             return found
         some = segments.only(follows)
-        times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - self._late(part)
+        times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - self.late(part)
         engine, runs = part.engine, np.arange(len(follows))
         result = run_many(
             grouped([(engine, runs)]), self._starts(part, some, start[follows]), times[:, 0], times[:, 1],
@@ -347,7 +352,7 @@ class Simulator:
                 part.drive_time, part.drive_value[None, None], part.hold or self.record.input_hold
             ),
             first=2 * runs, count=2, order=5, rtol=self.rtol,
-            max_steps=60 * (some.ends - some.begins) + 20_000,
+            max_steps=most_steps(some.ends - some.begins),
         )  # fmt: skip
         for error in result.errors.values():
             raise error
@@ -365,17 +370,18 @@ class Simulator:
 
     def _window(self, part, drive, segments, w, start, times, hidden=None):
         """Run one segment, recording at these times."""
-        begin = float(self.record.t[segments.begins[w]] - self._late(part))
+        begin = float(self.record.t[segments.begins[w]] - self.late(part))
         state = self._start(part, segments, w, None if start is None else start[w], begin, hidden or {})
         state.segment = max(int(np.searchsorted(part.drive_time, begin, "right")) - 1, 0)
-        steps = 60 * int(segments.ends[w] - segments.begins[w]) + 20_000
+        steps = most_steps(int(segments.ends[w] - segments.begins[w]))
         return part.engine.run(
             state, float(times[-1]), drive, times, order=5, rtol=self.rtol, log=1, max_steps=steps
         )
 
     # --- preparing ------------------------------------------------------------------------------------
 
-    def _prepare(self, values) -> PreparedModel:
+    def prepared(self, values) -> PreparedModel:
+        """Return the model with these values (None: its own) ready to run; the latest stay so."""
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]

@@ -26,3 +26,13 @@ LONG_BEFORE = 1e3
 RESTORING = 0.1
 """Force between two rms positions to either side, over the typical one, with which free runs do not drift: a
 force that the model lacks of one per cent then moves its rest by 0.4 rms positions at most."""
+
+STEPS_PER_SAMPLE, STEPS_AT_LEAST = 60, 20_000
+"""Steps of a run at most, a sample and besides: a model that takes more (chatter, laws far stiffer than the
+record) is of no use to a fit, and is given up before it holds up the others."""
+
+TURNS_SAMPLES = 2000
+"""Samples among which turning points are counted: a record of a hundred swings has twenty in each."""
+
+SEGMENT_LEAST = 40
+"""Samples of a segment of usual length at least: a few of them go to its initial state."""

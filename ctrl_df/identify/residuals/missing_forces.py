@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...simulate.crew import side_by_side
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
@@ -24,8 +25,8 @@ from .thresholds import FINER, FREE_STEPS, HUM_WINDOW, REVERSAL_REACHES, TEST_FO
 
 
 @dataclass(frozen=True)
-class MissingForce:
-    """Forces of one kind, fitted to a residual.
+class FreeForce:
+    """Free forces of one kind, fitted to a residual.
 
     Attributes
     ----------
@@ -51,7 +52,7 @@ class MissingForce:
     sentence: str
 
 
-def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[MissingForce]:
+def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) -> list[FreeForce]:
     """Return every kind of free force with what it explains, the most telling first."""
     sensitivity = tried.train.sensitivity
     if sensitivity is None:
@@ -79,7 +80,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         # the residual is of forces here, as the fits see it
         noise = noise_of_outputs([residual[w] for w in segments], outputs, max_order=NOISE_ORDER)
 
-    def regressed(noise) -> list[tuple[MissingForce, np.ndarray]]:
+    def regressed(noise) -> list[tuple[FreeForce, np.ndarray]]:
         beside = sensitivity.beside(noise)
         return [_regressed(k, m, s, residual, noise, segments, units, beside) for k, m, s in tables]
 
@@ -90,14 +91,12 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
         left = residual - explained
         found = regressed(noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER))
     unit, best = tried.train.unit, {}
-    for lack, _ in sorted(found, key=lambda f: -f[0].evidence):
-        best.setdefault(lack.kind, replace(lack, rms=lack.rms / unit, left=lack.left / unit))
+    for free, _ in sorted(found, key=lambda f: -f[0].evidence):
+        best.setdefault(free.kind, replace(free, rms=free.rms / unit, left=free.left / unit))
     return list(best.values())
 
 
-def _regressed(
-    kind, matrix, spans, residual, noise, segments, units, beside
-) -> tuple[MissingForce, np.ndarray]:
+def _regressed(kind, matrix, spans, residual, noise, segments, units, beside) -> tuple[FreeForce, np.ndarray]:
     """Fit forces of one kind; return what they tell and the output they explain.
 
     `beside`: takes away what refitting could do (see `OutputSensitivity.beside`).
@@ -112,7 +111,8 @@ def _regressed(
     explained = matrix @ weights
     span = spans[int(np.argmax(np.linalg.norm(matrix * weights, axis=0)))]
     rms, rest = (float(np.sqrt(np.mean(e * e))) for e in (explained, residual - explained))
-    return MissingForce(kind, gain, rms, rest, span, _SENTENCES[kind].format(*span, **units)), explained
+    sentence = moving_in(units["x"]).text(_SENTENCES[kind].format(*span, **units))
+    return FreeForce(kind, gain, rms, rest, span, sentence), explained
 
 
 _SENTENCES = {

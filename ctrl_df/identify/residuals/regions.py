@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
+from ..data.quantities import word_of
 from ..thresholds import LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
@@ -89,10 +91,10 @@ class Regions(tuple[Region, ...]):
 
     def table(self, rows: int = 12) -> str:
         """Return the worst `rows` regions as text."""
-        lines = [f"{'kind':<15} {'region':<28} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"]
+        lines = [f"{'kind':<15} {'region':<34} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"]
         for r in self[:rows]:
             lines.append(
-                f"{r.kind:<15} {r.label:<28} {r.share:>7.1%} {r.expected_share:>8.1%} {_p(r.p_value):>8} "
+                f"{r.kind:<15} {r.label:<34} {r.share:>7.1%} {r.expected_share:>8.1%} {_p(r.p_value):>8} "
                 f"{r.bias:>+6.2f}"
             )
         return "\n".join(lines)
@@ -115,7 +117,7 @@ def error_regions(
     bins : int
         Parts of the record in time and in position.
     units : (str, str)
-        Of position and of force.
+        Of position and of force; the words follow from them.
 
     Returns
     -------
@@ -146,7 +148,8 @@ def error_regions(
         worst_bias = min(region.bias_p_value * count, 1.0)
         adjusted.append(replace(region, p_value=worst, bias_p_value=worst_bias))
     adjusted.sort(key=lambda region: (region.p_value >= LEVEL, -region.excess))
-    return Regions(replace(region, sentence=_sentence(region)) for region in adjusted)
+    words = {"position": moving_in(units[0]).position, "load": word_of(units[1], "force")}
+    return Regions(replace(region, sentence=_sentence(region, words)) for region in adjusted)
 
 
 # --- dividing the record --------------------------------------------------------------------------
@@ -162,25 +165,26 @@ def _parts(t, bins, units, position=None, velocity=None, force=None) -> Iterator
     if position is not None:
         yield from _quantiles("position", units[0], position, bins)
     if force is not None:
-        yield from _quantiles("load", units[1], np.abs(force), 4, "|F| ")
+        word = word_of(units[1], "force")
+        yield from _quantiles("load", units[1], np.abs(force), 4, "|F| " if word == "force" else f"|{word}| ")
 
 
 def _by_velocity(t, velocity, position, unit):
     fast = float(np.quantile(np.abs(velocity), FASTEST))
-    low = LOW_SPEED * fast
-    yield "direction", "v > 0", velocity > low, (low, math.inf)
-    yield "direction", "v < 0", velocity < -low, (-math.inf, -low)
+    low, v = LOW_SPEED * fast, moving_in(unit).name("v")
+    yield "direction", f"{v} > 0", velocity > low, (low, math.inf)
+    yield "direction", f"{v} < 0", velocity < -low, (-math.inf, -low)
     speed = np.abs(velocity)
-    yield "low_speed", f"|v| < {low:.2g} {unit}/s", speed < low, (0.0, low)
+    yield "low_speed", f"|{v}| < {low:.2g} {unit}/s", speed < low, (0.0, low)
     yield (
         "low_speed",
-        f"{low:.2g} < |v| < {MEDIUM_SPEED * fast:.2g} {unit}/s",
+        f"{low:.2g} < |{v}| < {MEDIUM_SPEED * fast:.2g} {unit}/s",
         (speed >= low) & (speed < MEDIUM_SPEED * fast),
         (low, MEDIUM_SPEED * fast),
     )
     yield (
         "low_speed",
-        f"|v| > {MEDIUM_SPEED * fast:.2g} {unit}/s",
+        f"|{v}| > {MEDIUM_SPEED * fast:.2g} {unit}/s",
         speed >= MEDIUM_SPEED * fast,
         (MEDIUM_SPEED * fast, math.inf),
     )
@@ -323,15 +327,15 @@ _PLACE = {
     "direction": "motion with {label}",
     "low_speed": "speeds {label}",
     "after_reversal": "the time after reversals, {label}",
-    "position": "positions from {label}",
-    "load": "forces {label}",
+    "position": "{word}s from {label}",
+    "load": "{word}s {label}",
     "amplitude": "swings of half stroke {label}",
     "frequency": "the band {label}",
 }
 
 
-def _sentence(region: Region) -> str:
-    place = _PLACE[region.kind].format(label=region.label)
+def _sentence(region: Region, words: dict[str, str]) -> str:
+    place = _PLACE[region.kind].format(label=region.label, word=words.get(region.kind))
     of = "its neighbours suggest" if region.kind == "frequency" else "of the samples"
     text = (
         f"{region.share:.0%} of the squared error lies in {place}, against {region.expected_share:.0%} {of}"

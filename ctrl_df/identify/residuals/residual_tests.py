@@ -13,7 +13,7 @@ import numpy as np
 
 from ..shooting.noise_model import noise_model
 from ..thresholds import NOTHING
-from .thresholds import AT_ROOT, BANDWIDTH, DECORRELATED, INPUT_LAGS, TWO_SIDED, WHITENESS_LAGS
+from .thresholds import DECORRELATED, INPUT_LAGS, TWO_SIDED, WHITENESS_LAGS
 
 
 def rmse(residual) -> float:
@@ -109,53 +109,6 @@ def whiteness(residual, lags: int | None = None, *, fitted: int = 0, alpha: floa
 
 
 # --- colour ---------------------------------------------------------------------------------------
-
-
-def effective_sample_size(residual) -> float:
-    """Return the number of independent samples that tell the mean as well: n / (1 + 2 sum rho_k), at most n.
-
-    The sum runs until pairs of neighbouring autocorrelations turn negative (Geyer's initial positive
-    sequence).
-    """
-    r = _series(residual)
-    n = len(r)
-    if n < 4 or np.ptp(r) == 0:
-        return float(n)
-    rho = autocorrelation(r, n - 1)
-    pairs = rho[: 2 * (n // 2)].reshape(-1, 2).sum(axis=1)
-    stop = int(np.argmax(pairs <= 0)) if np.any(pairs <= 0) else len(pairs)
-    pairs = np.minimum.accumulate(pairs[: max(stop, 1)])
-    return float(min(n / max(2 * pairs.sum() - 1, 1.0 / n), n))
-
-
-def long_run_variance(x, bandwidth: int | None = None) -> float:
-    """Return the variance of sqrt(n) times the mean of an autocorrelated series (Bartlett weights).
-
-    Parameters
-    ----------
-    x : array_like, shape (n,)
-        Evenly sampled.
-    bandwidth : int or None
-        Lags taken in; None: from the data by Andrews' rule for a first-order model, at most n/4.
-
-    References
-    ----------
-    Newey & West (1987); Andrews (1991), eq. (6.4).
-    """
-    x = _series(x)
-    x = x - x.mean()
-    n = len(x)
-    power = float(np.mean(x * x))
-    if power == 0:
-        return 0.0
-    if bandwidth is None:
-        rho = min(max(float(x[1:] @ x[:-1]) / (n * power), 0.0), 1 - AT_ROOT)
-        alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
-        bandwidth = math.ceil(BANDWIDTH * (alpha * n) ** (1 / 3))
-    m = int(min(max(bandwidth, 1), n // 4))
-    c = _crosscovariance(x, x, m)[m:]
-    weights = 1 - np.arange(1, m + 1) / (m + 1)
-    return max(float(c[0] + 2 * np.sum(weights * c[1:])), power / n)
 
 
 # --- is the input still in it? --------------------------------------------------------------------

@@ -39,10 +39,6 @@ INPUT_LAGS = 3000
 DECORRELATED = round(math.exp(-1), 2)
 """Correlation at which a first-order signal has forgotten: 1/e."""
 
-BANDWIDTH, AT_ROOT = 1.1447, 1e-6
-"""Andrews' (1991) factor of the bandwidth of Bartlett's kernel; distance of a correlation from one, at
-least."""
-
 FASTEST, LOW_SPEED, MEDIUM_SPEED = 0.95, 0.1, 0.6
 """Quantile of the speeds that is fast, and shares of it below which a motion is slow, and of medium speed."""
 

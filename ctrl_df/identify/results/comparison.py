@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...drawing import draw
 from ..data.derivatives import automatic_cutoff, derivative
 from ..data.imposed import imposed_motion
@@ -103,7 +104,7 @@ class RecordComparison:
 
     @property
     def windows(self) -> int:
-        """Number of windows; 1: a free run."""
+        """Number of segments; 1: a free run."""
         return len(self.edges) - 1
 
     @cached_property
@@ -234,7 +235,7 @@ class Comparison(ComparisonBase):
 
     @property
     def windows(self) -> int:
-        """Number of windows of all records together."""
+        """Number of segments of all records together."""
         return sum(r.windows for r in self.records)
 
     @property
@@ -245,7 +246,7 @@ class Comparison(ComparisonBase):
     @property
     def over(self) -> str:
         """What the model was judged over, in words."""
-        return "a free run" if self.mode == "free" else f"{self.windows} windows"
+        return "a free run" if self.mode == "free" else f"{self.windows} segments"
 
     def report(self) -> str:
         """Return the comparison as text: each record, the tests, the regions."""
@@ -277,11 +278,11 @@ class Comparison(ComparisonBase):
         imposed = next((r.record for r in self.records if facts(r.record).imposed), None)
         how = "free run from fitted initial states"
         if imposed is not None:
-            how = f"in force, {imposed_motion(imposed)}"
+            how = moving_in(imposed.input_unit).text(f"in force, {imposed_motion(imposed)}")
         elif self.mode == "windows":
             lengths = [float(np.ptp(r.record.t)) / r.windows for r in self.records]
             how = (
-                f"{self.windows} windows of {np.mean(lengths):.3g} s, each from a fitted initial state "
+                f"{self.windows} segments of {np.mean(lengths):.3g} s, each from a fitted initial state "
                 "(nothing holds this model in place: over a free run it would drift)"
             )
         if worst.record.note:

@@ -61,7 +61,7 @@ def explain(d, words) -> str:
             f"error from {size}.{same}{doubts} next_experiment gives {words.separates} that would separate "
             "them."
         )
-    where, shows = places(d.where), words.shows.format(first.effect.shows)
+    where, shows = places(d.where), words.shows.format(first.model.coordinates.text(first.effect.shows))
     doubts = "".join(f" {s}" for s in d.doubts)
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
@@ -96,6 +96,23 @@ def grows(short: float, error: float, seconds: float, effect=None) -> str:
         f"{who} follows short segments to {short:.2%}, but not long ones: over {seconds:.3g} s "
         f"each, refitted to these, it errs by {error:.2%}{more}."
     )
+
+
+def explains_nothing() -> str:
+    """Return that a model makes nothing of the motion, whatever its parameters."""
+    return f"It explains nothing of this motion. {_UNITS}"
+
+
+def far_off(judged, names, stated) -> str:
+    """Return that the model without an effect explains more with parameters far from those stated."""
+    now, before = judged.block.parameters, stated.parameters
+    values = ", ".join(
+        f"{k} {now[k].value:.3g} {now[k].unit} in place of {before[k].value:.3g}" for k in names
+    )
+    return f"With {values} the model errs by {judged.train.nrmse:.2%} without any effect. {_UNITS}"
+
+
+_UNITS = "Do record and model agree in their units?"
 
 
 def undetermined(first) -> str:

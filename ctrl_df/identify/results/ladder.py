@@ -28,7 +28,7 @@ class Step:
         Ids of these others.
     model : block
     nrmse, nrmse_holdout : float
-        Over windows with fitted starts.
+        Over segments with fitted starts.
     evidence : float
         Log likelihood ratio over the step before [nats].
     parameters : dict

@@ -317,7 +317,8 @@ def _begin_joint(job) -> list[Attempt]:
 def _begin(job) -> tuple[list[Start], list[Attempt]]:
     """Return the starts of one effect class, and where fits begin there."""
     cls, screen, places, free, known = job
-    found, starts = [], starts_for(cls, screen)
+    proposed = proposals(cls, screen)
+    found, starts = [], starts_for(cls, screen, proposed)
     if known:
         # with the other parameters as the model has them, or as they are without the effect
         best = starts[: 1 + cls.multimodal]
@@ -333,7 +334,7 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user
         # does. What changes in proportion to its size finds that within a step.
         several = cls.multimodal or not cls.proportional
-        for effect in _spread(list(proposals(cls, screen)), 1 + screen.block.core.bodies if several else 1):
+        for effect in _spread(proposed, 1 + screen.block.core.bodies if several else 1):
             attempt = _from(Start(effect, 0.0, places.values), screen, places, free)
             found.append(attempt and replace(attempt, nominal=True))
     return starts, [a for a in found if a is not None]

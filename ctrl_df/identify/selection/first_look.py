@@ -16,7 +16,15 @@ from .alike import begun_like_better
 from .attempts import tried
 from .evidence import ranked
 from .standing import Standing
-from .thresholds import CONFIRMED, EFFORT_MOVED, EXPLAINS_LITTLE, LEFT, SHOWS_HARDLY
+from .thresholds import (
+    CONFIRMED,
+    EFFORT_MOVED,
+    EXPLAINS_LITTLE,
+    LEFT,
+    RIVAL_BASE_STEPS,
+    RIVAL_STEPS,
+    SHOWS_HARDLY,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +91,8 @@ class FirstLook:
     def rivals(self, at: Standing, model, names) -> list[CandidateFit]:
         """Return effects that may do what the model of one effect more does, with evidence over it."""
         data = at.data.sampled
-        known = data.fit(model, names, iterations=4, followed=RESTARTS_KEPT)
-        about = data.moved(at.base.train, 3)
+        known = data.fit(model, names, iterations=RIVAL_STEPS, followed=RESTARTS_KEPT)
+        about = data.moved(at.base.train, RIVAL_BASE_STEPS)
         found = self._tried(at, data, about, self._short(at, data), reached=known.rmse)
         more = data.count(model, names) - data.count(at.base.block, self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
@@ -92,7 +100,7 @@ class FirstLook:
     def _sampled(self, at: Standing, screened=None) -> tuple[FitResult, list[CandidateFit]]:
         """Return the model and every effect fitted over every second of the segments that judge."""
         data = at.data.sampled
-        base = data.moved(at.base.train, 3)
+        base = data.moved(at.base.train, RIVAL_BASE_STEPS)
         return base, self._over(at, data, base, base, self._short(at, data), screened)
 
     def _over(

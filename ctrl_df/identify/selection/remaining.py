@@ -8,7 +8,7 @@ import numpy as np
 
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
-from ..residuals.missing_forces import MissingForce, missing_forces
+from ..residuals.missing_forces import FreeForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
 from ..shooting.noise_model import NoiseModel
@@ -124,7 +124,7 @@ def located(
     return Located(where, kinds, _sentences(left, missed, where, measure))
 
 
-def _sentences(left: Remainder, missed: list[MissingForce], where, measure: str) -> str:
+def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:
     acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
         f"Of structure {left.structure:.2g} remains beside {left.noise:.2g} of noise (rms of the {measure}). "

@@ -178,10 +178,6 @@ class Search(ABC):
     def alike(self, a, b) -> bool:
         """Whether two confirmed candidates make the same of these data, within noise."""
 
-    def settled(self, judged):
-        """Return the model that is named with the values that a refit of it finds; by default as it is."""
-        return judged
-
     @abstractmethod
     def remainder(self, best, significant: bool) -> Remainder:
         """Return what the best model leaves."""

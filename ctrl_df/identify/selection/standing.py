@@ -14,8 +14,9 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
+from ..thresholds import UNMOVED
 from .evidence import ranked
-from .thresholds import GROWN, by_chance
+from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,19 @@ class Standing:
             return False
         return self.farthest.rmse > self.grown(self.nearest, self.farthest) * self.nearest.rmse
 
+    def unmoved(self, significant: float) -> bool:
+        """Whether disturbance forces prevail and the model explains no motion.
+
+        Then its accelerations say no more of those recorded than none at all would, or it does not follow
+        the shortest segments: accelerations that are mostly noise do not speak for such a model.
+
+        `significant`: evidence that tells something from nothing [nats].
+        """
+        if not self.data.disturbed:
+            return False
+        base = self.base.train
+        return self.nearest.nrmse > UNMOVED or -base.count * math.log(base.nrmse) < significant
+
     def colour(self, noise: NoiseModel) -> NoiseModel:
         """Return the noise if it forgets within the shortest segments, else white noise.
 
@@ -99,7 +113,7 @@ class Standing:
         for best in found[:2]:
             values = {k: best.block.parameters[k].value for k in free}
             again = self.data.fit(
-                base.block.with_parameters(feasible(base.block, values)), free, iterations=8
+                base.block.with_parameters(feasible(base.block, values)), free, iterations=BASE_STEPS
             )
             if again.rmse < base.train.rmse:
                 base = CandidateFit("", again)
@@ -116,6 +130,8 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:
         begins.append(block.with_parameters(feasible(block, guess)))
-    fits = [data.moved(shortest.fit(begin, free, iterations=8), 12) for begin in begins]
+    fits = [
+        data.moved(shortest.fit(begin, free, iterations=BASE_STEPS), BASE_LONGER_STEPS) for begin in begins
+    ]
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
     return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])

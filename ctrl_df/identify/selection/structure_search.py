@@ -9,22 +9,23 @@ from functools import partial
 import numpy as np
 
 from ..course import Course
-from ..estimation.refit_records import blurred, refit_records
+from ..estimation.refit_records import blurred
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
-from ..results.explain import grows
-from ..thresholds import GROWTH, PROCESS_NOISE, SIGNIFICANT, UNMOVED
+from ..results.explain import explains_nothing, far_off, grows
+from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
 from .equivalence import breaks_away_only, indistinguishable
 from .evidence import ranked, step_as_recorded
 from .first_look import FirstLook
+from .named import beyond_range, refitted, whole_refit
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
 from .standing import Standing, begun
-from .thresholds import EXACT, FLOOR, SETTLED, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EXACT, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -111,7 +112,12 @@ class StructureSearch(Search):
         """Refit baseline and best candidates at the full rate."""
         course = course or Course()
         at, chosen = confirmed(self.at, found, self.stages, partial(self._told, course), course.stage)
+        course.stage("the parameters of those that may be named")
+        at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen
+
+    def _whole_refit(self, at: Standing, tried: CandidateFit, seen: bool = False) -> CandidateFit:
+        return whole_refit(at, tried, self.prior, seen or bool(self.records[1]))
 
     def _look(self, classes, executor) -> FirstLook:
         nominal = {k: p.value for k, p in self.block.parameters.items()}
@@ -156,34 +162,6 @@ class StructureSearch(Search):
         doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
-    def settled(self, judged):
-        """Return a model with the values that `refit` finds from its own.
-
-        Candidates are told apart in segments that show what is missing, at an effort that they all can have.
-        Parameters are told best over stretches as long as a model can be followed: those of the one that is
-        named are fitted there, to the end, unless the segments that judge speak against them.
-        """
-        data, names = self.at.data.fine, judged.train.names
-
-        def refitted(model, start):
-            return refit_records(
-                model, data.train.records, names, start, whole=False, mode="auto", window=None,
-                robust=True, budget=SETTLED, prior=self.prior,
-            )[0]  # fmt: skip
-
-        found = refitted(judged.block, {})
-        if not data.disturbed and found.rmse > FLOOR * self.at.floor:
-            # a minimum beside the right one: short segments lead out of it
-            found = min(found, refitted(found.model, None), key=lambda f: f.rmse)
-        there = data.as_it_is(found)
-        there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
-        settled = data.validate(replace(judged, train=there))
-        if settled.size > GROWTH**2 * judged.size:
-            return judged
-        # where parts of the records are held out, this fit has seen them: what is told of them is of the last
-        # one that has not
-        return settled if self.records[1] else replace(settled, validation=judged.validation)
-
     def predicted(self, judged):
         """Return the model and the records held out (angles as these have them), or those fitted."""
         fitted, held = self.records
@@ -215,9 +193,11 @@ class StructureSearch(Search):
             self.at.base, best, self.at.data.fine, noise, self.at.colour(noise),
             self.at.by_noise(best.train, noise), self.significant,
         )  # fmt: skip
-        if self.at.data.disturbed and not significant and self.at.nearest.nrmse > UNMOVED:
-            # accelerations that are mostly noise do not speak for a model that does not even move
-            return replace(left, unexplained=True)
+        if not significant and self.at.unmoved(self.significant):
+            return replace(left, unexplained=True, doubt=explains_nothing())
+        if far := beyond_range(self.at, best, self.significant, self._whole_refit):
+            other, names = far
+            return replace(left, unexplained=True, doubt=far_off(other, names, self.block))
         if self.at.grows:
             return self._growing(left, best) if significant else self._growing(left)
         if not left.unexplained and self.as_recorded(best):

@@ -73,8 +73,11 @@ def by_chance(independent: float) -> float:
     return math.exp(BY_CHANCE / math.sqrt(independent))
 
 
-SETTLED = 600
-"""Simulations at most that fit the parameters of the model that is named, as many as `refit` makes."""
+REFIT_MOST = 600
+"""Simulations at most that refit a model that may be named, as many as `refit` makes."""
+
+ON_LIMIT = 1.001
+"""Factor to the end of its range within which a parameter has come there: fits go on to a thousandth."""
 
 ANOTHER_START = (1.5, 0.02)
 """Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
@@ -127,3 +130,10 @@ that begin."""
 
 LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
 """Of the mass behind the joints that are tried."""
+
+BASE_STEPS, BASE_LONGER_STEPS = 8, 12
+"""Steps of the refitted model over short segments, and moved to longer ones: every candidate is judged beside
+it, so that it goes on for twice as long as a candidate does at first."""
+
+RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
+"""Steps of the models among which rivals of one more effect are sought: their errors are compared only."""

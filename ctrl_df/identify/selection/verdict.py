@@ -109,11 +109,6 @@ class _Asked:
             if verdict == UNKNOWN:
                 # refuted: what is missing is what the model leaves without it
                 best, remainder = search.base, search.remainder(search.base, False)
-        if verdict in (EFFECT, AMBIGUOUS):
-            course.stage("the parameters of the first")
-            first = ranking[0]
-            settled = _entry(search.settled(best), search, first.probability, first.equivalents)
-            ranking = [settled, *ranking[1:]]
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
         return Diagnosed(replace(result, explanation=explain(result, words) + note), search)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...blocks.mechanism import Mechanism
 from ...checks import choice
 from ...drawing import draw
@@ -22,6 +23,10 @@ from .curves import Curve, curve_over
 from .smoother import smooth_record
 from .thresholds import FORCE_KNOWN, PARAMETER_NUDGE
 
+_WORDS = {
+    "force": "force", "time": "time", "position": "position", "velocity": "velocity",
+    "load": "force recorded", "reversal": "distance since the last reversal",
+}  # fmt: skip
 AGAINST = ("time", "position", "velocity", "load", "reversal")
 
 
@@ -63,6 +68,12 @@ class MissingForce:
     noise: float
     size: float
     name: str
+
+    @property
+    def words(self) -> dict[str, str]:
+        """What force, time and quantities are called: a torque, an angle, where something turns."""
+        said = moving_in(self.units["position"]).text
+        return {name: said(word) for name, word in _WORDS.items()}
 
     @property
     def known(self) -> np.ndarray:
@@ -117,8 +128,7 @@ class MissingForce:
         if not np.any(self.known):
             return first + " Nowhere is it larger than what the record leaves open."
         best, share = next(iter(self.shares.items()))
-        words = {"reversal": "the distance since the last reversal", "load": "the force recorded"}
-        return first + f" {100 * share:.0f} % of it is a curve over {words.get(best, best)}."
+        return first + f" {100 * share:.0f} % of it is a curve over the {self.words[best]}."
 
     def __repr__(self) -> str:
         return f"<MissingForce: {self.summary()}>"

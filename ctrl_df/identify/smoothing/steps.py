@@ -17,7 +17,7 @@ from ..data.measurement import Measurement
 from ..prediction import initial_states
 from ..prediction.segments import facts_of
 from ..prediction.sensed import POSITION
-from ..prediction.simulator import Simulator
+from ..prediction.simulator import Simulator, most_steps
 from ..thresholds import UNPLACED
 from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL
 
@@ -80,7 +80,7 @@ class Steps:
     def __init__(self, block, record: Measurement, every: int):
         model = block.with_effects([*block.effects, Disturbance(0.0)])
         self.simulator = Simulator(model, record, rtol=SMOOTHER_RTOL)
-        self.part = self.simulator._prepare(None)
+        self.part = self.simulator.prepared(None)
         self.record = record
         self.edges = np.append(np.arange(0, len(record) - 1, every), len(record) - 1)
         self.known = facts_of(block, record)
@@ -120,7 +120,7 @@ class Steps:
     @property
     def late(self) -> float:
         """How long after it was so a sensor sees the place [s]; 0 where there was none."""
-        return self.simulator._late(self.part)
+        return self.simulator.late(self.part)
 
     def guess(self) -> tuple[np.ndarray, np.ndarray]:
         """Return states and their standard deviations as the record alone has them, (N + 1, n) each."""
@@ -222,7 +222,7 @@ class Steps:
         result = run_many(
             groups, x0, every[first], every[first + count - 1], every,
             sampled_drives(part.drive_time, part.drive_value[None, None], part.hold or record.input_hold),
-            first=first, count=count, order=5, rtol=SMOOTHER_RTOL, max_steps=60 * count + 20_000,
+            first=first, count=count, order=5, rtol=SMOOTHER_RTOL, max_steps=most_steps(count),
         )  # fmt: skip
         for error in result.errors.values():
             raise error

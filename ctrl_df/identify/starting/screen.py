@@ -19,7 +19,6 @@ from ..estimation.starts import carried
 from ..shooting.scales import Scales
 from ..thresholds import NOTHING
 from .extend import extended
-from .proposals import proposals
 from .regression import ForceFit, Start, force_fit, motion_of, regressed
 from .ripple_spectrum import Wave
 from .ripple_starts import long_wave, long_waves, waves
@@ -116,11 +115,11 @@ class Screen:
         return change if all(np.all(np.isfinite(c)) for c in change) else None
 
 
-def starts_for(cls, screen: Screen, keep: int = 2) -> list[Start]:
-    """Return the best start values for one effect class, best first."""
+def starts_for(cls, screen: Screen, proposed, keep: int = 2) -> list[Start]:
+    """Return the best start values for one effect class, best first; `proposed`: effects of it."""
     found: list[Start] = []
     total = float(screen.residual @ screen.residual)
-    for effect in proposals(cls, screen):
+    for effect in proposed:
         found += _judged(effect, screen, total)
     found.sort(key=lambda s: s.left)
     chosen: list[Start] = list(regressed(cls, screen))

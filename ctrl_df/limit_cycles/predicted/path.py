@@ -175,7 +175,7 @@ class _Curve:
         """Return what is missing to the balance of each harmonic, and the block's answer or None."""
         U, a, omega = self.waveform(z)
         Y = self.respond(U, omega)
-        if Y is None or not np.isfinite(Y).all():
+        if Y is None or not np.isfinite(Y).all() or Y[1] == 0:  # it stands still: nothing goes around
             return None, None
         return self._defect(z, U / a, Y / a, omega), Y
 

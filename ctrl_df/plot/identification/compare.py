@@ -9,8 +9,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
+from ...blocks.coordinates import moving_in
 from ...checks import known_name
 from ...identify.data.quantities import word_of
+from ...identify.prediction.segments import facts
 from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
@@ -72,7 +74,7 @@ def comparison_plot(
         top.set_ylabel(f"{word_of(chosen.record.output_unit)} [{unit}]")
         top.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{size * value:.4g}"))
         below.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.4g}"))
-        over = "free run" if chosen.windows == 1 else f"{chosen.windows} windows"
+        over = "free run" if chosen.windows == 1 else f"{chosen.windows} segments"
         told = f"{over}: nrmse {chosen.nrmse:.3g}, fit {chosen.fit_percent:.2f} %"
         if len(models) > 1:
             told = f"{over}: nrmse " + ", ".join(f"{m.nrmse:.3g}" for m in models)
@@ -87,7 +89,8 @@ def comparison_plot(
         for edge in chosen.edges[1:-1]:
             for ax in (top, below):
                 ax.axvline(data.t[edge], color="0.85", lw=0.6, zorder=0)
-        lines[2] = _regions(bars, chosen.where, rows)
+        said = moving_in(facts(data).units[0]).text
+        lines[2] = _regions(bars, chosen.where, rows, said)
         top.tick_params(labelbottom=False)
         return drawn.finished(lines, data.name if title is None else title)
 
@@ -103,8 +106,8 @@ def _readable(values, unit):
     return 1.0, unit
 
 
-def _regions(ax, regions, rows):
-    """Bars: share of the error; ticks: share of the samples. Filled where beyond chance."""
+def _regions(ax, regions, rows, said):
+    """Bars: share of the error, filled where beyond chance; ticks: of the samples; `said`: in whose words."""
     significant = regions.significant
     shown = (significant if len(significant) else regions)[:rows][::-1]
     ax.set_title("where the error is" if len(significant) else "no region stands out")
@@ -118,7 +121,7 @@ def _regions(ax, regions, rows):
     for i, region in enumerate(shown):
         expected = 100 * region.expected_share
         ax.plot([expected, expected], [i - 0.18, i + 0.18], color="black", lw=1.5)
-        words = f"{_KINDS.get(region.kind, region.kind.replace('_', ' '))}: {region.label}"
+        words = f"{said(_KINDS.get(region.kind, region.kind.replace('_', ' ')))}: {region.label}"
         words = "\n".join(textwrap.wrap(words, 36))
         ax.annotate(
             words, (0, i + 0.22), xytext=(2, 0), textcoords="offset points", va="bottom", linespacing=0.95,

@@ -8,11 +8,6 @@ import numpy as np
 from ..parts.page import legend_above, page
 
 _POINTS, _CURVE = "#7f9cc6", "#b3402a"
-_WORDS = {
-    "time": "time", "position": "position", "velocity": "velocity", "load": "force recorded",
-    "reversal": "distance since the last reversal",
-}  # fmt: skip
-_TURNING = {"position": "angle", "velocity": "speed", "load": "torque recorded"}
 
 
 def missing_force_plot(missing, *, against="time", title=None, width=None, **keywords) -> ct.ControlPlot:
@@ -31,8 +26,7 @@ def missing_force_plot(missing, *, against="time", title=None, width=None, **key
     """
     with page(0.55, narrow=0.8, width=width, keywords=keywords) as drawn:
         ax = drawn.panels(1)[0]
-        turning = missing.unit != "N"
-        what = "torque" if turning else "force"
+        what = missing.words["force"]
         if against == "time":
             band = ax.fill_between(
                 missing.time, missing.force - 2 * missing.std, missing.force + 2 * missing.std,
@@ -51,12 +45,7 @@ def missing_force_plot(missing, *, against="time", title=None, width=None, **key
             )  # fmt: skip
             lines = [[points, means]]
         ax.axhline(0.0, color="0.6", lw=0.7, zorder=0)
-        words = (
-            {**_WORDS, "position": "angle", "velocity": "speed", "load": "torque recorded"}
-            if turning
-            else _WORDS
-        )
-        ax.set_xlabel(f"{words[against]} [{missing.units[against]}]")
+        ax.set_xlabel(f"{missing.words[against]} [{missing.units[against]}]")
         along = " along the motion" if against == "reversal" else ""
         ax.set_ylabel(f"missing {what}{along} [{missing.unit}]")
         if against == "time":

@@ -1,0 +1,98 @@
+"""Models that may be named, refitted as `refit` does and ranked by that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from ...simulate.crew import side_by_side
+from ..estimation.refit_records import refit_records
+from ..estimation.segmented import CandidateFit
+from ..thresholds import GROWTH, RULED_OUT
+from .evidence import ranked
+from .standing import Standing
+from .thresholds import FLOOR, ON_LIMIT, REFIT_MOST
+
+
+def refitted(
+    at: Standing, chosen: Sequence[CandidateFit], significant: float, refit: Callable
+) -> tuple[Standing, list[CandidateFit]]:
+    """Refit the first of confirmed candidates and those that the data hardly tell from it.
+
+    Candidates are told apart in segments that show what is missing, at an effort that they all can have.
+    Parameters are told best over stretches as long as a model can be followed: those of the ones that may be
+    named are fitted there, to the end, and evidence is that of these fits.
+
+    Parameters
+    ----------
+    chosen : sequence of CandidateFit
+        Best first.
+    significant : float
+        Evidence that an effect needs [nats].
+    refit : callable
+        Returns a candidate refitted, such as `whole_refit`.
+    """
+    chosen, known, noise = list(chosen), dict[str, CandidateFit](), at.noise
+    while chosen and chosen[0].evidence > significant:
+        least = chosen[0].evidence - RULED_OUT
+        there = [t for t in chosen if t.evidence > least and t.key not in known]
+        if not there:
+            break
+        known |= {t.key: f for t, f in zip(there, side_by_side(lambda t: refit(at, t), there), strict=True)}
+        chosen, noise = ranked(at.base, [known.get(t.key, t) for t in chosen])
+    return replace(at, noise=noise), chosen
+
+
+def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> CandidateFit:
+    """Return a candidate with the values that `refit` finds from its own.
+
+    It stays as it is where the segments that judge speak against these.
+
+    Parameters
+    ----------
+    prior : mapping or None
+        Value and standard deviation of parameters known beforehand, by name.
+    seen : bool
+        Whether what is held out may be judged by this fit: it has seen all of the records fitted. Of parts
+        of them that are held out, what is told else is of the last fit that has not.
+    """
+    data, names = at.data.fine, tried.train.names
+
+    def found_from(model, start):
+        return refit_records(
+            model, data.train.records, names, start, whole=False, mode="auto", window=None, robust=True,
+            budget=REFIT_MOST, prior=prior,
+        )[0]  # fmt: skip
+
+    found = found_from(tried.block, {})
+    if not data.disturbed and found.rmse > FLOOR * at.floor:
+        # a minimum beside the right one: short segments lead out of it
+        found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
+    there = data.as_it_is(found)
+    there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
+    other = data.validate(replace(tried, train=there))
+    if other.size > GROWTH**2 * tried.size:
+        return tried
+    return other if seen else replace(other, validation=tried.validation)
+
+
+def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Callable):
+    """Return the model without an effect, refitted without limits, where that explains more than the best.
+
+    Fits keep the model's own parameters within a range of what they were stated to be. Where one ends there,
+    a record or a model in other units than it says is as likely as a missing effect.
+
+    Returns
+    -------
+    tuple of (CandidateFit, tuple of str) or None
+        With the parameters that left their range; None: all are within, or it explains no more.
+    """
+    values = {k: p.value for k, p in at.base.block.parameters.items()}
+    spans = {k: span for k, span in at.data.limits.items() if k in at.base.train.names}
+    if at.data.disturbed or all(a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items()):
+        return None
+    other = refit(replace(at, data=replace(at.data, limits={})), at.base, seen=True)
+    values = {k: p.value for k, p in other.block.parameters.items()}
+    left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)
+    (judged,), _ = ranked(at.base, [other])
+    return (other, left) if left and judged.evidence > best.evidence + significant else None

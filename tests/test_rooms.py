@@ -1,0 +1,66 @@
+"""Rooms keep their privacy: no attribute with an underscore is read from outside its package."""
+
+import ast
+from pathlib import Path
+
+import ctrl_df
+
+ROOT = Path(ctrl_df.__file__).parent
+
+OF_PYTHON_CONTROL = {"_isstatic"}  # which blocks answer as its own systems do
+
+
+def room(path):
+    """Name of the package that a file belongs to; those of `identify` are rooms of their own."""
+    parts = path.relative_to(ROOT).parts
+    return "/".join(parts[:2]) if parts[0] == "identify" and len(parts) > 2 else parts[0]
+
+
+def private(name):
+    return name.startswith("_") and not name.startswith("__")
+
+
+def defined(tree):
+    """Yield the private names that a file gives something."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.attr
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+
+
+def read(tree):
+    """Yield line and name of private attributes read of anything but `self` and `cls`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load) and private(node.attr):
+            if not (isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")):
+                yield node.lineno, node.attr
+
+
+def test_no_private_attribute_is_read_from_outside_its_package():
+    trees = {path: ast.parse(path.read_text()) for path in sorted(ROOT.rglob("*.py"))}
+    owners: dict[str, set] = {}
+    for path, tree in trees.items():
+        for name in filter(private, defined(tree)):
+            owners.setdefault(name, set()).add(room(path))
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {name}, of {', '.join(sorted(owners[name]))}"
+        for path, tree in trees.items()
+        for line, name in read(tree)
+        if name in owners and room(path) not in owners[name] and name not in OF_PYTHON_CONTROL
+    ]
+    assert not found, found
+
+
+def test_no_private_name_is_imported_from_another_package():
+    found = [
+        f"{path.relative_to(ROOT)}:{node.lineno}: {alias.name}"
+        for path in sorted(ROOT.rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.level != 1
+        for alias in node.names
+        if private(alias.name)
+    ]
+    assert not found, found
