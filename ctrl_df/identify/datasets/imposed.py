@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..data.imposed import imposes_motion
-from ..selection.imposed_search import ImposedSearch
+from ..selection.kinematic_searches import ImposedSearch
 from .over_time import TimeDataset
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..data.moving_base import moves_base, seen_from_base, told_in_space
-from ..selection.moving_base_search import MovingBaseSearch
+from ..selection.kinematic_searches import MovingBaseSearch
 from .over_time import TimeDataset
 
 

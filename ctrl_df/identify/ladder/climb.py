@@ -127,7 +127,28 @@ class Climb:
             self.best = None
             if other is not None:
                 end, around = self._settled(self._on(other))
-        return self._study(end.steps, end.search, COMPLETE, around)
+        steps = self._in_full(end)
+        around = replace(around, nrmse=steps[-1].nrmse, nrmse_holdout=steps[-1].nrmse_holdout)
+        return self._study(steps, end.search, COMPLETE, around)
+
+    def _in_full(self, end: Rung) -> tuple[Step, ...]:
+        """Return the steps to an end, the last with the parameters that a whole refit finds.
+
+        Where parts of the records are held out that fit has seen them: what is told of them is of the last
+        one that has not.
+        """
+        *steps, last = end.steps
+        self.course.stage("the parameters of the last model")
+        refitted = end.search.in_full()
+        again = None if refitted is None else end.search.final([refitted], self.free)
+        if again is None:
+            return end.steps
+        ((model, error, held),) = again
+        held = held if self.dataset.validation else last.nrmse_holdout
+        return (
+            *steps,
+            replace(last, model=model, nrmse=error, nrmse_holdout=held, parameters=_values(model)),
+        )
 
     # --- up -------------------------------------------------------------------------------------------
 

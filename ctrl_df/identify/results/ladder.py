@@ -87,6 +87,8 @@ class Step:
                 f"In the end {new} {_do(self.instead)} better than {gone} by {self.evidence:.0f} nats, "
                 f"and took {_its(self.dropped)} place."
             )
+        if not gone:
+            return f"The ladder went back, and on with {new}: what it had tried left more than noise."
         return f"The ladder went back: {new} in place of {gone}, which had led to no end without remainder."
 
 

@@ -178,6 +178,10 @@ class Search(ABC):
     def alike(self, a, b) -> bool:
         """Whether two confirmed candidates make the same of these data, within noise."""
 
+    def in_full(self):
+        """Return the model without an effect as a whole refit has it; None: no better than it is."""
+        return None
+
     @abstractmethod
     def remainder(self, best, significant: bool) -> Remainder:
         """Return what the best model leaves."""

@@ -16,9 +16,9 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
+from .alike import breaks_away_only, indistinguishable
 from .attempts import own_names
 from .confirmation import confirmed, stages
-from .equivalence import breaks_away_only, indistinguishable
 from .evidence import ranked, step_as_recorded
 from .first_look import FirstLook
 from .named import beyond_range, refitted, whole_refit
@@ -115,6 +115,11 @@ class StructureSearch(Search):
         course.stage("the parameters of those that may be named")
         at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen
+
+    def in_full(self):
+        """Return the model refitted over stretches as long as it can be followed."""
+        found = None if self.at.data.disturbed else self._whole_refit(self.at, self.base)
+        return None if found is None or found is self.base else found.block
 
     def _whole_refit(self, at: Standing, tried: CandidateFit, seen: bool = False) -> CandidateFit:
         return whole_refit(at, tried, self.prior, seen or bool(self.records[1]))

@@ -1,4 +1,4 @@
-"""The search over records of an imposed motion: errors are of the force itself."""
+"""Searches over records of kinematic excitation: a motion that is imposed, or a base that moves."""
 
 from __future__ import annotations
 
@@ -40,3 +40,20 @@ class ImposedSearch(StructureSearch):
         """Return the fits over all segments, once."""
         there = over(at.data, fits, fits, math.inf)
         return [there], FLOOR * min(f.rmse for f in there if f is not None)
+
+
+class MovingBaseSearch(StructureSearch):
+    """The fits of one diagnosis of a mass on a base that moves.
+
+    The input is inertia: no drive makes it, and where the mass is divided it acts on every part. A sensor in
+    space (`in_space`) saw another motion than the one relative to the base.
+    """
+
+    def __init__(self, *arguments, in_space: bool):
+        super().__init__(*arguments)
+        self.in_space = in_space
+
+    def applies(self, effect) -> bool:
+        """Whether an effect acts between the base and one body, or is of a sensor on the base."""
+        elsewhere = ("input", "coupling", *(["output"] if self.in_space else []))
+        return super().applies(effect) and effect.role not in elsewhere and not effect.divides
