@@ -2,16 +2,17 @@
 
     python benchmarks/copies.py [--jobs 2] [--only PART] [--whole | --units]
 
-One rig an effect. The diagnosis is made twice: with the original among the candidates, and with its copy in
-its place. `--whole`: against the whole library; else against three others. `--units`: the original alone, in
-three other systems of units (a third of these the tests see); laws with events by powers of two, by which
-nothing rounds otherwise, and by powers of ten to within what a user would notice. One line each: verdict,
-evidence, and what differs.
+One rig an effect; the copy has other names for its parameters as well. The diagnosis is made twice: with the
+original among the candidates, and with its copy in its place. `--whole`: against the whole library; else
+against three others. `--units`: the original alone, in three other systems of units (a third of these the
+tests see); laws with events by powers of two, by which nothing rounds otherwise, and by powers of ten to
+within what a user would notice. One line each: verdict, evidence, and what differs.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import sys
 import tempfile
@@ -47,7 +48,7 @@ def asked_of(name):
 def with_own(model, own, original):
     """Return a model in which a copy stands in the place of its original."""
     effects = [
-        own(**{k: p.value for k, p in e.parameters.items()}) if type(e) is original else e
+        own(*(getattr(e, f.name) for f in dataclasses.fields(e))) if type(e) is original else e
         for e in model.effects
     ]
     return type(model)(model.mass, effects)

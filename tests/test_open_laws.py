@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
+from ctrl_df.blocks import probing
 
 T = np.linspace(0, 4, 801)
 
@@ -69,6 +70,46 @@ class Slip(cdf.Effect):
         for i in range(2):
             dz[i] = v - abs(v) * p[i] * z[i] / (0.5 * level)
         return -p[0] * z[0] - p[1] * z[1]
+
+
+@dataclass(frozen=True)
+class Link(cdf.Effect):
+    """A joint that hardens; no parameter is called as one of the library is."""
+
+    firm: float = cdf.parameter("N/m")
+    more: float = cdf.parameter("N/m^3")
+    loss: float = cdf.parameter("N s/m", default=0.0)
+    beyond: float = cdf.parameter("", default=0.4, known_as="load_fraction")
+
+    role: ClassVar[str] = "coupling"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        return p[0] * x + p[1] * x * x * x + p[2] * v
+
+
+@dataclass(frozen=True)
+class Clutch(Link):
+    """A joint that slips at 10 N."""
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        return 10.0 * np.tanh(0.1 * p[0] * x)
+
+
+@dataclass(frozen=True)
+class Teeth(cdf.Effect):
+    """A force from tooth to tooth."""
+
+    size: float = cdf.parameter("N")
+    pitch: float = cdf.parameter("m", strict=True)
+    width: float = cdf.parameter("m", strict=True)
+
+    role: ClassVar[str] = "force"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        return p[0] * np.sin(2 * np.pi * x / p[1]) ** 3
 
 
 def joint(x, v, z):
@@ -172,3 +213,80 @@ def test_two_laws_for_one_place_are_refused():
         cdf.Mass(1.0, [Bumper(1.0, 1.0, 1.0), cdf.HardStop(2.0)])
     with pytest.raises(ValueError, match="one Slip and Bristle"):
         cdf.Mass(1.0, [Slip(1.0, 1.0), cdf.Bristle(2.0)])
+
+
+def test_what_laws_tell_of_themselves():
+    spring, link, pulls = cdf.Compliance(300.0, 2.0), Link(300.0, 5e4, 2.0), np.array([7.0, -0.1, 0.0])
+    assert probing.deflection(spring, pulls) == pytest.approx(pulls / 300.0, rel=1e-15)
+    bent = probing.deflection(link, pulls)
+    assert 300.0 * bent + 5e4 * bent**3 == pytest.approx(pulls, rel=1e-12)
+    assert probing.stiffness(link, 7.0) == pytest.approx(7.0 / bent[0], rel=1e-12)
+    pure = float(probing.deflection(Link(0.0, 5e4), 7.0))
+    assert 5e4 * pure**3 == pytest.approx(7.0, rel=1e-12)  # without a slope at rest
+    assert probing.deflection(Clutch(300.0, 0.0), 50.0) == pytest.approx(np.arctanh(0.9) / 30.0, rel=1e-9)
+    assert probing.deflection(Link(0.0, 0.0, 3.0), 7.0) == 0.0  # a damper alone
+    assert probing.states_at(Shaft(300.0, 5e4, 150.0, 0.05), 0.02) == pytest.approx((0.02,), rel=1e-12)
+    stated = (cdf.Bristle(5e4, 300.0, 1.0), cdf.MaxwellSlip(5e4, 30.0), cdf.LooseLinkage(5e4, 0.01))
+    for effect in (*stated, cdf.Hysteresis(3.0, 0.1)):
+        assert probing.sliding(effect, 3.0) == pytest.approx(effect.steady(3.0), rel=1e-9)
+    assert Slip(2000.0, 400.0).steady(3.0) == pytest.approx((1.5 / 2000.0, 1.5 / 400.0), rel=1e-9)
+    assert Teeth(2.0, 0.3, 0.2).periods() == (0.3,)
+    assert cdf.LinearSpring(3.0, center=0.1).periods() == cdf.LinearSpring(3.0, center=1e-12).periods() == ()
+    assert cdf.PositionDependentFriction(1e-6, wavelength=4e3).periods() == (4e3,)
+
+
+def record_of(block):
+    drive = 3.0 * push(T)
+    x, *_ = np.asarray(cdf.event_response(block, T, drive, input_hold="zoh").outputs)
+    return cdf.Measurement(T, drive, x, input_unit="N", output_unit="m")
+
+
+@pytest.mark.parametrize("law", [Link(600.0, 2e5, 1.0), Shaft(300.0, 5e4, 150.0, 0.05)])
+def test_a_joint_of_any_names_is_compared_and_refitted(law):
+    block = cdf.Mass(2.0, [law, cdf.Viscous(1.0)])
+    record, stiff = record_of(block), f"{law.id}.{next(iter(law.parameters))}"
+    assert cdf.compare(block, record).nrmse < 1e-4  # 5e-6: samples begin a little off
+    off = block.with_parameters({stiff: 0.9 * block.parameters[stiff].value})
+    fit = cdf.refit(off, record, free=[stiff])
+    assert fit.parameters[stiff].value == pytest.approx(block.parameters[stiff].value, rel=1e-3)
+    assert "link.beyond" not in cdf.TwoMass(1.0, 2.0, [Link(600.0, 2e5)]).parameters
+
+
+def test_presliding_of_any_names_on_a_table():
+    rest = [cdf.Coulomb(3.0), cdf.Viscous(0.5), cdf.LinearSpring(50.0)]
+    soft, none = cdf.Mass(1.5, [Slip(4000.0, 2000.0), *rest]), cdf.Mass(1.5, rest)
+    A, omega = np.array([6.0, 12.0]), np.array([3.0, 8.0])
+    table, rigid = (
+        cdf.FrequencyMeasurement(A, omega, cdf.describing_function_family(b, A, omega).N)
+        for b in (soft, none)
+    )
+    assert cdf.compare(soft, table).nrmse < 1e-6
+    assert cdf.compare(none, table).nrmse > 0.01
+    # what yields over next to nothing is as good as rigid, and costs no more
+    assert cdf.compare(cdf.Mass(1.5, [Slip(4e7, 2e7), *rest]), rigid).nrmse < 1e-6
+    assert np.isfinite(cdf.compare(cdf.Mass(1.5, [cdf.MaxwellSlip(6000.0), *rest]), table).nrmse)
+
+
+def stated(name, **body):
+    """Make a contact of an effect class."""
+    made = {"role": "contact", "__annotations__": {"size": float}, "size": cdf.parameter("m"), **body}
+    return dataclass(frozen=True)(type(name, (cdf.Effect,), made))
+
+
+def test_what_a_contact_leaves_open_is_asked_for():
+    with pytest.raises(ValueError, match="needs span"):
+        cdf.register_effect(stated("Wall"))
+    with pytest.raises(ValueError, match="needs restitution; got none. Declare"):
+        cdf.register_effect(stated("Wall", span=(-1.0, 1.0)))
+    with pytest.raises(ValueError, match="needs gap; got none. Declare"):
+        stated("Slack", divides=True)(0.1)
+    with pytest.raises(ValueError, match="cannot have a law"):
+        stated("Slack", divides=True, law=staticmethod(lambda t, x, v, z, p, dz: 0.0))(0.1)
+    loose = stated("Slack", divides=True, restitution=0.3, gap=property(lambda self: 2.0 * self.size))(0.1)
+    assert cdf.TwoMass(1.0, 2.0, [loose]).core.gap == 0.2
+    with pytest.raises(ValueError, match="which share of it lies behind Slack"):
+        cdf.Mass(1.0, [loose])
+    with pytest.raises(ValueError, match="known_as gap, restitution, load_fraction"):
+        cdf.parameter("m", known_as="play")
+    with pytest.raises(ValueError, match="0 < beyond <= 0.999"):
+        Link(1.0, 1.0, beyond=2.0)

@@ -100,11 +100,12 @@ def diagnosed(hidden, candidates, force=1.0, length=1.0):
 
 
 def alike(before, after, scale):
-    """Assert that verdict, evidence and, converted, parameters are the same."""
+    """Assert that verdict, evidence and, converted, parameters are the same, whatever they are called."""
     assert after.verdict == before.verdict
     first, second = before.ranking[0], after.ranking[0]
     assert second.evidence == pytest.approx(first.evidence, rel=CLOSE, abs=CLOSE)
-    assert scaled.back(second, *scale) == pytest.approx(dict(first.parameters), rel=CLOSE)
+    named = {k.removeprefix("own_"): v for k, v in scaled.back(second, *scale).items()}
+    assert named == pytest.approx(dict(first.parameters), rel=CLOSE)
 
 
 def near(before, after, scale):

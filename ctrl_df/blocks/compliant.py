@@ -183,8 +183,7 @@ def _stops(core, t, x, dx, force):
         side = math.copysign(1.0, bend) if bend != 0.0 else 0.0
         force[b] -= side * max(_called(core.contact, t, abs(bend), side * x[2 * b + 1], x, dx), 0.0)
         return
-    assert core.stop is not None  # it bends something
-    force[b] -= _contact(bend, x[2 * b + 1], core.masses[b], core.stop.restitution)  # type: ignore[union-attr]
+    force[b] -= _contact(bend, x[2 * b + 1], core.masses[b], core.stop_restitution)
 
 
 def _contact(bend, rate, mass, restitution):

@@ -13,6 +13,7 @@ from typing import Any
 
 from .effect import Effect
 from .primitives import Delay, Lag, Play, Primitive, RateLimiter
+from .stated import known
 
 RIGID, IMPACT, ELASTIC = "rigid", "impact", "elastic"
 BOTH = -1
@@ -37,9 +38,8 @@ class Core:
     friction: tuple[tuple[Effect, ...], ...]
     gap: float = 0.0
     restitution: float = 0.0
-    stiffness: float = 0.0
-    damping: float = 0.0
     stop: Any = None
+    stop_restitution: float = 0.0
     bristle: Any = None
     bristle_state: int = -1
     presliding: ForceTerm | None = None
@@ -93,7 +93,7 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         joint = RIGID
     if joint is not None and not two_mass:
         dividing: Any = compliance or backlash
-        share = dividing.load_fraction
+        share = known(dividing, "load_fraction")
         masses = (share * masses[0], (1 - share) * masses[0])
     motor = len(masses) - 1
     names = ["x", "v"] + (["x_motor", "v_motor"] if motor else [])
@@ -131,11 +131,10 @@ def build_core(masses: tuple[float, ...], two_mass: bool, effects: Sequence[Effe
         joint=joint,
         forces=tuple(forces),
         friction=tuple(tuple(sorted(group, key=lambda e: e.rank)) for group in friction),
-        gap=backlash.gap if backlash else 0.0,
-        restitution=backlash.restitution if backlash else 0.0,
-        stiffness=getattr(compliance, "stiffness", 0.0),
-        damping=getattr(compliance, "damping", 0.0),
+        gap=known(backlash, "gap") if backlash else 0.0,
+        restitution=known(backlash, "restitution") if backlash else 0.0,
         stop=stop if yielding is None else None,
+        stop_restitution=known(stop, "restitution") if stop and not yielding else 0.0,
         bristle=bristle,
         bristle_state=bristle_state,
         **terms,

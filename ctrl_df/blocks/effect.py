@@ -15,22 +15,25 @@ role          what the class provides
               `asks` for more is called ``law(moving, direction, speed, base, p, x, drive, load)``
 ``contact``   ``law(t, depth, rate, z, p, dz) -> force`` [N] of stops at ``span`` = (lower, upper) [m] that
               yield by `depth`: they push, and what the law pulls is left out. Without a law the engine's law
-              of impact: fields ``gap``, ``restitution``, ``load_fraction`` of one that `divides` the mass
-              (`Backlash`); else ``restitution`` and ``span`` (`HardStop`)
+              of impact: it knows a ``restitution``, and of one that `divides` the mass a ``gap`` and a
+              ``load_fraction`` (`Backlash`) in the place of the span (`HardStop`)
 ``coupling``  ``law(t, x, v, z, p, dz) -> force`` [N] on the load, of a joint whose motor side is `x` ahead;
-              beside `Backlash` outside the gap only. A field ``load_fraction`` divides a single mass
+              beside `Backlash` outside the gap only. A ``load_fraction`` divides a single mass
 ``presliding`` ``law(v, level, z, p, dz) -> force`` [N] of friction that yields before it slides, in the
               place of sticking; `level` is that of the block's dry friction
 ``input``     ``channel() -> tuple of primitives`` that the applied force passes through; may have the
               ``law`` of a force besides, as the drive's own (back-EMF)
 ``output``    ``channel() -> tuple of primitives`` that the measured position passes through
 ============  ==================================================================================
+
+Parameters may have any name. Those that the engine must know say what it knows them as,
+``parameter(unit, known_as="gap")``; so may a field or property of that name. All else follows from the law
+(`ctrl_df.blocks.probing`): how far a joint is bent, what presliding comes to, where a force repeats.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -38,8 +41,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
 from ..checks import shown
+from ..units import si_unit
+from . import probing
 from .parameter import Parameter, checked
 from .primitives import Primitive
+from .stated import require_complete, share_name, stated_parameters
 
 TOLD = ("x", "drive", "load")
 ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
@@ -138,6 +144,7 @@ class Effect:
         cls.id = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
 
     def __post_init__(self):
+        require_complete(type(self))
         for name, spec in stated_parameters(type(self)):
             value = checked(type(self).__name__, name, getattr(self, name), spec, self.remedy)
             object.__setattr__(self, name, value)
@@ -194,8 +201,39 @@ class Effect:
         return True
 
     def steady(self, level: float) -> tuple[float, ...]:
-        """Return the internal states that motion along +x comes to, under a dry friction of `level` [N]."""
-        return (0.0,) * self.states
+        """Return the internal states that motion along +x comes to, under a dry friction of `level` [N].
+
+        The base class asks the law.
+        """
+        return probing.sliding(self, level)
+
+    def periods(self) -> tuple[float, ...]:
+        """Return lengths over which its law repeats from place to place [m]; the base class asks the law."""
+        return probing.periods(self)
+
+    @classmethod
+    def from_spring(
+        cls, stiffness: float, damping: float, load_fraction: float, usual: Callable[[str], float]
+    ) -> Effect | None:
+        """Return a joint that is nearly a spring [N/m] with a damper [N s/m], or None.
+
+        The base class goes by units: the first parameter of each takes it, others are left at their defaults
+        or take sizes that are `usual` for their unit in the records. None where no parameter is a stiffness.
+        """
+        given = {"N/m": stiffness, "N s/m": damping}
+        values, defaults = {}, {f.name: f.default for f in dataclasses.fields(cls)}
+        for name, spec in stated_parameters(cls):
+            unit = si_unit(spec["unit"])[1]
+            if name == share_name(cls):
+                values[name] = load_fraction
+            elif unit in given:
+                values[name] = given.pop(unit)
+            elif defaults[name] is dataclasses.MISSING:
+                values[name] = usual(spec["unit"])
+        try:
+            return None if "N/m" in given else cls(**values)
+        except (TypeError, ValueError):  # it needs more than parameters, or refuses these
+            return None
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -212,20 +250,6 @@ class Effect:
         return dataclasses.replace(self, **changes)
 
 
-@functools.cache
-def stated_parameters(cls: type[Effect]) -> tuple[tuple[str, dict[str, Any]], ...]:
-    """Return the names of the parameters of an effect class, in declaration order, with what is stated."""
-    return tuple(
-        (f.name, f.metadata["parameter"]) for f in dataclasses.fields(cls) if "parameter" in f.metadata
-    )
-
-
-@functools.cache
-def static_levels(cls: type[Effect]) -> tuple[str, ...]:
-    """Return the parameters of an effect class that are static levels, none below the kinetic one."""
-    return tuple(name for name, spec in stated_parameters(cls) if spec.get("threshold"))
-
-
 def register_effect(cls: _EffectClass) -> _EffectClass:
     """Class decorator: add an effect to the library, so that diagnosis screens it and blocks accept it.
 
@@ -236,7 +260,7 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
     TypeError
         If it is no dataclass derived from `Effect`.
     ValueError
-        If the id is taken or the role unknown.
+        If the id is taken, the role unknown, or something that the role needs not stated.
 
     Examples
     --------
@@ -264,10 +288,11 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
             f"{cls.__name__} may ask for {', '.join(TOLD)}, if its role is friction; got role {cls.role!r}, "
             f"asks={cls.asks!r}."
         )
-    known = _LIBRARY.get(cls.id)
-    if known is not None and _origin(known) != _origin(cls):
+    require_complete(cls)
+    taken = _LIBRARY.get(cls.id)
+    if taken is not None and _origin(taken) != _origin(cls):
         raise ValueError(
-            f"effect id {cls.id!r} is taken by {known.__module__}.{known.__qualname__}; rename the class."
+            f"effect id {cls.id!r} is taken by {taken.__module__}.{taken.__qualname__}; rename the class."
         )
     _LIBRARY[cls.id] = cls
     return cls

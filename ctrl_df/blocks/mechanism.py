@@ -16,10 +16,11 @@ from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
-from .effect import Effect, stated_parameters, static_levels
+from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Viscous
 from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
+from .stated import share_name, stated_parameters, static_levels
 
 _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
 
@@ -84,8 +85,9 @@ class Mechanism(ct.NonlinearIOSystem):
     def _of_effects(self) -> Iterator[tuple[str, float, dict[str, Any]]]:
         """Yield the parameters of its effects: full name, value, what is stated of it."""
         for key, effect in zip(self._keys, self._effects, strict=True):
+            idle = share_name(type(effect)) if len(self._inertias) == 2 else ""
             for (name, spec), value in zip(stated_parameters(type(effect)), effect.values, strict=True):
-                if name != "load_fraction" or len(self._inertias) < 2:
+                if name != idle:
                     yield f"{key}.{name}", value, spec
 
     def _labels(self) -> tuple[list[str], list[str], list[str]]:

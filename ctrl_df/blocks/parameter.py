@@ -10,6 +10,10 @@ from typing import Any
 from ..checks import CHECK_VALUE, number
 from ..units import dimension
 
+KNOWN_AS = ("gap", "restitution", "load_fraction")
+"""What the engine must know of contacts and joints: clearance [m], rebound speed over impact speed, the share
+of a single mass that lies behind a joint."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -36,6 +40,8 @@ class Parameter:
         Whether it is an angle that every record has anew (an encoder counts from another zero).
     stepped : bool
         Whether outputs change in steps with it: no least squares moves it, it is read off the record.
+    known_as : str
+        What the engine knows it as, one of `KNOWN_AS`; "" where its law alone uses it.
     line_unit : str
         Unit of the same parameter in a machine on a line, `unit` by default; its size follows from that.
 
@@ -56,6 +62,7 @@ class Parameter:
     threshold: bool = False
     per_record: bool = False
     stepped: bool = False
+    known_as: str = ""
     line_unit: str = ""
 
     def __post_init__(self):
@@ -78,13 +85,17 @@ def parameter(
     threshold=False,
     per_record=False,
     stepped=False,
+    known_as="",
 ) -> Any:
     """Declare a dataclass field that is a physical parameter (unit, bounds, what it means).
+
+    Its attributes are those of `Parameter`.
 
     Raises
     ------
     ValueError
-        The unit is unknown: the sizes that a fit begins with follow from it.
+        The unit is unknown: the sizes that a fit begins with follow from it. Or `known_as` is none of
+        ``gap``, ``restitution``, ``load_fraction``.
 
     Examples
     --------
@@ -96,9 +107,14 @@ def parameter(
     'N/m'
     """
     dimension(unit)
+    if known_as and known_as not in KNOWN_AS:
+        raise ValueError(
+            f"a parameter may be known_as {', '.join(KNOWN_AS)}; got {known_as!r}. Leave it out where the "
+            "law alone uses the parameter."
+        )
     stated = dict(
         unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning, threshold=threshold,
-        per_record=per_record, stepped=stepped,
+        per_record=per_record, stepped=stepped, known_as=known_as,
     )  # fmt: skip
     return dataclasses.field(default=default, metadata={"parameter": stated})
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..blocks.effect import Effect, effect_class, effect_library, stated_parameters
+from ..blocks.effect import Effect, effect_class, effect_library
 from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
+from ..blocks.stated import stated_parameters
 from ..checks import count, flag, known_name, mapping, names, number, positive, shown
 from ..simulate.imposed_response import imposable
 from ..units import dimension

@@ -32,11 +32,14 @@ class Backlash(Effect):
     ['x', 'v', 'x_motor', 'v_motor']
     """
 
-    gap: float = parameter("m", strict=True, meaning="total clearance")
-    restitution: float = parameter("", upper=1.0, default=0.0, meaning="coefficient of restitution")
-    load_fraction: float = parameter(
-        "", strict=True, upper=0.999, default=0.5, meaning="share of a single mass behind the gap"
+    gap: float = parameter("m", strict=True, known_as="gap", meaning="total clearance")
+    restitution: float = parameter(
+        "", upper=1.0, default=0.0, known_as="restitution", meaning="coefficient of restitution"
     )
+    load_fraction: float = parameter(
+        "", strict=True, upper=0.999, default=0.5, known_as="load_fraction",
+        meaning="share of a single mass behind the gap",
+    )  # fmt: skip
 
     role: ClassVar[str] = "contact"
     nonsmooth: ClassVar[bool] = True

@@ -38,8 +38,9 @@ class Compliance(Effect):
     stiffness: float = parameter("N/m", strict=True, meaning="joint stiffness")
     damping: float = parameter("N s/m", default=0.0, meaning="joint damping")
     load_fraction: float = parameter(
-        "", strict=True, upper=0.999, default=0.5, meaning="share of a single mass behind the joint"
-    )
+        "", strict=True, upper=0.999, default=0.5, known_as="load_fraction",
+        meaning="share of a single mass behind the joint",
+    )  # fmt: skip
 
     role: ClassVar[str] = "coupling"
     multimodal: ClassVar[bool] = True

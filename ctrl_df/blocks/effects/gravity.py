@@ -38,7 +38,6 @@ class Gravity(Effect):
     role: ClassVar[str] = "force"
     turns: ClassVar[bool] = True
     proportional: ClassVar[bool] = True
-    wavelength: ClassVar[float] = 2.0 * math.pi
     shows: ClassVar[str] = "error that goes with the sine of the angle, in motion and at rest"
     source: ClassVar[str] = "Newton"
     remedy: ClassVar[str] = "On a line gravity is a ConstantForce."
@@ -47,6 +46,10 @@ class Gravity(Effect):
     def law(t, x, v, z, p, dz):
         """Return the torque [N m]."""
         return -p[0] * math.sin(x - p[1])
+
+    def periods(self):
+        """Return a turn."""
+        return (2.0 * math.pi,)
 
     @classmethod
     def applicable(cls, block):
@@ -66,7 +69,7 @@ class Gravity(Effect):
     def suggest(cls, screen):
         """Return the pendulum whose sine and cosine explain most of the output, and shares of the force."""
         shares = [cls(f * screen.scales.force) for f in (0.1, 0.4)]
-        wave = screen.long_wave(lambda size, _, phase: cls(size, math.pi - phase), cls.wavelength)
+        wave = screen.long_wave(lambda size, _, phase: cls(size, math.pi - phase), 2.0 * math.pi)
         if wave is None:
             return shares
         _, torque, phase = wave

@@ -34,7 +34,9 @@ class HardStop(Effect):
     """
 
     limit: float = parameter("m", lower=-math.inf, meaning="upper end of the stroke")
-    restitution: float = parameter("", upper=1.0, default=0.0, meaning="coefficient of restitution")
+    restitution: float = parameter(
+        "", upper=1.0, default=0.0, known_as="restitution", meaning="coefficient of restitution"
+    )
     lower: float | None = None
 
     role: ClassVar[str] = "contact"

@@ -58,7 +58,7 @@ class PositionRipple(Effect):
     @classmethod
     def regress(cls, screen):
         """Yield the waves of any length that explain most of the motion."""
-        known = [e.wavelength for e in screen.block.effects if hasattr(e, "wavelength")]
+        known = [length for e in screen.block.effects for length in e.periods()]
         for wave, values in screen.waves(known):
             yield cls(wave.amplitude, wave.wavelength, wave.phase), values
 

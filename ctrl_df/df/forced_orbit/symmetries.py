@@ -164,7 +164,7 @@ def _mechanisms(prog):
 
 
 def find_symmetries(engine: Engine, block=None, sizes: Sizes | None = None) -> Symmetries:
-    """Ask the laws of a compiled system for its symmetries; `block` tells wavelengths of ripples."""
+    """Ask the laws of a compiled system for its symmetries; `block` tells over which lengths they repeat."""
     n, prog, probe = engine.nstates, engine.program, Probe(engine, sizes)
     transform, power = np.eye(n), np.zeros(n, int)
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
@@ -267,4 +267,4 @@ def _close(a, b, tol=ALIKE):
 
 def _wavelengths(block):
     effects = getattr(block, "effects", ()) if isinstance(block, Mechanism) else ()
-    return sorted({e.wavelength for e in effects if hasattr(e, "wavelength")}, reverse=True)
+    return sorted({length for e in effects for length in e.periods()}, reverse=True)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.probing import stiffness
 from ..data.measurement import Measurement
 from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
@@ -377,15 +378,17 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
     spans = [r.duration if n is None else n for r, n in zip(records, lengths, strict=True)]
     first = [0.5 * facts(r).swing for r in records]
     core = simulator.block.core if simulator.mechanism else None
-    if core is not None and core.stiffness > 0:
+    joint = None if core is None or core.coupling is None else core.coupling.effect
+    if core is not None and joint is not None:
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
-        first = [min(f, 4 * 2 * math.pi * math.sqrt(mass / core.stiffness)) for f in first]
+        stiff = stiffness(joint, simulator.facts.force)
+        first = [min(f, 4 * 2 * math.pi * math.sqrt(mass / max(stiff, NOTHING))) for f in first]
     first = [max(f, SEGMENT_LEAST * facts(r).dt) for f, r in zip(first, records, strict=True)]
     stages: list[list[float | None]] = []
     factor = 1.0
     while any(1.5 * factor * f < span for f, span in zip(first, spans, strict=True)) and len(stages) < 4:
         stages.append([min(factor * f, span) for f, span in zip(first, spans, strict=True)])
-        if core is None or core.stiffness == 0:
+        if joint is None:
             break
         factor *= 4
     return stages

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, level
-from ...blocks.effect import Effect
+from ...blocks.probing import deflection, states_at, stiffness
 from ..thresholds import NOTHING
 from .thresholds import BEND_REACH, PLACE_REACH, RATE_REACH, SPEED_REACH
 
@@ -71,10 +71,13 @@ def reach(which, core, known, segments) -> np.ndarray:
         "slack_rate": RATE_REACH * known.speed * one,
     } | {name: 0.5 * one for name, _, _ in _inner(core)}
     if core.joint == ELASTIC:
-        bend = known.force / max(core.stiffness, NOTHING)
+        stiff = stiffness(core.coupling.effect, known.force)
         mass = core.masses[0] * core.masses[-1] / sum(core.masses)
-        table["stretch"] = BEND_REACH * bend * one
-        table["stretch_rate"] = BEND_REACH * bend * math.sqrt(core.stiffness / mass) * one
+        bend, rate = known.position, known.speed  # of a joint that nothing holds together
+        if stiff > NOTHING:
+            bend = known.force / stiff
+            rate = bend * math.sqrt(stiff / mass)
+        table["stretch"], table["stretch_rate"] = BEND_REACH * bend * one, BEND_REACH * rate * one
     return np.column_stack([table[name] for name in which])
 
 
@@ -105,6 +108,12 @@ def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
         beyond = np.clip(states[:, 2], *core.stop.span) - states[:, 2]
         states[:, 2] += beyond
         states[:, 0] += beyond
+    if core.coupling is not None and core.coupling.effect.states:
+        first, joint = core.coupling.state, core.coupling.effect
+        for row in states:
+            ahead = row[2] - row[0]
+            bent = float(ahead - min(max(ahead, 0.0), core.gap))
+            row[first : first + joint.states] = states_at(joint, bent)
     for name, term, at in _inner(core):
         slip, full = np.array([_settled(row, core, term, at) for row in states]).T
         share = np.tanh(3 * slip / speed) + given.get(name, 0.0)
@@ -140,7 +149,7 @@ def _joint(core, acceleration) -> tuple[Any, float]:
         return core.gap * (acceleration > 0), 0.0
     if core.joint == ELASTIC:
         pull = core.masses[0] * acceleration
-        return pull / core.stiffness + core.gap * (pull > 0), 0.0
+        return deflection(core.coupling.effect, pull) + core.gap * (pull > 0), 0.0
     return 0.0, 0.0
 
 
@@ -150,8 +159,9 @@ def _inner(core) -> list[tuple[str, Any, int]]:
     return [
         (core.state_names[term.state + i], term, i)
         for term in terms
-        if term is not None and type(term.effect).steady is not Effect.steady
-        for i in range(term.effect.states)
+        if term is not None
+        for i, full in enumerate(term.effect.steady(1.0))
+        if full != 0.0
     ]
 
 

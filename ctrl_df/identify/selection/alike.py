@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ...blocks.core import level
-from ...blocks.effect import static_levels
+from ...blocks.stated import static_levels
 from ...simulate.crew import side_by_side
 from ..estimation.multistart import cross_started
 from ..estimation.segmented import CandidateFit, SegmentedData

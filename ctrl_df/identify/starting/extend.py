@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ...blocks.core import kinetic_level
-from ...blocks.effect import static_levels
+from ...blocks.stated import static_levels
 
 
 def applicable(cls, block) -> bool:

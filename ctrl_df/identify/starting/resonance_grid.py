@@ -24,7 +24,8 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
     reduced = share * (1 - share) * scales.mass
     for rate in RESONANCES * scales.speed / scales.position:
         stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
-        block = extended(screen.block, cls(stiffness=stiffness, damping=damping, load_fraction=share))
+        joint = cls.from_spring(stiffness, damping, share, scales.of)
+        block = None if joint is None else extended(screen.block, joint)
         if block is not None:
             found.append(screen.data.fit(block, (), iterations=1, hopeless=hopeless))
     near = sorted(found, key=lambda f: f.rmse)[:JOINTS_TRIED]

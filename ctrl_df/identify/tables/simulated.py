@@ -5,14 +5,16 @@ Where the block has no periodic answer or stands still, its N counts as zero.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ...blocks.core import level
+from ...blocks.probing import slip
 from ..thresholds import NOTHING
 from .points import Points
-from .thresholds import RESONANT, RIGID, WORK_HIGH
+from .thresholds import AS_DRY, RESONANT, RIGID, WORK_HIGH
 
 
 def simulate_table(model, points: Points, work=None) -> np.ndarray:
@@ -38,17 +40,22 @@ def _without_bristles(model):
 
 
 def _rigid(model, points: Points, share: float) -> np.ndarray:
-    """Return where the bristles of a model yield over next to nothing of the measured swing.
+    """Return where the presliding of a model yields over next to nothing of the measured swing.
 
-    There they are stiff and cost thousands of steps a period, and N differs from that of rigid friction by
-    less than that share.
+    There it is stiff and costs thousands of steps a period, and N differs from that of rigid friction by
+    less than that share. It must carry the block's dry friction and no more.
     """
-    bristles = [e for e in getattr(model, "effects", ()) if e.role == "presliding" and e.level == 0]
-    if not bristles:
-        return np.zeros(len(points), bool)
-    friction = [e for e in model.effects if e.role == "friction" and e.side == "motor"]
-    bend = level(friction, 0.0, 1.0, 0.0) / bristles[0].stiffness
-    return bend < share * points.A * np.abs(points.N)
+    nowhere = np.zeros(len(points), bool)
+    presliding = [e for e in getattr(model, "effects", ()) if e.role == "presliding"]
+    if not presliding:
+        return nowhere
+    dry = level([e for e in model.effects if e.role == "friction" and e.side == "motor"], 0.0, 1.0, 0.0)
+    if not dry > 0:
+        return nowhere
+    stroke, carried = slip(presliding[0], dry)
+    if not math.isclose(carried, dry, rel_tol=AS_DRY):
+        return nowhere
+    return stroke < share * points.A * np.abs(points.N)
 
 
 def relative_error(simulated, points: Points) -> np.ndarray:

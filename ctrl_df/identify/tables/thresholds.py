@@ -25,6 +25,9 @@ than one of the tables of `tests/test_frequency.py`, so that a second such point
 RIGID = (2e-3, 3e-4)
 """Deflection of bristles, as a share of the swing, below which they are rigid: when quick, when careful."""
 
+AS_DRY = 1e-6
+"""Relative difference up to which presliding that slips carries the dry friction of its block: rounding."""
+
 CONFIRMED_ON_TABLE = 5
 """Candidates that are fitted to all points of a table."""
 

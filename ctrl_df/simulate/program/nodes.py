@@ -10,8 +10,8 @@ import control as ct
 import numpy as np
 
 from ...blocks.core import ELASTIC, IMPACT, RIGID, Core
-from ...blocks.effect import stated_parameters
 from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Play, Quantizer, Ramp, RateLimiter, Smooth
+from ...blocks.stated import stated_parameters
 from ...checks import returned, shown
 from ..thresholds import PROBED
 from . import layout as L
@@ -147,7 +147,7 @@ def core_node(core: Core, x0: int) -> Node:
     """Node of a mechanism."""
     low, high = core.wall
     numbers: list[float] = [core.masses[0], core.masses[1] if core.bodies == 2 else 1.0, core.gap]
-    numbers += [core.restitution, low, high, core.stop.restitution if core.stop else 0.0]
+    numbers += [core.restitution, low, high, core.stop_restitution]
     par = [*numbers, *(_narrowest(chain) for chain in (core.friction + ((),))[:2])]
     laws, effects = [], []
 
