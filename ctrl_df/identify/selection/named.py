@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ...simulate.crew import side_by_side
-from ..estimation.refit_records import refit_records
+from ..estimation.refit_records import blurred, refit_records
 from ..estimation.segmented import CandidateFit
 from ..thresholds import GROWTH, RULED_OUT
 from .evidence import ranked
@@ -46,7 +46,8 @@ def refitted(
 def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> CandidateFit:
     """Return a candidate with the values that `refit` finds from its own.
 
-    It stays as it is where the segments that judge speak against these.
+    It stays as it is where the segments that judge speak against these, or tell parameters that the refit
+    leaves open.
 
     Parameters
     ----------
@@ -68,6 +69,8 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> Candida
     if not data.disturbed and found.rmse > FLOOR * at.floor:
         # a minimum beside the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
+    if blurred(found) - blurred(tried.train):
+        return tried
     there = data.as_it_is(found)
     there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
     other = data.validate(replace(tried, train=there))
