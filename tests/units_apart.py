@@ -24,8 +24,9 @@ ten they are held to what a user would notice (`near`).
 """
 
 NEARLY, OF_AN_ERROR, OPEN = 1.0, 0.3, 0.005
-"""What a rounding may change: nats of evidence, of which five decide; a share of a standard error (measured: 0.13); a share of
-a static level, which samples leave open (a stiction: 0.35 %, by which the evidence moves 0.05)."""
+"""What a rounding may change: nats of evidence, of which five decide; a share of a standard error (measured:
+0.13); a share of a static level, which samples leave open (a stiction: 0.35 %, by which the evidence moves
+0.05)."""
 
 SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow
 LENGTHS = {
