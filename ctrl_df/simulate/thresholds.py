@@ -208,6 +208,10 @@ EXPONENTIAL_HALVINGS, CURVED_HALVINGS = 12, 40
 """Halvings of a step at most before its exponential is summed: a mode that needs more is left to other steps;
 and where stiff laws decay within the step."""
 
+CURVATURE_TERMS, CURVATURE_SHARE, CURVATURE_EXCESS = 64, 1e-6, 1.001
+"""Terms at most of the series that limits a margin's curvature, all of one sign; the share of its sum at which
+it ends; what stands for the rest. More terms sum exp(20), a limit that no margin keeps."""
+
 EXPONENTIAL_SHARE, CURVED_SHARE = 1e-3, 0.1
 """Share of an eps at which its series ends: twelve squarings make four eps of it; and where steps
 double one by one."""

@@ -83,7 +83,8 @@ def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Ca
     """Return the model without an effect, refitted without limits, where that explains more than the best.
 
     Fits keep the model's own parameters within a range of what they were stated to be. Where one ends there,
-    a record or a model in other units than it says is as likely as a missing effect.
+    a record or a model in other units than it says is as likely as a missing effect. Where the best errs no
+    more than over the shortest segments nothing is left to explain.
 
     Returns
     -------
@@ -92,7 +93,11 @@ def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Ca
     """
     values = {k: p.value for k, p in at.base.block.parameters.items()}
     spans = {k: span for k, span in at.data.limits.items() if k in at.base.train.names}
-    if at.data.disturbed or all(a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items()):
+    if (
+        at.data.disturbed
+        or best.train.rmse <= at.floor
+        or all(a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items())
+    ):
         return None
     other = refit(replace(at, data=replace(at.data, limits={})), at.base, seen=True)
     values = {k: p.value for k, p in other.block.parameters.items()}

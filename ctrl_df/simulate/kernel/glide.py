@@ -23,12 +23,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.compiled import part
-from ..dynamics.matrices import multiply, row_times
+from ..dynamics.matrices import row_times
 from ..dynamics.mechanics import mechanism
 from ..dynamics.modes import settle
 from ..program import layout as L
 from ..thresholds import (
     ALIKE,
+    CURVATURE_EXCESS,
+    CURVATURE_SHARE,
+    CURVATURE_TERMS,
     EPS,
     EXPONENTIAL_HALVINGS,
     EXPONENTIAL_SHARE,
@@ -77,7 +80,10 @@ class Glide(NamedTuple):
     slack: np.ndarray  # (margins,)
     here: np.ndarray  # z at the start of a step
     ahead: np.ndarray  # and at its end
-    matrix: np.ndarray  # (5, nz, nz)
+    matrix: np.ndarray  # (2, nz, nz)
+    begins: np.ndarray  # (nz + 1,): where a row of M begins in the next two
+    columns: np.ndarray  # (nz * nz,)
+    values: np.ndarray  # (nz * nz,)
 
 
 def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
@@ -94,7 +100,7 @@ def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
         np.zeros((used, margins), np.int64),
         np.zeros((used, margins, nz)), np.zeros(nz), np.zeros(margins),
         np.zeros(nz + 3 * memory.acting.shape[0]), np.zeros(nz),
-        np.zeros((5, nz, nz)),
+        np.zeros((2, nz, nz)), np.zeros(nz + 1, np.int64), np.zeros(nz * nz, np.int64), np.zeros(nz * nz),
     )  # fmt: skip
 
 
@@ -538,56 +544,18 @@ def _make(store, tracks, bend, place, slot, h, n, nr, ny):
 @part
 def _make_straight(store, tracks, place, slot, h, n, nr):
     """Compute exp(M h), row after row, and the limits of curvature; returns their entries (-1: none)."""
-    nz, margins = n + 2 * nr + 2, store.rows.shape[1]
-    at, one = nz - 2, nz - 1
-    m, absolute, power, scratch = tracks.matrix[0], tracks.matrix[1], tracks.matrix[2], tracks.matrix[3]
-    whole = tracks.matrix[4]
-    for i in range(nz):
-        for j in range(nz):
-            m[i, j] = 0.0
-    for i in range(n):
-        for j in range(n):
-            m[i, j] = store.a[slot, i, j]
-        for k in range(nr):
-            m[i, n + k] = store.b[slot, i, k]
-        m[i, at], m[i, one] = store.d[slot, i], store.c[slot, i]
-    for k in range(nr):
-        m[n + k, n + nr + k] = 1.0
-    m[at, one] = 1.0
-    for i in range(nz):
-        for j in range(nz):
-            absolute[i, j] = abs(m[i, j])
+    nz = n + 2 * nr + 2
+    _entries_of(store, tracks, slot, n, nr)
+    usable = _curvatures(store, tracks, place, slot, h, n, nr)
     halvings = 0
-    while halvings <= EXPONENTIAL_HALVINGS and not _exponential(absolute, h, halvings, whole, power, scratch):
+    while usable and not _exponential(tracks, h / 2.0**halvings, n):
         halvings += 1
-    usable = halvings <= EXPONENTIAL_HALVINGS
-    # --- limits of curvature: |c M^2| exp(|M| h) h^2 / 8
-    for row in range(margins):
-        for j in range(nz):
-            tracks.curved[place, row, j] = 0.0
-        if not usable or tracks.owner[place, row] < 0:
-            continue
-        for j in range(nz):
-            power[0, j] = power[1, j] = 0.0
-        for i in range(nz):
-            c = entry(store.rows[slot, row], i, n, nr)
-            if c != 0.0:
-                for j in range(nz):
-                    power[0, j] += c * m[i, j]
-        for i in range(nz):
-            if power[0, i] != 0.0:
-                for j in range(nz):
-                    power[1, j] += power[0, i] * m[i, j]
-        for i in range(nz):
-            bend = abs(power[1, i]) * h * h / 8.0
-            if bend > 0.0:
-                for j in range(nz):
-                    tracks.curved[place, row, j] += bend * whole[i, j]
-        for j in range(nz):
-            usable = usable and tracks.curved[place, row, j] < math.inf
+        usable = halvings <= EXPONENTIAL_HALVINGS
     if not usable:
         return -1
-    _exponential(m, h, halvings, whole, power, scratch)
+    whole = tracks.matrix[0]
+    for done in range(halvings):
+        _double(whole, tracks.matrix[1], h / 2.0 ** (halvings - done), n, nr)
     # --- the rows, zeros left out
     count = 0
     for row in range(n):
@@ -600,27 +568,124 @@ def _make_straight(store, tracks, place, slot, h, n, nr):
 
 
 @part
-def _exponential(m, h, halvings, out, power, scratch):
-    """Sum exp(m h / 2^halvings), squared as often; False where so many terms are too few for an element."""
-    nz = m.shape[0]
-    step = h / 2.0**halvings
+def _entries_of(store, tracks, slot, n, nr):
+    """Write M of a mode row by row, zeros left out."""
+    nz, begins, columns, values = n + 2 * nr + 2, tracks.begins, tracks.columns, tracks.values
+    count = 0
     for i in range(nz):
+        begins[i] = count
         for j in range(nz):
-            out[i, j] = power[i, j] = 1.0 if i == j else 0.0
-    small = False
-    for k in range(1, EXPONENTIAL_TERMS + 1):
-        small = True
-        multiply(m, power, scratch)
-        for i in range(nz):
+            value = 0.0
+            if i < n and j < n:
+                value = store.a[slot, i, j]
+            elif i < n and j < n + nr:
+                value = store.b[slot, i, j - n]
+            elif i < n and j >= n + 2 * nr:
+                value = store.d[slot, i] if j == nz - 2 else store.c[slot, i]
+            elif (n <= i < n + nr and j == i + nr) or (i == nz - 2 and j == nz - 1):
+                value = 1.0
+            if value != 0.0:
+                columns[count], values[count] = j, value
+                count += 1
+    begins[nz] = count
+
+
+@part
+def _curvatures(store, tracks, place, slot, h, n, nr):
+    """Write the limits of curvature, |c M^2| exp(|M| h) h^2 / 8; False where there are none."""
+    nz, margins = n + 2 * nr + 2, store.rows.shape[1]
+    begins, columns, values = tracks.begins, tracks.columns, tracks.values
+    power, ahead = tracks.matrix[0, 0], tracks.matrix[0, 1]
+    for row in range(margins):
+        limit = tracks.curved[place, row]
+        for j in range(nz):
+            limit[j] = 0.0
+        if tracks.owner[place, row] < 0:
+            continue
+        for j in range(nz):
+            power[j] = entry(store.rows[slot, row], j, n, nr)
+        for _ in range(2):
+            _times(power, begins, columns, values, ahead)
             for j in range(nz):
-                power[i, j] = scratch[i, j] * step / k
-                out[i, j] += power[i, j]
-                small = small and abs(power[i, j]) <= EXPONENTIAL_SHARE * EPS * abs(out[i, j])
-        if small:
-            break
-    for _ in range(halvings):
-        multiply(out, out, scratch)
-        for i in range(nz):
+                power[j] = ahead[j]
+        for j in range(nz):
+            power[j] = limit[j] = abs(power[j]) * h * h / 8.0
+        small = False
+        for k in range(1, CURVATURE_TERMS + 1):
             for j in range(nz):
-                out[i, j] = scratch[i, j]
-    return small
+                ahead[j] = 0.0
+            for i in range(nz):
+                if power[i] != 0.0:
+                    factor = power[i] * h / k
+                    for at in range(begins[i], begins[i + 1]):
+                        ahead[columns[at]] += factor * abs(values[at])
+            small = True
+            for j in range(nz):
+                power[j] = ahead[j]
+                limit[j] += power[j]
+                small = small and power[j] <= CURVATURE_SHARE * limit[j] < math.inf
+            if small:
+                break
+        if not small:
+            return False
+        for j in range(nz):
+            limit[j] *= CURVATURE_EXCESS
+    return True
+
+
+@part
+def _times(row, begins, columns, values, out):
+    """Write a row times a matrix kept without its zeros to `out`."""
+    for j in range(out.shape[0]):
+        out[j] = 0.0
+    for i in range(row.shape[0]):
+        if row[i] != 0.0:
+            for at in range(begins[i], begins[i + 1]):
+                out[columns[at]] += row[i] * values[at]
+
+
+@part
+def _exponential(tracks, h, n):
+    """Sum the states' rows of exp(M h); False where so many terms are too few for an element."""
+    begins, columns, values = tracks.begins, tracks.columns, tracks.values
+    whole, power, ahead = tracks.matrix[0], tracks.matrix[1, 0], tracks.matrix[1, 1]
+    nz = power.shape[0]
+    for i in range(n):
+        out = whole[i]
+        for j in range(nz):
+            out[j] = power[j] = 1.0 if i == j else 0.0
+        small = False
+        for k in range(1, EXPONENTIAL_TERMS + 1):
+            _times(power, begins, columns, values, ahead)
+            factor = h / k
+            small = True
+            for j in range(nz):
+                power[j] = ahead[j] * factor
+                out[j] += power[j]
+                small = small and abs(power[j]) <= EXPONENTIAL_SHARE * EPS * abs(out[j])
+            if small:
+                break
+        if not small:
+            return False
+    return True
+
+
+@part
+def _double(whole, scratch, h, n, nr):
+    """Square the states' rows of exp(M h); those of inputs and time are known."""
+    at, one = n + 2 * nr, n + 2 * nr + 1
+    for i in range(n):
+        for j in range(n):
+            scratch[i, j] = 0.0
+        for j in range(n, one + 1):
+            scratch[i, j] = whole[i, j]
+        for k in range(nr):
+            scratch[i, n + nr + k] += h * whole[i, n + k]
+        scratch[i, one] += h * whole[i, at]
+        for q in range(n):
+            if whole[i, q] != 0.0:
+                for j in range(one + 1):
+                    scratch[i, j] += whole[i, q] * whole[q, j]
+    for i in range(n):
+        for j in range(one + 1):
+            whole[i, j] = scratch[i, j]
