@@ -203,8 +203,6 @@ def test_errors_are_clear():
     data = Measurement(t, np.sin(t), t**2)
     with pytest.raises(TypeError, match="Measurement"):
         diagnose(cdf.Mass(1), (t, t, t))
-    with pytest.raises(TypeError, match="unrecognized keyword"):
-        diagnose(cdf.Mass(1), data, error_filter="red")
     with pytest.raises(ValueError, match="effect id"):
         diagnose(cdf.Mass(1), data, candidates=["gremlin"])
     with pytest.raises(TypeError, match="inertia"):

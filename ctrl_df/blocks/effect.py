@@ -40,6 +40,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
+from ..calls import explained
 from ..checks import shown
 from ..units import si_unit
 from . import probing
@@ -295,7 +296,7 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
             f"effect id {cls.id!r} is taken by {taken.__module__}.{taken.__qualname__}; rename the class."
         )
     _LIBRARY[cls.id] = cls
-    return cls
+    return explained(cls)
 
 
 def _origin(cls) -> tuple[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..checks import count, unknown_keywords
+from ..checks import count
 from ..checks import executor as checked_executor
 from .arguments import (
     check_quantities,
@@ -34,7 +34,6 @@ def improve(
     progress=None,
     callback=None,
     budget=None,
-    **keywords,
 ) -> Study:
     """Add the effects a model misses, one at a time, as long as held-out error falls beyond noise.
 
@@ -82,7 +81,6 @@ def improve(
     >>> study.verdict, study.effects
     ('effect', ('constant_force',))
     """
-    unknown_keywords(keywords, improve)
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     course = Course("improve", progress, callback, budget)

@@ -19,7 +19,7 @@ _REST, _CYCLE, _BOTH, _HATCH = "#ffffff", "#d9d9d9", "#efefef", "////"
 
 
 def plot_limit_cycle_map(
-    gains_map: LimitCycleMap, *, ax=None, title=None, contours=True, checks=True, **keywords
+    gains_map: LimitCycleMap, *, ax=None, title=None, contours=True, checks=True
 ) -> ct.ControlPlot:
     """Draw a map over gains.
 
@@ -52,8 +52,6 @@ def plot_limit_cycle_map(
     >>> cplt.axes[0, 0].get_xlabel()
     'kp [N/m]'
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     if ax is None:
         figure = plt.figure(figsize=(6.4, 4.8), layout="constrained")
         ax = figure.add_subplot()

@@ -64,9 +64,7 @@ wider (NaN)."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
 
-def orbit_family(
-    block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000, **keywords
-):
+def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000):
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 
     Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the answer
@@ -106,8 +104,6 @@ def orbit_family(
     RuntimeError
         A law raised or returned NaN; carries the exception.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     A, omega = np.atleast_1d(np.asarray(A, float)), np.atleast_1d(np.asarray(omega, float))
     harmonics = np.full((len(A), len(omega), orders + 1), np.nan + 0j)
     regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int16)

@@ -22,7 +22,7 @@ _KINDS = {"low_speed": "speed"}  # the region may as well be one of high speed
 
 
 def comparison_plot(
-    comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None, **keywords
+    comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None
 ) -> ct.ControlPlot:
     """Draw a `Comparison`; see `ctrl_df.identify.compare.Comparison.plot`.
 
@@ -55,7 +55,7 @@ def comparison_plot(
     names = [*labels, *(f"model {i + 1}" for i in range(len(labels), len(models)))]
     if len(models) == 1 and not labels:
         names = ["simulated"]
-    with page(0.72, narrow=1.9, width=width, keywords=keywords) as drawn:
+    with page(0.72, narrow=1.9, width=width) as drawn:
         found = drawn.rows(
             wide=["yw", "ew"], narrow=["y", "e", "w"], width_ratios=(2.0, 1), narrow_ratios=(1.2, 1, 1.3)
         )

@@ -11,7 +11,7 @@ from ..parts.labels import settle
 from ..parts.page import MODEL, OTHER, QUIET, page
 
 
-def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> ct.ControlPlot:
+def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None) -> ct.ControlPlot:
     """Draw a `Diagnosis`: held-out error of every candidate beside that of the refitted model.
 
     Parameters
@@ -25,7 +25,7 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> 
         Of a new figure [in].
     """
     inches = 1.0 + 0.3 * (min(rows, len(diagnosis.ranking)) + 1)
-    with page(inches / 7.0, narrow=inches / 3.3, width=width, keywords=keywords) as drawn:
+    with page(inches / 7.0, narrow=inches / 3.3, width=width) as drawn:
         ax = drawn.panels(1)[0]
         bars = draw_ranking(ax, diagnosis, rows)
         of = "acceleration" if diagnosis.measure == "acceleration" else "output"

@@ -10,7 +10,7 @@ from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 _COLOURS = (MODEL, ERROR, MEASURED, "#3f8f5f", "#8a5fa8")
 
 
-def horizons_plot(curves, *, labels=(), title=None, width=None, **keywords) -> ct.ControlPlot:
+def horizons_plot(curves, *, labels=(), title=None, width=None) -> ct.ControlPlot:
     """Draw one or more `ErrorByHorizon`.
 
     Parameters
@@ -23,7 +23,7 @@ def horizons_plot(curves, *, labels=(), title=None, width=None, **keywords) -> c
     width : float or None
         Of a new figure [in].
     """
-    with page(0.55, narrow=0.8, width=width, keywords=keywords) as drawn:
+    with page(0.55, narrow=0.8, width=width) as drawn:
         ax, lines = drawn.panels(1)[0], []
         for i, curve in enumerate(curves):
             label = labels[i] if i < len(labels) else None

@@ -19,7 +19,7 @@ OF = {
 """What errors are drawn as shares of."""
 
 
-def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
+def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
     """Draw the error of each step on training and held-out data; the grey band is the noise floor.
 
     Parameters
@@ -31,7 +31,7 @@ def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
         Of a new figure [in].
     """
     steps = study.steps
-    with page(0.52, narrow=0.95, width=width, keywords=keywords) as drawn:
+    with page(0.52, narrow=0.95, width=width) as drawn:
         ax = drawn.panels(1)[0]
         small = plt.rcParams["legend.fontsize"]
         at = np.arange(len(steps))

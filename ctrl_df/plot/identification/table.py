@@ -11,9 +11,7 @@ from ..parts.page import legend_above, page
 from .diagnosis import draw_ranking, verdict_title
 
 
-def table_comparison_plot(
-    comparison, record=None, *, title=None, curves=6, width=None, **keywords
-) -> ct.ControlPlot:
+def table_comparison_plot(comparison, record=None, *, title=None, curves=6, width=None) -> ct.ControlPlot:
     """Draw a `FrequencyComparison`: magnitude and phase over frequency, dots measured, lines model; error.
 
     Parameters
@@ -30,7 +28,7 @@ def table_comparison_plot(
     """
     chosen = comparison.worst if record is None else comparison.records[record]
     data = chosen.record
-    with page(0.62, narrow=2.1, width=width, keywords=keywords) as drawn:
+    with page(0.62, narrow=2.1, width=width) as drawn:
         found = drawn.rows(
             wide=["ne", "pe"], narrow=["n", "p", "e"], width_ratios=(1.25, 1), narrow_ratios=(1.2, 1, 1.2)
         )
@@ -104,7 +102,7 @@ def _edges(values):
     return np.exp(np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]]))
 
 
-def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **keywords) -> ct.ControlPlot:
+def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None) -> ct.ControlPlot:
     """Draw a `FrequencyDiagnosis`: the ranking, and the error on the plane before and after the first of it.
 
     Parameters
@@ -118,7 +116,7 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **key
         Of a new figure [in].
     """
     inches = 0.9 + 0.3 * (min(rows, len(diagnosis.ranking)) + 1)
-    with page((inches + 2.9) / 7, narrow=(inches + 4.4) / 3.3, width=width, keywords=keywords) as drawn:
+    with page((inches + 2.9) / 7, narrow=(inches + 4.4) / 3.3, width=width) as drawn:
         found = drawn.rows(
             wide=["rr", "ba"], narrow=["r", "b", "a"], height_ratios=(inches, 2.9),
             narrow_ratios=(inches, 2.2, 2.2),
