@@ -44,6 +44,7 @@ from ..calls import explained
 from ..checks import shown
 from ..units import si_unit
 from . import probing
+from .coordinates import either
 from .parameter import Parameter, checked
 from .primitives import Primitive
 from .stated import require_complete, share_name, stated_parameters
@@ -147,7 +148,8 @@ class Effect:
     def __post_init__(self):
         require_complete(type(self))
         for name, spec in stated_parameters(type(self)):
-            value = checked(type(self).__name__, name, getattr(self, name), spec, self.remedy)
+            alone = {**spec, "unit": either(spec["unit"], self.turns)}
+            value = checked(type(self).__name__, name, getattr(self, name), alone, self.remedy)
             object.__setattr__(self, name, value)
         self.check()
 

@@ -40,14 +40,13 @@ def known_beforehand(block, prior, *, grows=True) -> dict[str, tuple[float, floa
     found = {}
     for name, stated in ({} if prior is None else mapping("prior", "prior", prior, _PRIOR)).items():
         effect = effect_library().get(str(name).partition(".")[0])
-        may_be = (
-            () if effect is None or not grows else [f"{effect.id}.{k}" for k, _ in stated_parameters(effect)]
-        )
+        may_be = [f"{effect.id}.{k}" for k, _ in stated_parameters(effect)] if effect and grows else []
         if name not in block.parameters and name not in may_be:
             others = ", or of a parameter of an effect that may be added, such as 'stribeck.level'"
+            remedy = "Correct it." if grows else "Add its effect to the model, or leave it out."
             raise ValueError(
                 f"prior needs names out of {', '.join(block.parameters)}{others if grows else ''}; got "
-                f"{shown(name)}. {'Correct it.' if grows else 'Add its effect to the model, or leave it out.'}"
+                f"{shown(name)}. {remedy}"
             )
         pair = tuple(stated) if isinstance(stated, Sequence) and not isinstance(stated, str) else (stated,)
         if len(pair) != 2:
