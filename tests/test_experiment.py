@@ -75,7 +75,7 @@ def test_a_plan_is_ready_to_be_played():
     assert plan.force == np.max(np.abs(u)) and plan.kind in ("multisine", "chirp", "steps", "triangle")
     with pytest.raises(ValueError, match="force > 0"):
         next_experiment(found, force=-1.0)
-    with pytest.raises(ValueError, match="leaves the stroke"):
+    with pytest.raises(ValueError, match="leaves the range"):
         next_experiment(found, force=50.0, stroke=1e-9)
     with pytest.raises(TypeError, match="closed_loop"):
         next_experiment(found, loop=rig.baseline)

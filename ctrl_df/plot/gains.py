@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from ..blocks.mechanism import Mechanism
 from ..gains.map import Fine, LimitCycleMap
+from ..numerals import digits
 from .parts.curves import in_brackets, plain_spines
 from .parts.page import AMPLITUDE_COLOR, CROSSING_COLOR, NARROW, OMEGA_COLOR
 
@@ -141,9 +142,7 @@ def _contours(ax, gains_map, fine, count):
             continue
         where = fine.x, fine.y, np.ma.masked_invalid(values.T)
         lines = ax.contour(*where, levels=levels, colors=color, linestyles=style, linewidths=1.1, zorder=3)
-        labels += list(
-            ax.clabel(lines, fontsize=7.5, fmt=lambda v: f"{v:.3g}", inline=True, inline_spacing=2)
-        )
+        labels += list(ax.clabel(lines, fontsize=7.5, fmt=digits, inline=True, inline_spacing=2))
         handles.append(Line2D([], [], color=color, ls=style, lw=1.1, label=f"{name}, {told}"))
     return labels, handles
 

@@ -13,6 +13,7 @@ from ...blocks.coordinates import moving_in
 from ...checks import known_name
 from ...identify.data.quantities import word_of
 from ...identify.prediction.segments import facts
+from ...numerals import digits, probability
 from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
@@ -81,8 +82,8 @@ def comparison_plot(
         legend_above(top, told)
         white = chosen.white
         below.set_title(
-            f"rmse {factor * chosen.rmse:.3g} {small}; {'white' if white else 'not white'} "
-            f"(p {'< 1e-6' if white.p_value < 1e-6 else f'= {white.p_value:.2g}'})"
+            f"rmse {digits(factor * chosen.rmse)} {small}; {'white' if white else 'not white'} "
+            f"(p{probability(white.p_value)})"
         )
         below.set_ylabel(f"measured - simulated [{small}]")
         below.set_xlabel("time [s]")

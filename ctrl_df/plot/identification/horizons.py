@@ -7,6 +7,8 @@ import control as ct
 from ..parts.curves import log_ticks
 from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
+_LEAST_SPAN = 4.0
+"""Upper over lower end of the errors shown, at least."""
 _COLOURS = (MODEL, ERROR, MEASURED, "#3f8f5f", "#8a5fa8")
 
 
@@ -31,6 +33,9 @@ def horizons_plot(curves, *, labels=(), title=None, width=None) -> ct.ControlPlo
             lines.append(ax.plot(curve.horizon, 100 * curve.nrmse, "o-", ms=4, color=colour, label=label))
         ax.set_xscale("log")
         ax.set_yscale("log")
+        low, high = ax.get_ylim()
+        spread = max(1.0, (_LEAST_SPAN * low / high) ** 0.5)  # a change of a percent is none to the eye
+        ax.set_ylim(low / spread, high * spread)
         log_ticks(ax.xaxis, *ax.get_xlim())
         log_ticks(ax.yaxis, *ax.get_ylim())
         ax.set_xlabel("time predicted freely [s]")

@@ -44,6 +44,11 @@ def missing_force_plot(missing, *, against="time", title=None, width=None) -> ct
                 label="mean, two standard errors",
             )  # fmt: skip
             lines = [[points, means]]
+            if not len(curve.points[0]):
+                ax.text(
+                    0.5, 0.6, f"the record tells of no missing {what}:\nnowhere larger than its uncertainty",
+                    transform=ax.transAxes, ha="center", va="bottom",
+                )  # fmt: skip
         ax.axhline(0.0, color="0.6", lw=0.7, zorder=0)
         ax.set_xlabel(f"{missing.words[against]} [{missing.units[against]}]")
         along = " along the motion" if against == "reversal" else ""

@@ -6,6 +6,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...numerals import digits
 from ..parts.curves import log_ticks
 from ..parts.page import legend_above, page
 from .diagnosis import draw_ranking, verdict_title
@@ -35,7 +36,7 @@ def table_comparison_plot(comparison, record=None, *, title=None, curves=6, widt
         top, below, plane = found["n"], found["p"], found["e"]
         below.sharex(top)
         dots, lines = _over_frequency(top, below, data, chosen, curves)
-        legend_above(top, f"error {100 * chosen.nrmse:.3g} % of |N| (dots measured, lines model)")
+        legend_above(top, f"error {digits(100 * chosen.nrmse)} % of |N| (dots measured, lines model)")
         cells = error_plane(drawn.figure, plane, data, np.abs(chosen.relative))
         plane.set_title("error over the plane")
         drawn.keep = [top, below, plane]
@@ -60,7 +61,7 @@ def _over_frequency(top, below, data, chosen, curves):
         lines += top.loglog(w, np.abs(model), "-", color=shade, lw=1.1)
         below.semilogx(w, phase, "o", color=shade, ms=3)
         below.semilogx(w, phase + step, "-", color=shade, lw=1.1)
-        lines[-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
+        lines[-1].set_label(f"{digits(data.A[i])} {data.input_unit}")
     top.set_ylabel(f"|N| [{data.output_unit}/{data.input_unit}]")
     below.set_ylabel("phase [deg]")
     below.set_xlabel("frequency ω [rad/s]")
@@ -129,10 +130,10 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None) -> ct
         data = diagnosis.before.records[i].record
         error_plane(drawn.figure, left, data, before, limits, bar=drawn.narrow)
         error_plane(drawn.figure, right, data, after, limits)
-        left.set_title(f"model refitted, {100 * diagnosis.nrmse:.3g} %")
+        left.set_title(f"model refitted, {digits(100 * diagnosis.nrmse)} %")
         name = diagnosis.ranking[0].id.replace("_", " ") if diagnosis.ranking else "nothing"
         error = diagnosis.ranking[0].nrmse if diagnosis.ranking else diagnosis.nrmse
-        right.set_title(f"with {name}, {100 * error:.3g} %")
+        right.set_title(f"with {name}, {digits(100 * error)} %")
         if not drawn.narrow:
             right.set_ylabel("")
         ax.set_xlabel("held-out error, rms over |N| [%]")

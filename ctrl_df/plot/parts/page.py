@@ -38,7 +38,7 @@ def style(width: float) -> dict:
         "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7,
         "axes.grid": False, "grid.color": "0.92", "grid.linewidth": 0.6, "lines.linewidth": 1.4,
         "xtick.major.width": 0.7, "ytick.major.width": 0.7,
-        "axes.formatter.use_mathtext": True, "axes.formatter.limits": (-4, 4),
+        "axes.formatter.use_mathtext": True, "axes.formatter.limits": (-4, 6),
     }  # fmt: skip
 
 
