@@ -34,7 +34,7 @@ from ..thresholds import (
     TRAVEL,
     WAITS,
 )
-from .far_newton import close_far
+from .damped import close_damped
 from .line import Line
 from .orbit_search import BIT, TOUCH, OrbitSearch, OutOfWork
 
@@ -266,7 +266,7 @@ class OrbitSolver(OrbitSearch):
                 orbit = self._periodic(state, orders=orders)
                 self.mirrored = orbit is None
             if orbit is None:
-                orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
+                orbit = close_damped(self, state, orders=orders, patient=self._slow(trail))
         if orbit is None and self.symmetric:
             self.mirrored = self.repels = False
             state = self._nudged(state)
@@ -305,14 +305,14 @@ class OrbitSolver(OrbitSearch):
         found = self._longer_period(state, y, orders)
         if found is not None:
             return found
-        orbit = close_far(self, state, orders=orders, patient=self._slow(y))
+        orbit = close_damped(self, state, orders=orders, patient=self._slow(y))
         if orbit is None:
             for periods in WAITS:
                 means, sizes = self._averages(state, orders)
                 if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
                     break
                 state = self._follow(state, periods)
-                orbit = self._periodic(state, orders=orders) or close_far(self, state, orders=orders)
+                orbit = self._periodic(state, orders=orders) or close_damped(self, state, orders=orders)
                 if orbit is not None:
                     break
             else:  # still on its way
