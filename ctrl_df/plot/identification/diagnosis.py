@@ -78,7 +78,8 @@ def draw_ranking(ax, diagnosis, rows):
             continue
         text = f"  {digits(value)} %" + (" >>" if value > end else "")
         if c is not None and c.probability >= 0.005:
-            text += f"  p = {certainty(c.probability)}"
+            sure = certainty(c.probability)
+            text += f"  p {sure}" if sure.startswith(">") else f"  p = {sure}"
         if c is not None and c.equivalents:
             same = [e.replace("_", " ") for e in c.equivalents]
             text += "\n not told from " + ", ".join(same[:2]) + (" …" if len(same) > 2 else "")
