@@ -40,6 +40,7 @@ from .blocks.memoryless import (
 from .blocks.parameter import Parameter, parameter
 from .blocks.pid import pid
 from .blocks.rotary import Inertia, TwoInertias
+from .calls import explained as _explained
 from .status import Status
 
 # Names loaded on first use, so that importing the package stays cheap.
@@ -112,12 +113,15 @@ __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     *_LAZY,
 ]
 
+# Every public call that does not fit says what the function takes.
+globals().update({_name: _explained(globals()[_name]) for _name in __all__ if _name not in _LAZY})
+
 
 def __getattr__(name):
     if name == "__version__":
         return _import_module(".versions", __name__).version()
     if name in _LAZY:
-        value = getattr(_import_module(f".{_LAZY[name]}", __name__), name)
+        value = _explained(getattr(_import_module(f".{_LAZY[name]}", __name__), name))
         globals()[name] = value
         return value
     message = f"module {__name__!r} has no attribute {name!r}"

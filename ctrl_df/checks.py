@@ -6,8 +6,6 @@ where the value is. ``owner`` begins the sentence: the function or block that as
 
 from __future__ import annotations
 
-import difflib
-import inspect
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -178,16 +176,6 @@ def names(owner: str, name: str, value) -> tuple[str, ...]:
     if wrong:
         raise TypeError(f"{owner} needs {name} as one name or a sequence of names; got {shown(wrong[0])}.")
     return given
-
-
-def unknown_keywords(keywords, known) -> None:
-    """Refuse keywords that a function does not know; `known`: the function, or the names."""
-    if not keywords:
-        return
-    names = inspect.signature(known).parameters if callable(known) else known
-    near = [n for k in keywords for n in difflib.get_close_matches(k, names, 1)]
-    meant = f"; did you mean {', '.join(near)}?" if near else ""
-    raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}{meant}")
 
 
 def returned(value) -> bool:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
+from .calls import explained
+
 PICTURES = {
     "family": "family.plot_family",
     "harmonics": "harmonics.plot_harmonics",
@@ -52,7 +54,8 @@ def draw(picture: str, result, **keywords) -> Any:
     ct.ControlPlot
     """
     module, _, function = PICTURES[picture].rpartition(".")
-    return getattr(importlib.import_module(f"ctrl_df.plot.{module}"), function)(result, **keywords)
+    drawn = getattr(importlib.import_module(f"ctrl_df.plot.{module}"), function)
+    return explained(drawn, "plot", given=1)(result, **keywords)
 
 
 def go_on(step: str, result, *arguments) -> Any:

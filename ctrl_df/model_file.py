@@ -148,6 +148,7 @@ def _plant(table) -> Mechanism:
     for name in needed:
         if name not in given:
             raise ValueError(f"{kind} needs {name} [kg]; add it.")
+        _unquoted(kind, name, given[name])
     return cls(**given, effects=_effects(table.get("effects", {})))
 
 
@@ -171,6 +172,8 @@ def _effects(given) -> list[Effect]:
         cls = effect_class(key)
         fields = dataclasses.fields(cls)
         _known(None, f"effect {key}", values, [f.name for f in fields])
+        for name, value in values.items():
+            _unquoted(f"effect {key}", name, value)
         for f in fields:
             if f.name not in values and f.default is f.default_factory is dataclasses.MISSING:
                 unit = f.metadata.get("parameter", {}).get("unit", "")
@@ -255,7 +258,17 @@ def _column(value) -> bool:
 
 
 def _number(name, value) -> float:
-    return number("controller" if name in _GAINS else "box", name, value)
+    owner = "controller" if name in _GAINS else "box"
+    _unquoted(owner, name, value)
+    return number(owner, name, value)
+
+
+def _unquoted(owner, name, value) -> None:
+    """Refuse text in the place of a number, with how this file writes one."""
+    if isinstance(value, str):
+        raise ValueError(
+            f"{owner} needs {name} as one real number; got the text {shown(value)}. Write it without quotes."
+        )
 
 
 def _mapping(value, name) -> Mapping:

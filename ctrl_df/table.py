@@ -10,6 +10,17 @@ from tabulate import tabulate
 
 WIDEST = 44
 """Characters of a cell; longer ones are wrapped."""
+SHOWN = 180
+"""Characters that a result is shown by."""
+
+
+class Brief:
+    """A result with much in it: a debugger shows what it comes to, `str` says all."""
+
+    def __repr__(self) -> str:
+        said = str(self).partition("\n")[0]
+        room = SHOWN - len(type(self).__name__)
+        return f"<{type(self).__name__}: {said if len(said) <= room else said[: room - 4] + ' ...'}>"
 
 
 @dataclass(frozen=True)

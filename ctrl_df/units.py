@@ -1,9 +1,10 @@
 """Units: what is written of a channel or a parameter, as a factor to SI and a dimension.
 
 A unit is a product of symbols with powers, a solidus before those in the denominator: ``N s^2/m^2``,
-``deg/s``, ``mN*m``, ``m/(N s)``. Angles and forces count as dimensions of their own here: a drive that turns
-has sizes of angle and of torque that follow from nothing else, which libraries of physical units take for
-plain numbers and for kg m^2/s^2. That, and a dozen symbols, is why this is done here.
+``deg/s``, ``mN*m``, ``m/(N s)``. Powers may be fractions, ``N s^0.5/m^0.5``, as some laws have them. Angles
+and forces count as dimensions of their own here: a drive that turns has sizes of angle and of torque that
+follow from nothing else, which libraries of physical units take for plain numbers and for kg m^2/s^2. That,
+and a dozen symbols, is why this is done here.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import functools
 import math
 import re
 from collections.abc import Mapping
+from fractions import Fraction
 
 import numpy as np
 
@@ -59,17 +61,21 @@ for _plain in ("", "1", "-"):
 BASE = ("kg", "N", "V", "A", "m", "s", "rad")
 """Dimensions, in the order in which units of SI are written."""
 
+Power = int | Fraction
+LARGEST_DENOMINATOR, AS_WRITTEN = 12, 1e-5
+"""Of a fractional power; by how much its decimals, as users write a third, may miss it."""
+
 _ON_A_LINE = {"N": ("N", "m"), "m": ("rad",), "kg": ("kg", "m", "m")}  # and what stands for it when turning
-_PRODUCT = re.compile(r"(?<!\*)\*(?!\*)|[·.]|(?<=[^\W\d])-(?=[^\W\d])")  # *, ·, ., and the hyphen of N-m
+_PRODUCT = re.compile(r"(?<!\*)\*(?!\*)|·|\.(?!\d)|(?<=[^\W\d])-(?=[^\W\d])")  # and the hyphen of N-m
 _FACTOR = re.compile(
-    r"(?P<symbol>[^\s^*·./()\d²³][^\s^*·./()²³]*|1)(?:(?:\^|\*\*)(?P<power>-?\d+)|(?P<mark>[²³]))?"
+    r"(?P<symbol>[^\s^*·./()\d²³][^\s^*·./()²³]*|1)(?:(?:\^|\*\*)(?P<power>-?\d+(?:\.\d+)?)|(?P<mark>[²³]))?"
 )
 
 
 @functools.cache
-def _parsed(unit: str) -> tuple[float, tuple[tuple[str, int], ...]]:
+def _parsed(unit: str) -> tuple[float, tuple[tuple[str, Power], ...]]:
     factor = 1.0
-    total: dict[str, int] = {}
+    total: dict[str, Power] = {}
     above, *below = unit.strip().split("/")
     if any(not part.strip() for part in below):
         raise _unknown(unit)
@@ -82,17 +88,25 @@ def _parsed(unit: str) -> tuple[float, tuple[tuple[str, int], ...]]:
             found = [_factor(unit, word) for word in _PRODUCT.sub(" ", text).split()]
         for symbol, power in found:
             size, dimension = _SYMBOLS[symbol]
-            factor *= size ** (sign * power)
+            factor *= size ** float(sign * power)
             for base, exponent in dimension.items():
                 total[base] = total.get(base, 0) + sign * power * exponent
-    return factor, tuple((base, total[base]) for base in BASE if total.get(base))
+    return factor, tuple((base, _whole(total[base])) for base in BASE if total.get(base))
 
 
-def _factor(unit: str, word: str) -> tuple[str, int]:
+def _factor(unit: str, word: str) -> tuple[str, Power]:
     match = _FACTOR.fullmatch(word)
     if match is None or match["symbol"] not in _SYMBOLS:
         raise _unknown(unit)
-    return match["symbol"], int(match["power"] or {"²": 2, "³": 3}.get(match["mark"] or "", 1))
+    stated = Fraction(match["power"] or {"²": 2, "³": 3}.get(match["mark"] or "", 1))
+    power = stated.limit_denominator(LARGEST_DENOMINATOR)
+    if abs(power - stated) > AS_WRITTEN:
+        raise _unknown(unit)
+    return match["symbol"], _whole(power)
+
+
+def _whole(power: Power) -> Power:
+    return int(power) if power == int(power) else power
 
 
 def _unknown(unit: str) -> ValueError:
@@ -105,7 +119,7 @@ def _unknown(unit: str) -> ValueError:
     return ValueError(f"a unit must be one of {known}, or made of these (mm/s, N s^2/m^2); got {unit!r}.")
 
 
-def dimension(unit: str) -> dict[str, int]:
+def dimension(unit: str) -> dict[str, Power]:
     """Return the powers of a unit over `BASE`, those that are zero left out.
 
     Raises
@@ -118,7 +132,7 @@ def dimension(unit: str) -> dict[str, int]:
     return dict(_parsed(unit)[1])
 
 
-def written(powers: Mapping[str, int]) -> str:
+def written(powers: Mapping[str, Power]) -> str:
     """Return the SI unit of a dimension."""
     above = [_power(base, powers[base]) for base in BASE if powers.get(base, 0) > 0]
     below = [_power(base, -powers[base]) for base in BASE if powers.get(base, 0) < 0]
@@ -128,15 +142,15 @@ def written(powers: Mapping[str, int]) -> str:
     return f"{' '.join(above) or '1'}/{last}"
 
 
-def _power(base: str, exponent: int) -> str:
-    return base if exponent == 1 else f"{base}^{exponent}"
+def _power(base: str, exponent: Power) -> str:
+    return base if exponent == 1 else f"{base}^{float(exponent):.6g}"
 
 
 def size(unit: str, sizes: Mapping[str, float]) -> float:
     """Return the typical size of what has this unit, given those of `BASE` (default 1)."""
     value = 1.0
     for base, exponent in dimension(unit).items():
-        value *= sizes.get(base, 1.0) ** exponent
+        value *= sizes.get(base, 1.0) ** float(exponent)
     return value
 
 
@@ -168,7 +182,7 @@ def over(above: str, below: str) -> str:
 
 def turning(unit: str) -> str:
     """Return the unit that a machine that turns has in the place of one on a line: N m for N, rad for m."""
-    powers: dict[str, int] = {}
+    powers: dict[str, Power] = {}
     for base, exponent in dimension(unit).items():
         for other in _ON_A_LINE.get(base, (base,)):
             powers[other] = powers.get(other, 0) + exponent

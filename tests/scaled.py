@@ -32,7 +32,7 @@ def record(data, force, length):
     velocity = None if data.velocity is None else data.velocity * length
     return cdf.Measurement(
         data.t, data.u * given, data.y * seen, name=data.name, velocity=velocity,
-        input_unit=data.input_unit, output_unit=data.output_unit,
+        input_unit=data.input_unit, output_unit=data.output_unit, input_hold=data.input_hold,
     )  # fmt: skip
 
 

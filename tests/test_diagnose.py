@@ -124,9 +124,11 @@ def test_a_model_that_follows_short_segments_alone_is_not_complete():
 
 def test_a_joint_with_nothing_behind_it_is_no_joint():
     rig = rigs.draw_outside(1008, kind="friction_zone", excitation="multisine", snr_db=60, n=5000)
-    train, held = (record.slice(0, 2.5) for record in of(rig))
+    train, held = (record.slice(0, 2).decimate(2) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance",))
     assert found.verdict == "unknown" and found.regions[0] == "position"
+    # over short segments, each with a stretch of its own, it is ahead by hundreds of nats
+    assert found.best.evidence > 100 and not found.best.determined
 
 
 def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
@@ -178,18 +180,30 @@ def test_nothing_hidden_is_none(draw):
     assert found.next_experiment is None
 
 
-@pytest.mark.parametrize("lengths", [1e3, 1e-3])
-def test_a_length_in_another_unit_is_no_missing_effect(lengths):
+FORCED = cdf.friction_mass(2, 2.5, 5)
+
+
+@pytest.fixture(scope="module")
+def forced():
+    """Times, force and, with noise, the position of a mass with friction."""
     t = np.arange(0, 4, 0.005)
     force = 9 * np.sin(3 * t)
     (x,) = np.asarray(cdf.event_response(cdf.friction_mass(2.2, 3, 6), t, force).outputs)[:1]
-    x = x + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
-    model = cdf.friction_mass(2, 2.5, 5)
-    found = diagnose(model, Measurement(t, force, lengths * x), candidates=["backlash", "linear_spring"])
+    return t, force, x + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
+
+
+@pytest.mark.parametrize("lengths", [1e3, 1e-3])
+def test_a_length_in_another_unit_is_no_missing_effect(forced, lengths):
+    t, force, x = forced
+    found = diagnose(FORCED, Measurement(t, force, lengths * x), candidates=["backlash", "linear_spring"])
     assert found.verdict == "unknown" and "units" in found.explanation
+
+
+def test_a_time_in_another_unit_is_no_missing_effect(forced):
     # none of the motion is left to explain: a time of 1000 s for one of 1 s
-    slow = diagnose(model, Measurement(1e3 * t, force, x), candidates=["input_lag"])
-    assert slow.verdict == "unknown" and "units" in slow.explanation
+    t, force, x = forced
+    found = diagnose(FORCED, Measurement(1e3 * t, force, x), candidates=["input_lag"])
+    assert found.verdict == "unknown" and "units" in found.explanation
 
 
 def test_one_record_alone():
@@ -203,8 +217,6 @@ def test_errors_are_clear():
     data = Measurement(t, np.sin(t), t**2)
     with pytest.raises(TypeError, match="Measurement"):
         diagnose(cdf.Mass(1), (t, t, t))
-    with pytest.raises(TypeError, match="unrecognized keyword"):
-        diagnose(cdf.Mass(1), data, error_filter="red")
     with pytest.raises(ValueError, match="effect id"):
         diagnose(cdf.Mass(1), data, candidates=["gremlin"])
     with pytest.raises(TypeError, match="inertia"):

@@ -34,20 +34,20 @@ def play(rig, plan, seed):
 
 
 CASES = [
-    # seeds 15 to 18 are all told as stiction, 15 by 5 nats, the others by 38 to 167
-    ("stiction", "stribeck", 16, True, {}),
-    ("linear_spring", "cubic_spring", 3, False, {}),
+    # the record alone names Stribeck friction, by 12 nats
+    ("stiction", "stribeck", 15, 1500, True),
+    ("linear_spring", "cubic_spring", 3, 2500, False),
 ]
 
 
-@pytest.mark.parametrize(("hidden", "other", "seed", "closed", "asked"), CASES)
-def test_it_separates_on_the_true_plant(hidden, other, seed, closed, asked):
-    rig = rigs.draw(hidden, seed, ratio=1.0, snr_db=40, closed_loop=closed, n=2500)
+@pytest.mark.parametrize(("hidden", "other", "seed", "n", "closed"), CASES)
+def test_it_separates_on_the_true_plant(hidden, other, seed, n, closed):
+    rig = rigs.draw(hidden, seed, ratio=1.0, snr_db=40, closed_loop=closed, n=n)
     record = rig.train[0].measurement()
     before = diagnose(rig.baseline, record, candidates=(hidden, other))
     loop = cdf.closed_loop(cdf.pid(*rig.controller[:4]), rig.baseline) if closed else None
     force, stroke = 1.2 * np.max(np.abs(record.u)), 1.5 * np.max(np.abs(record.y - record.y[0]))
-    plan = next_experiment(left_open(before), force=force, stroke=stroke, loop=loop, **asked)
+    plan = next_experiment(left_open(before), force=force, stroke=stroke, loop=loop)
     assert set(plan.candidates) == {hidden, other}
     # seen 0.37 to 120: stiction is a limit of Stribeck friction, and both fits come to the truth;
     # over 10,000 samples a fifth of the noise is hundreds of nats
@@ -60,7 +60,7 @@ def test_it_separates_on_the_true_plant(hidden, other, seed, closed, asked):
     new = cdf.Measurement(plan.t, played["u"], played["y"])
     after = diagnose(rig.baseline, [record, new], candidates=(hidden, other))
     assert after.best.id == hidden
-    # the record alone may name the other one, as it does for seed 17: it is then overruled
+    # the record alone may name the other one: it is then overruled
     assert after.ranking[0].evidence - after.ranking[1].evidence > 3
 
 
@@ -75,12 +75,10 @@ def test_a_plan_is_ready_to_be_played():
     assert plan.force == np.max(np.abs(u)) and plan.kind in ("multisine", "chirp", "steps", "triangle")
     with pytest.raises(ValueError, match="force > 0"):
         next_experiment(found, force=-1.0)
-    with pytest.raises(ValueError, match="leaves the stroke"):
+    with pytest.raises(ValueError, match="leaves the range"):
         next_experiment(found, force=50.0, stroke=1e-9)
     with pytest.raises(TypeError, match="closed_loop"):
         next_experiment(found, loop=rig.baseline)
-    with pytest.raises(TypeError, match="unrecognized keyword"):
-        next_experiment(found, stroek=1.0)
 
 
 def test_it_prints_as_a_sentence():

@@ -19,7 +19,7 @@ FEW = ("constant_force", "linear_spring", "input_delay")
 
 @pytest.fixture(scope="module")
 def study():
-    rig = rigs.draw(("linear_spring", "input_delay"), 21, snr_db=60, n=1500)
+    rig = rigs.draw(("linear_spring", "input_delay"), 21, snr_db=60, n=1000)
     return rig, improve(
         rig.baseline, rig.train[0].measurement(), rig.holdout[0].measurement(), candidates=FEW
     )

@@ -108,7 +108,7 @@ def test_other_refusals():
         Measurement(t, u, y, input_hold="cubic")
     with pytest.raises(TypeError, match="numbers in u"):
         Measurement(t, ["a"] * len(t), y)
-    with pytest.raises(TypeError, match="unexpected keyword"):
+    with pytest.raises(TypeError, match="unrecognized keyword: units=.mm.; it takes t, u, y, name"):
         Measurement(t, u, y, units="mm")
     with pytest.raises(TypeError, match="1-D array of numbers"):
         Measurement(t, None, y)

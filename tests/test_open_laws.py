@@ -1,10 +1,12 @@
 """Joints, contacts and presliding by laws of a user's own, against SciPy."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import pytest
+import scaled
 from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
@@ -290,3 +292,32 @@ def test_what_a_contact_leaves_open_is_asked_for():
         cdf.parameter("m", known_as="play")
     with pytest.raises(ValueError, match="0 < beyond <= 0.999"):
         Link(1.0, 1.0, beyond=2.0)
+
+
+@dataclass(frozen=True)
+class Wash(cdf.Effect):
+    """Drag between that of a slow flow and that of a fast one."""
+
+    resistance: float = cdf.parameter("N s^1.5/m^1.5", meaning="drag over speed to the power 1.5")
+
+    role: ClassVar[str] = "force"
+    shows: ClassVar[str] = "drag that grows a little faster than speed"
+    source: ClassVar[str] = "of the test"
+
+    @staticmethod
+    def law(t, x, v, z, p, dz):
+        return -p[0] * v * math.sqrt(abs(v))
+
+
+def test_a_parameter_may_have_a_fractional_power_of_a_unit():
+    true, guess = (cdf.Mass(2.0, [Wash(c)]) for c in (6.0, 3.0))
+    x = np.asarray(cdf.event_response(true, T, push(T)).outputs)[0]
+    assert guess.parameters["wash.resistance"].unit == "N s^1.5/m^1.5"
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(T))
+    record = cdf.Measurement(T, push(T), x + noise, input_hold="linear")
+    found = cdf.refit(guess, record)
+    resistance = found.model.parameters["wash.resistance"].value
+    assert abs(resistance - 6.0) < 3 * found.parameters["wash.resistance"].standard_error
+    # in millimetres it has another number, and is the same
+    other = cdf.refit(scaled.block(guess, 1.0, 1e3), scaled.record(record, 1.0, 1e3)).model
+    assert other.parameters["wash.resistance"].value == pytest.approx(resistance / 1e3**1.5, rel=1e-6)

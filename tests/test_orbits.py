@@ -441,8 +441,6 @@ def test_unfit_blocks_and_arguments_are_refused():
         one(friction_mass(9, 5), 20.0, 5.0, output="force")
     with pytest.raises(ValueError, match="continuous time"):
         one(sampled(ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1)), 1.0, 1.0)
-    with pytest.raises(TypeError, match="unrecognized keyword"):
-        one(friction_mass(9, 5), 20.0, 5.0, order=3)
 
 
 def test_harmonics_asked_for_do_not_change_the_orbits():

@@ -55,6 +55,7 @@ def test_a_diagnosis_and_a_ladder_take_it(record):
     "prior, said",
     [
         ({"mas": (1, 2)}, "names out of mass"),
+        ({"stribeck.level": (9, 1)}, "Add its effect to the model"),
         ({"mass": 2.0}, "value and its standard deviation"),
         ({"mass": (2.0, 0.0)}, "standard deviation of mass > 0"),
         ({"mass": (2.0, "a")}, "one real number"),

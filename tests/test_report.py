@@ -14,6 +14,7 @@ import rigs
 import ctrl_df as cdf
 from ctrl_df.identify.improve import improve
 from ctrl_df.identify.report import write_report
+from ctrl_df.numerals import percent
 
 BROWSER = next(
     (b for b in ("chromium", "chromium-browser", "google-chrome", "firefox") if shutil.which(b)), None
@@ -98,7 +99,7 @@ def test_it_tells_the_story(path, study):
     for heading in ("The ladder", "The model", "Model and measurement", "Step by step"):
         assert heading in page.headings
     assert "linear spring" in words and "Standard error" in words and "±" in words
-    assert f"{100 * study.steps[-1].nrmse_holdout:.3g} %" in words
+    assert percent(study.steps[-1].nrmse_holdout) in words
     assert page.rows >= len(study.steps) + 2 + len(study.model.parameters)
     assert "%%" not in words and "$" not in words and "nan" not in words.split()
 

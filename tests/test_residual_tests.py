@@ -162,7 +162,7 @@ def test_shares_add_up_and_noise_says_so():
     regions = where.error_regions(T, rng.standard_normal(len(T)), **motion(rng))
     for kind in ("time", "position", "load", "amplitude", "low_speed"):
         assert sum(r.share for r in regions.of(kind)) == pytest.approx(1)
-    assert regions.sentences == ("The error is spread evenly: no region stands out.",)
+    assert regions.sentences == ("No region holds more of the squared error than chance would leave there.",)
     with pytest.raises(ValueError, match="kind of region"):
         regions.of("weather")
     with pytest.raises(ValueError, match="equal length"):

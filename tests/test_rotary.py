@@ -116,6 +116,9 @@ def test_unknown_units_are_refused(unit):
         ("V/(rad/s)", None, None), ("V s/rad", 1.0, "V s/rad"), ("m/(N s)", 1.0, "m/(N s)"),
         ("1/s", 1.0, "1/s"),
         ("N/mm^3", 1e9, "N/m^3"), ("stone", None, None), ("kHz", 1e3, "1/s"), ("m/s/s", 1.0, "m/s^2"),
+        ("N s^0.5/mm^0.5", 1e3**0.5, "N s^0.5/m^0.5"), ("N.m^1.50", 1.0, "N m^1.5"),
+        ("m^-1.5", 1.0, "1/m^1.5"),
+        ("m^0.333333", 1.0, "m^0.333333"), ("m^0.123", None, None), ("m^1/2", None, None),
     ],
 )  # fmt: skip
 def test_products_of_units(unit, factor, si):
@@ -125,6 +128,11 @@ def test_products_of_units(unit, factor, si):
     else:
         assert si_unit(unit) == (pytest.approx(factor), si)
         assert si_unit(si) == (1.0, si)
+
+
+def test_a_third_of_a_power_three_times_is_a_whole_one():
+    assert dimension("m^0.33333 m^0.33333 m^0.33333") == {"m": 1}
+    assert turning("N s^0.5/m^0.5") == "N m s^0.5/rad^0.5"
 
 
 def test_dimensions():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from ..units import dimension, turning
 
@@ -14,7 +15,7 @@ class Coordinates:
 
     Attributes
     ----------
-    position, velocity, force, inertia : str
+    position, velocity, force, inertia, stroke : str
         What the quantities are called.
     unit : str
         Of the position.
@@ -26,6 +27,7 @@ class Coordinates:
     velocity: str
     force: str
     inertia: str
+    stroke: str
     unit: str
     names: dict[str, str] = field(default_factory=dict, hash=False)
 
@@ -60,14 +62,24 @@ class Coordinates:
 
 _QUANTITIES = {
     "position": "position", "velocity": "velocity", "velocitie": "velocity", "force": "force",
-    "mass": "inertia",
+    "mass": "inertia", "stroke": "stroke",
 }  # fmt: skip
 _SAID = re.compile(
     rf"\b(?P<article>[Aa]n? )?(?P<word>{'|'.join(_QUANTITIES)})(?P<plural>e?s)?\b", re.IGNORECASE
 )
 
-LINE = Coordinates("position", "velocity", "force", "mass", "m")
-AXIS = Coordinates("angle", "speed", "torque", "inertia", "rad", {"x": "angle", "v": "speed", "F": "torque"})
+
+@lru_cache(maxsize=256)
+def either(unit: str, turns: bool) -> str:
+    """Return the unit of what may belong to a machine of either kind; `turns`: to one that turns alone."""
+    other = turning(unit)
+    return unit if unit == other else (other if turns else f"{unit} on a line, {other} about an axis")
+
+
+LINE = Coordinates("position", "velocity", "force", "mass", "stroke", "m")
+AXIS = Coordinates(
+    "angle", "speed", "torque", "inertia", "travel", "rad", {"x": "angle", "v": "speed", "F": "torque"}
+)
 
 
 def moving_in(unit: str) -> Coordinates:

@@ -40,9 +40,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar
 
+from ..calls import explained
 from ..checks import shown
 from ..units import si_unit
 from . import probing
+from .coordinates import either
 from .parameter import Parameter, checked
 from .primitives import Primitive
 from .stated import require_complete, share_name, stated_parameters
@@ -146,7 +148,8 @@ class Effect:
     def __post_init__(self):
         require_complete(type(self))
         for name, spec in stated_parameters(type(self)):
-            value = checked(type(self).__name__, name, getattr(self, name), spec, self.remedy)
+            alone = {**spec, "unit": either(spec["unit"], self.turns)}
+            value = checked(type(self).__name__, name, getattr(self, name), alone, self.remedy)
             object.__setattr__(self, name, value)
         self.check()
 
@@ -295,7 +298,7 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
             f"effect id {cls.id!r} is taken by {taken.__module__}.{taken.__qualname__}; rename the class."
         )
     _LIBRARY[cls.id] = cls
-    return cls
+    return explained(cls)
 
 
 def _origin(cls) -> tuple[str, str]:

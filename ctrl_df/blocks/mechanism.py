@@ -59,6 +59,7 @@ class Mechanism(ct.NonlinearIOSystem):
         self._measured = measured
         self._keys = _effect_keys(self._effects)
         _check_levels(self._effects)
+        _check_repeated(self._effects)
         for effect in self._effects if self._coordinates is LINE else ():
             if effect.turns:
                 raise ValueError(
@@ -448,6 +449,18 @@ def _effect_keys(effects) -> tuple[str, ...]:
         count = sum(e.id == effect.id for e in effects[: len(keys)])
         keys.append(effect.id if count == 0 else f"{effect.id}_{count + 1}")
     return tuple(keys)
+
+
+def _check_repeated(effects) -> None:
+    seen = set()
+    for effect in effects:
+        if effect.id in seen and not effect.repeatable:
+            name = type(effect).__name__
+            raise ValueError(
+                f"a block takes one {name}; got two. Put what they do together into one; a law that a block "
+                f"may hold several of states repeatable = True."
+            )
+        seen.add(effect.id)
 
 
 def _check_levels(effects) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
+from ..calls import keywords_of, unknown_keywords
 from ..checks import count, real_array
 
 
@@ -77,7 +78,8 @@ def check_omega(method, omega):
         )
 
 
-def check_options(method, options):
-    """Check that further keywords are given to a method that takes some."""
-    if options and not method.takes_options:
-        raise TypeError(f"unrecognized keywords: {', '.join(options)}")
+def check_options(method, options, function):
+    """Check that further keywords of a function are options that the method takes."""
+    wrong = {k: v for k, v in options.items() if k not in method.takes_options}
+    if wrong:
+        unknown_keywords(function.__name__, wrong, (*keywords_of(function), *method.takes_options))

@@ -101,7 +101,7 @@ def _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)
     shape = common_shape(A, omega)
     largest = float(A.max()) if A.size and A.max() > 0 else 1.0
     method = method_for(F, output, try_method, num_points, largest, options)
-    check_options(method, options)
+    check_options(method, options, describing_function)
     check_omega(method, omega)
     if A.size == 0 or np.prod(shape) == 0:
         return np.zeros(shape, dtype=complex), np.full(shape, ""), A, omega
@@ -187,7 +187,7 @@ def describing_function_family(
         flag("a family", "progress", progress)
     num_points = check_block(F, num_points)
     method = method_for(F, output, try_method, num_points, float(A.max()), options)
-    check_options(method, options)
+    check_options(method, options, describing_function_family)
     check_omega(method, omega)
     work = Work(F, method, A, omega, orders, save)
     work.run(executor, progress)

@@ -37,8 +37,8 @@ class Method:
         Whether pictures may ask for points between those of a family, where its motions have a period.
     light : bool
         Whether a family is computed sooner than sent to another process.
-    takes_options : bool
-        Whether the user may set options of its solver.
+    takes_options : tuple of str
+        Options of its solver that the user may set.
     along_amplitudes : bool
         Whether one point starts the next along amplitudes: lines of a family are then columns.
     amplitudes : int
@@ -58,7 +58,7 @@ class Method:
     quick: ClassVar[bool] = False
     between: ClassVar[bool] = False
     light: ClassVar[bool] = False
-    takes_options: ClassVar[bool] = False
+    takes_options: ClassVar[tuple[str, ...]] = ()
     along_amplitudes: ClassVar[bool] = False
     amplitudes: ClassVar[int] = 60
     at_once: ClassVar[int | None] = None
@@ -360,7 +360,7 @@ class ForcedOrbit(Method):
     options: dict = field(default_factory=dict)
 
     dynamic = True
-    takes_options = True
+    takes_options = ("transient", "averages", "max_steps")
     along_amplitudes = True
 
     def harmonics(self, A, omega, orders):

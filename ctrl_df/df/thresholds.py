@@ -230,6 +230,10 @@ ASIDE = 0.05
 """Share of a step, squared, that has to lead aside of those before for what they have shown to be kept: of
 0.01, 0.05 and 0.2 the middle one took the fewest steps over sixteen families."""
 
+ONE_SIDED = 0.5
+"""Of differences to one side, relative, over the root of a shot's tolerance: there what the tolerance leaves
+of them and curvature are as large as each other."""
+
 PIVOT = 1e-9
 """Pivot, relative, below which a step is singular."""
 
@@ -324,7 +328,7 @@ EVEN_LEAST, EVEN_MISS = 1e-7, 1e3
 TRAVEL = 1e-6
 """Way in a period, relative to the amplitude, from which a motion is called drifting."""
 
-# --- orbits from far off ----------------------------------------------------------------------------
+# --- orbits from far off, by damped steps -----------------------------------------------------------
 
 FINE = 2e-13
 """Tolerance of shots."""
@@ -337,16 +341,17 @@ BETTER, GOOD_LATE, FINE_LATE = 1e-3, 30, 100
 """Of `GOOD`: a step that needs no other, and one that will do in the end; of `FINE`: the mismatch of one
 where rounding rules."""
 
-NEUTRAL = 1e-6
-"""By how much a multiplier may exceed one: central differences are that good."""
+NEUTRAL, SQUARINGS_FINE = 1e-6, 28
+"""By how much a multiplier may exceed one: central differences are that good; squarings that tell it to a
+tenth of that."""
 
-FAR_STEP = 2e-5
-"""Of differences, relative: the root of `FINE` times some forty."""
+CENTRAL = 2e-5
+"""Of central differences, relative: the root of `FINE` times some forty."""
 
-FAR_ITERATIONS, FAR_FORGETS = 40, 0.1
-"""Newton's steps at most; what is left of the size of a coordinate after one."""
+DAMPED_STEPS = 40
+"""Newton's steps at most."""
 
-FAR_SETTLED = 1e-5, 0.3
+DAMPED_SETTLED = 1e-5, 0.3
 """A step so short that shrinks no more than so far is what rounding leaves."""
 
 LEAST_SHARE = {True: 1e-3, False: 0.3}
@@ -355,7 +360,7 @@ LEAST_SHARE = {True: 1e-3, False: 0.3}
 SHORTENED = 0.1
 """Share of a step down to which it is halved, and then quartered."""
 
-HOPELESS = 30
+REACH = 30
 """First step, in sizes of the motion, from which an irregular one is given up."""
 
 # --- linear orbits and symmetries -------------------------------------------------------------------

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import count, number, unknown_keywords
+from ..checks import count, number
 from ..df.work import progress_bar
 from .arguments import bounds, box_of
 from .border import deep_points, distinct, refined, spread_points
@@ -39,7 +39,6 @@ def limit_cycle_map(
     marks: Mapping[str, Mapping[str, float]] | None = None,
     seed: int = 0,
     progress: bool | None = None,
-    **keywords: Any,
 ) -> LimitCycleMap:
     """Map what a PID loop around a block does over two of its gains: whether it rests, cycles or diverges.
 
@@ -106,7 +105,6 @@ def limit_cycle_map(
     >>> gains.at(kp=2000, ki=44250, exact=True).verdict
     'rests or diverges'
     """
-    unknown_keywords(keywords, limit_cycle_map)
     points = count(_OWNER, "n", n, 2, meaning="values of each range")
     checks = count(_OWNER, "exact_check", exact_check, 0, meaning="points simulated")
     if 0 < checks < CHECKS_LEAST:

@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 from scipy.optimize import NonlinearConstraint, OptimizeResult, differential_evolution
 
-from ..checks import number, positive, shown, unknown_keywords
+from ..checks import number, positive, shown
 from ..df.dispatch import method_for
 from ..df.work import progress_bar
 from ..limit_cycles.check import Check
@@ -149,7 +149,6 @@ def tune_pid(
     output: str | None = None,
     seed: int = 0,
     progress: bool | None = None,
-    **keywords: Any,
 ) -> TunedPID:
     """Choose the gains of a PID by what the loop really does: no limit cycle, or the smallest one.
 
@@ -201,7 +200,6 @@ def tune_pid(
     >>> tuned.bandwidth >= 12 and tuned.max_sensitivity <= 1.7
     True
     """
-    unknown_keywords(keywords, tune_pid)
     if np.ndim(bandwidth) == 0:
         least = positive(_OWNER, "bandwidth", bandwidth, "rad/s", meaning="crossover frequency")
         band = least, WIDER * least

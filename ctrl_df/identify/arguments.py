@@ -32,16 +32,21 @@ def own_parameters(block, own) -> tuple[str, ...]:
     return () if own is None else _parameters(block, "own", own)
 
 
-def known_beforehand(block, prior) -> dict[str, tuple[float, float]]:
-    """Return value and standard deviation of parameters of a model, or of effects that it may be given."""
+def known_beforehand(block, prior, *, grows=True) -> dict[str, tuple[float, float]]:
+    """Return value and standard deviation of parameters of a model, or of effects that it may be given.
+
+    `grows`: whether it may be given any.
+    """
     found = {}
     for name, stated in ({} if prior is None else mapping("prior", "prior", prior, _PRIOR)).items():
         effect = effect_library().get(str(name).partition(".")[0])
-        may_be = () if effect is None else [f"{effect.id}.{k}" for k, _ in stated_parameters(effect)]
+        may_be = [f"{effect.id}.{k}" for k, _ in stated_parameters(effect)] if effect and grows else []
         if name not in block.parameters and name not in may_be:
+            others = ", or of a parameter of an effect that may be added, such as 'stribeck.level'"
+            remedy = "Correct it." if grows else "Add its effect to the model, or leave it out."
             raise ValueError(
-                f"prior needs names out of {', '.join(block.parameters)}, or of a parameter of an effect "
-                f"that may be added, such as 'stribeck.level'; got {shown(name)}."
+                f"prior needs names out of {', '.join(block.parameters)}{others if grows else ''}; got "
+                f"{shown(name)}. {remedy}"
             )
         pair = tuple(stated) if isinstance(stated, Sequence) and not isinstance(stated, str) else (stated,)
         if len(pair) != 2:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..checks import unknown_keywords
 from .arguments import check_quantities
 from .datasets.choice import dataset_of
 from .residuals.comparison_base import ComparisonBase
@@ -11,7 +10,7 @@ from .results.comparison import Comparison
 __all__ = ["Comparison", "compare"]
 
 
-def compare(model, data, *, mode: str = "auto", window: float | None = None, **keywords) -> ComparisonBase:
+def compare(model, data, *, mode: str = "auto", window: float | None = None) -> ComparisonBase:
     """Simulate a model on records with the event engine and compare.
 
     Parameters
@@ -44,7 +43,6 @@ def compare(model, data, *, mode: str = "auto", window: float | None = None, **k
     >>> comparison.fit_percent < 90, bool(comparison.white)
     (True, False)
     """
-    unknown_keywords(keywords, compare)
     dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     dataset.warn_of_means(model)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from operator import attrgetter
 
 from ..checks import executor as checked_executor
-from ..checks import unknown_keywords
 from .arguments import (
     check_limits,
     check_quantities,
@@ -37,7 +36,6 @@ def diagnose(
     progress=None,
     callback=None,
     budget=None,
-    **keywords,
 ) -> Diagnosis:
     """Find the effect that a model misses.
 
@@ -63,10 +61,8 @@ def diagnose(
         Parameters of the model that every record has for itself, as for `refit`: they are estimated anew on
         records held out.
     prior : mapping or None
-        What is known of parameters besides the records: value and standard deviation by name, each in its
-        unit, ``{"mass": (2.0, 0.05)}``, of the model or of an effect that it may be given. Of the others the
-        model's own values count, each known within a factor of three (one standard deviation): no more than
-        one sample does.
+        What is known of parameters besides the records, as for `refit`; also of those of effects that the
+        model may be given, ``{"stribeck.level": (9.0, 0.5)}``.
     executor : concurrent.futures.Executor or None
         Runs candidates side by side; None: threads of this process do.
     limits : mapping or None
@@ -105,7 +101,6 @@ def diagnose(
     >>> diagnosis.verdict, diagnosis.best.id, round(diagnosis.best.parameters["force"], 1)
     ('effect', 'constant_force', 1.0)
     """
-    unknown_keywords(keywords, diagnose)
     checked_executor("diagnose", executor)
     check_limits(limits)
     classes = effect_classes(candidates)

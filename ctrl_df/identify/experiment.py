@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..checks import unknown_keywords
 from .datasets.choice import dataset_of
 from .results.experiment import Experiment
 
@@ -10,7 +9,7 @@ __all__ = ["Experiment", "next_experiment"]
 
 
 def next_experiment(
-    diagnosis, *, force=None, stroke=None, duration=None, dt=None, loop=None, **keywords
+    diagnosis, *, force=None, stroke=None, duration=None, dt=None, loop=None
 ) -> Experiment | None:
     """Choose the input that separates the remaining candidates best.
 
@@ -39,7 +38,6 @@ def next_experiment(
     ValueError
         Limits that are not positive; candidates that leave the stroke under every input.
     """
-    unknown_keywords(keywords, next_experiment)
     remaining = [c for c in diagnosis.remaining if c.model is not None]
     if diagnosis.verdict == "none" or not remaining:
         return None

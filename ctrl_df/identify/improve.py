@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..checks import count, unknown_keywords
+from ..checks import count
 from ..checks import executor as checked_executor
 from .arguments import (
     check_quantities,
@@ -34,12 +34,11 @@ def improve(
     progress=None,
     callback=None,
     budget=None,
-    **keywords,
 ) -> Study:
     """Add the effects a model misses, one at a time, as long as held-out error falls beyond noise.
 
-    After each, those added before are looked at again; at the end every model one exchange away is tried
-    (`Study.neighbours`), and the ladder goes on from one that is better, or as good and plainer. What
+    After each, those added before are looked at again; at the end every model that differs by one effect is
+    tried (`Study.neighbours`), and the ladder goes on from one that is better, or as good and plainer. What
     the model given has stays.
 
     Parameters
@@ -82,7 +81,6 @@ def improve(
     >>> study.verdict, study.effects
     ('effect', ('constant_force',))
     """
-    unknown_keywords(keywords, improve)
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     course = Course("improve", progress, callback, budget)

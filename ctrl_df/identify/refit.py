@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import unknown_keywords
 from .arguments import (
     check_fit,
     check_quantities,
@@ -36,7 +35,6 @@ def refit(
     window: float | None = None,
     robust: bool = True,
     budget: int = 600,
-    **keywords,
 ) -> Fit:
     """Adjust parameters until the simulated output fits the records best.
 
@@ -61,9 +59,8 @@ def refit(
         from such a fit, always are.
     prior : mapping or None
         What is known of parameters besides the records: value and standard deviation by name, each in its
-        unit, ``{"mass": (2.0, 0.05)}``, of the model or of an effect that it may be given. Of the others the
-        model's own values count, each known within a factor of three (one standard deviation): no more than
-        one sample does.
+        unit, ``{"mass": (2.0, 0.05)}``. Of the others the model's own values count, each known within a
+        factor of three (one standard deviation): no more than one sample does.
     start : mapping or None
         Start values other than the model's; the short segments are then left out.
     mode, window
@@ -101,7 +98,6 @@ def refit(
     >>> {name: round(p.value, 1) for name, p in fit.parameters.items()}
     {'mass': 2.2, 'coulomb.level': 3.0, 'viscous.coefficient': 6.0}
     """
-    unknown_keywords(keywords, refit)
     dataset = dataset_of(model, data)
     check_quantities(model, dataset.records)
     dataset.check_segments(mode, window)
@@ -110,7 +106,7 @@ def refit(
     names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
     dataset.warn_of_means(model, names)
-    found = dataset.with_prior(known_beforehand(block, prior)).fit(
+    found = dataset.with_prior(known_beforehand(block, prior, grows=False)).fit(
         dataset.with_own(model, own),
         names,
         start,

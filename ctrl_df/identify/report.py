@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 
 from ..checks import place_to_write
+from ..numerals import percent
 from .thresholds import REPORT_BUDGET, REPORT_DPI
 
 _ERRORS = {
@@ -103,10 +104,10 @@ def _steps(study, drawn):
     for i, s in enumerate(study.steps):
         same = ", ".join(e.replace("_", " ") for e in s.equivalents) or "–"
         evidence = f"{s.evidence:,.0f}" if s.effect or s.changes else "–"
-        seen = _percent(drawn[0 if i == 0 else -1].nrmse) if i in (0, last) else "–"
-        rows.append([_did(s), _percent(s.nrmse), _percent(s.nrmse_holdout), seen, evidence, same])
-    rows.append(["noise floor", _percent(study.noise), "", "", "", ""])
-    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Same on these data"]
+        seen = percent(drawn[0 if i == 0 else -1].nrmse) if i in (0, last) else "–"
+        rows.append([_did(s), percent(s.nrmse), percent(s.nrmse_holdout), seen, evidence, same])
+    rows.append(["noise floor", percent(study.noise), "", "", "", ""])
+    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Not told apart from"]
     return _table(head, rows, numeric=(1, 2, 3, 4))
 
 
@@ -122,7 +123,7 @@ def _did(step) -> str:
 
 
 def _neighbours(neighbours) -> dict | None:
-    """Return the final model beside all that are one exchange away: a sentence, the nearest, and the rest."""
+    """Return the final model beside all that differ by one effect: a sentence, the nearest, and the rest."""
     if not neighbours:
         return None
     rows = [list(row) for row in neighbours.table(len(neighbours)).rows]
@@ -131,16 +132,12 @@ def _neighbours(neighbours) -> dict | None:
     return {"sentence": neighbours.sentence, "near": near, "far": far}
 
 
-def _percent(value) -> str:
-    return f"{100 * value:.3g} %" if math.isfinite(value) else "–"
-
-
 def _pictures(study, drawn):
     """Draw the first and the last model beside the record held out, or the training record."""
     parts = []
     for comparison, name in zip(drawn, ("The start, refitted", "The improved model"), strict=False):
         caption = (
-            f"{name}, on {_shown(study).name}: it errs by {_percent(comparison.nrmse)} over "
+            f"{name}, on {_shown(study).name}: it errs by {percent(comparison.nrmse)} over "
             f"{comparison.over}. {comparison.places[0]}"
         )
         parts.append(_picture(lambda c=comparison, n=name, **size: c.plot(title=n, **size), caption))

@@ -8,7 +8,6 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..checks import unknown_keywords
 from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine
@@ -48,7 +47,7 @@ from .thresholds import (
 
 
 def find_limit_cycle(
-    loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False, **keywords
+    loop, guess=None, *, max_iterations=40, search_time=None, raise_on_failure=False
 ) -> Orbit | NoOrbit:
     """Find an exact periodic orbit of an autonomous loop (input r = 0).
 
@@ -89,7 +88,6 @@ def find_limit_cycle(
     >>> cdf.find_limit_cycle(loop, guess=(8.0, 11.6))
     <Orbit: 7.945402 @ 11.62868 rad/s, stable>
     """
-    unknown_keywords(keywords, find_limit_cycle)
     check_search(
         "find_limit_cycle", max_iterations=max_iterations, search_time=search_time,
         raise_on_failure=raise_on_failure,

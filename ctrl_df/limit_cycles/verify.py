@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..checks import unknown_keywords
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
@@ -26,7 +25,7 @@ DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simu
 _UNHELD = "Newton from the motion it stands on closes no orbit near"
 
 
-def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Check:
+def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     """Check every predicted limit cycle against the exact orbit and simulations of the closed loop.
 
     Parameters
@@ -57,7 +56,6 @@ def verify(resp, *, loop=None, search=True, search_time=None, **keywords) -> Che
     >>> [row.verdict for row in cdf.verify(resp)]
     ['confirmed']
     """
-    unknown_keywords(keywords, verify)
     check_search("verify", search_time=search_time, search=search)
     if not hasattr(resp, "limit_cycles"):
         raise TypeError(

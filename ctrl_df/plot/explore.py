@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.widgets import Slider
 
-from ..checks import flag, number, real_array, shown, unknown_keywords
+from ..checks import flag, number, real_array, shown
 from ..df.family import Family
 from ..gains.arguments import gain_units
 from ..gains.controller import GAINS, Structure
@@ -51,7 +51,6 @@ def explore(
     output: str | None = None,
     exact: bool = True,
     width: float = 7.0,
-    **keywords: Any,
 ) -> Explorer:
     """Open a picture of -1/N(a, omega) and of the controller, with its gains on sliders.
 
@@ -95,7 +94,6 @@ def explore(
     >>> view.gains["ki"]
     10000.0
     """
-    unknown_keywords(keywords, explore)
     flag(_OWNER, "exact", exact)
     tf = number(_OWNER, "tf", tf, "s", lower=0.0, meaning="filter time constant")
     width = number(_OWNER, "width", width, "in", lower=2.0)

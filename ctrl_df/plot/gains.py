@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 
 from ..blocks.mechanism import Mechanism
 from ..gains.map import Fine, LimitCycleMap
+from ..numerals import digits
 from .parts.curves import in_brackets, plain_spines
 from .parts.page import AMPLITUDE_COLOR, CROSSING_COLOR, NARROW, OMEGA_COLOR
 
@@ -19,7 +20,7 @@ _REST, _CYCLE, _BOTH, _HATCH = "#ffffff", "#d9d9d9", "#efefef", "////"
 
 
 def plot_limit_cycle_map(
-    gains_map: LimitCycleMap, *, ax=None, title=None, contours=True, checks=True, **keywords
+    gains_map: LimitCycleMap, *, ax=None, title=None, contours=True, checks=True
 ) -> ct.ControlPlot:
     """Draw a map over gains.
 
@@ -52,8 +53,6 @@ def plot_limit_cycle_map(
     >>> cplt.axes[0, 0].get_xlabel()
     'kp [N/m]'
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     if ax is None:
         figure = plt.figure(figsize=(6.4, 4.8), layout="constrained")
         ax = figure.add_subplot()
@@ -143,9 +142,7 @@ def _contours(ax, gains_map, fine, count):
             continue
         where = fine.x, fine.y, np.ma.masked_invalid(values.T)
         lines = ax.contour(*where, levels=levels, colors=color, linestyles=style, linewidths=1.1, zorder=3)
-        labels += list(
-            ax.clabel(lines, fontsize=7.5, fmt=lambda v: f"{v:.3g}", inline=True, inline_spacing=2)
-        )
+        labels += list(ax.clabel(lines, fontsize=7.5, fmt=digits, inline=True, inline_spacing=2))
         handles.append(Line2D([], [], color=color, ls=style, lw=1.1, label=f"{name}, {told}"))
     return labels, handles
 

@@ -6,6 +6,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..numerals import digits
 from .parts.curves import in_brackets, labels_of, log_ticks, memoryless, short, units
 from .parts.page import page
 
@@ -50,10 +51,10 @@ def plot_harmonics(
         for j, (panel, axis) in enumerate(zip(panels, axes, strict=False)):
             if panel == "omega":
                 x, y = family.omega, np.abs(family.harmonics[i])
-                where = f"A = {family.amplitudes[i]:.3g}{force}"
+                where = f"A = {digits(family.amplitudes[i])}{force}"
                 axis.set_xlabel("frequency ω [rad/s]")
             else:
-                at = "" if memoryless(family) else f"ω = {family.omega[k]:.3g} rad/s"
+                at = "" if memoryless(family) else f"ω = {digits(family.omega[k])} rad/s"
                 x, y, where = family.amplitudes, np.abs(family.harmonics[:, k]), at
                 axis.set_xlabel(f"amplitude A{in_brackets(force)}")
             lines[0, j], places = _draw_harmonics(axis, x, y, orders, where, kwargs)

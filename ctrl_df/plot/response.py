@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
 
 from ..blocks.coordinates import AXIS, LINE
 from .parts.events import MARKS, mark_events, shade_sticking
 from .parts.page import legend_above, page
+
+_ROWS = 3
+"""Signals over each other for which a figure of the usual height has room."""
 
 
 def event_response_plot(run, *, fmt=(), events=True, **keywords) -> ct.ControlPlot:
@@ -28,7 +32,11 @@ def event_response_plot(run, *, fmt=(), events=True, **keywords) -> ct.ControlPl
     ControlPlot
         python-control's.
     """
+    new = not plt.get_fignums()
     cplt = ct.time_response_plot(run, *fmt, **keywords)
+    rows = np.shape(cplt.axes)[0]
+    if new and rows > _ROWS:  # as high as labels need
+        cplt.figure.set_figheight(cplt.figure.get_figheight() * rows / _ROWS)
     marked = False
     bodies = {e.subsystem for e in run.events if e.kind in ("stick", "breakaway")}
     for ax in np.ravel(cplt.axes):

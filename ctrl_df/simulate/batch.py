@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import choice, count, flag, real_array, shown, unknown_keywords
+from ..checks import choice, count, flag, real_array, shown
 from ..status import Status
 from .engine import EVENT_KINDS, Engine, Event
 from .groups import Group, groups_of
@@ -132,7 +132,6 @@ def batch_response(
     max_steps=MAX_STEPS,
     keep_events=False,
     return_states=False,
-    **keywords,
 ) -> BatchResponse:
     """Simulate one system many times, every run as `event_response` does it, on all cores at once.
 
@@ -194,7 +193,6 @@ def batch_response(
     >>> batch.outputs.shape
     (100, 2, 2501)
     """
-    unknown_keywords(keywords, batch_response)
     for name, value in dict(keep_events=keep_events, return_states=return_states).items():
         flag(_OWNER, name, value)
     threads = None if threads is None else count(

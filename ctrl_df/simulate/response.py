@@ -14,7 +14,7 @@ import control as ct
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
-from ..checks import choice, count, flag, mapping, number, positive, real_array, shown, unknown_keywords
+from ..checks import choice, count, flag, mapping, number, positive, real_array, shown
 from ..drawing import draw
 from ..status import Status
 from ..table import Table
@@ -107,7 +107,6 @@ def event_response(
     keep_events=True,
     return_states=None,
     squeeze=None,
-    **keywords,
 ) -> EventResponse:
     """Simulate a block or a loop with every event located; otherwise like ``ct.input_output_response``.
 
@@ -166,7 +165,6 @@ def event_response(
     >>> [(round(float(e.time), 4), e.kind) for e in run.events]
     [(0.3013, 'breakaway'), (1.0564, 'stick'), (1.3485, 'breakaway')]
     """
-    unknown_keywords(keywords, event_response)
     for name, value in dict(keep_events=keep_events, return_states=return_states, squeeze=squeeze).items():
         if value is not None:
             flag("event_response", name, value)

@@ -44,6 +44,7 @@ from ..thresholds import (
 )
 from . import shooting
 from .linear_orbit import linear_orbit
+from .newton import differentiate_of
 from .shooting import CLOSED, SPENT, UNSTABLE, close_orbit
 from .shot import follow, make_shot, set_state, shoot
 from .symmetries import Probe, Sizes, find_symmetries
@@ -320,6 +321,23 @@ class OrbitSearch:
         self.budget -= int(shot.clock[3])
         self._checked(reason, state)
         return int(shot.tally[2])
+
+    def differentiated(self, state, missed, rtol, periods, relative):
+        """Take the Jacobian of a shot, kept in `shot`, by central differences; False where one ran off."""
+        shot, before = self.shot, self.shot.tally[1]
+        done = differentiate_of(
+            shot.at, self.drive, self._span(periods), state.x, state.mode, missed, self.mirrored, rtol,
+            self.atol, self._hmax(1) * self.period, self.budget, FIRST_STEP * self.period, relative,
+        )  # fmt: skip
+        self.budget -= int(shot.tally[1] - before)
+        go_on()
+        raised = bool(pointers.raised)
+        if raised and not isinstance(pointers.raised[0], Exception):
+            self._raise_if_raised()
+        pointers.raised.clear()
+        if self.budget <= 0:
+            raise OutOfWork(Status.WORK_LIMIT)
+        return done and not raised
 
     def _span(self, periods):
         return self.period / 2 if self.mirrored else periods * self.period

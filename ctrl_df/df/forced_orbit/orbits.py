@@ -34,7 +34,7 @@ from ..thresholds import (
     TRAVEL,
     WAITS,
 )
-from .far_newton import close_far
+from .damped import close_damped
 from .line import Line
 from .orbit_search import BIT, TOUCH, OrbitSearch, OutOfWork
 
@@ -64,9 +64,7 @@ wider (NaN)."""
 _CODE = {name: i for i, name in enumerate(ORBIT_REGIMES)}
 
 
-def orbit_family(
-    block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000, **keywords
-):
+def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000):
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 
     Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the answer
@@ -106,8 +104,6 @@ def orbit_family(
     RuntimeError
         A law raised or returned NaN; carries the exception.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     A, omega = np.atleast_1d(np.asarray(A, float)), np.atleast_1d(np.asarray(omega, float))
     harmonics = np.full((len(A), len(omega), orders + 1), np.nan + 0j)
     regime = np.full((len(A), len(omega)), _CODE["work limit"], np.int16)
@@ -270,7 +266,7 @@ class OrbitSolver(OrbitSearch):
                 orbit = self._periodic(state, orders=orders)
                 self.mirrored = orbit is None
             if orbit is None:
-                orbit = close_far(self, state, orders=orders, patient=self._slow(trail))
+                orbit = close_damped(self, state, orders=orders, patient=self._slow(trail))
         if orbit is None and self.symmetric:
             self.mirrored = self.repels = False
             state = self._nudged(state)
@@ -309,14 +305,14 @@ class OrbitSolver(OrbitSearch):
         found = self._longer_period(state, y, orders)
         if found is not None:
             return found
-        orbit = close_far(self, state, orders=orders, patient=self._slow(y))
+        orbit = close_damped(self, state, orders=orders, patient=self._slow(y))
         if orbit is None:
             for periods in WAITS:
                 means, sizes = self._averages(state, orders)
                 if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
                     break
                 state = self._follow(state, periods)
-                orbit = self._periodic(state, orders=orders) or close_far(self, state, orders=orders)
+                orbit = self._periodic(state, orders=orders) or close_damped(self, state, orders=orders)
                 if orbit is not None:
                     break
             else:  # still on its way

@@ -12,7 +12,7 @@ from ...blocks.transparent import without_delays
 from ...simulate.engine import Engine
 from ...simulate.program import layout
 from ..thresholds import WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE
-from .far_newton import close_far
+from .damped import close_damped
 from .orbit_search import OrbitSearch, OutOfWork
 
 # Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
@@ -105,7 +105,7 @@ class WaveformOrbit:
                 state = search._follow(state, periods)
             orbit = search._periodic(state, orders=orders, repelling=True, near=near)
             if orbit is None and far:
-                orbit = close_far(search, state, orders=orders, patient=False, repelling=True)
+                orbit = close_damped(search, state, orders=orders, patient=False, repelling=True)
         except OutOfWork:
             return None
         return None if orbit is None else orbit[0]

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import choice, count, mapping, number, shown, unknown_keywords
+from ...calls import keywords_of, unknown_keywords
+from ...checks import choice, count, mapping, number, shown
 from ...record_name import RecordName, digest
 from ...units import si_unit, to_si
 from ..thresholds import ON_SAMPLE
@@ -220,7 +221,7 @@ class Measurement:
             An unknown column (the message lists those there are), one column asked for twice, a cell that
             is no number (with its line), a file that is no text.
         """
-        cls._check_keywords(keywords)
+        cls._check_keywords(keywords, cls.from_csv)
         table = readers.read_csv(path, delimiter, decimal)
         keywords.setdefault("name", readers.stem(path))
         return cls(
@@ -237,7 +238,7 @@ class Measurement:
 
         See `from_csv` for the parameters.
         """
-        cls._check_keywords(keywords)
+        cls._check_keywords(keywords, cls.from_mat)
         table = readers.read_mat(path)
         keywords.setdefault("name", readers.stem(path))
         return cls(
@@ -252,7 +253,7 @@ class Measurement:
 
         See `from_csv` for the parameters.
         """
-        cls._check_keywords(keywords)
+        cls._check_keywords(keywords, cls.from_dataframe)
         table = readers.read_dataframe(frame, time)
         time = readers.INDEX if time is None else time
         columns = (time, input, output, outputs, velocity, channels)
@@ -266,7 +267,7 @@ class Measurement:
         The input of python-control's simulations runs straight between samples: ``input_hold='linear'``
         unless told otherwise.
         """
-        cls._check_keywords(keywords)
+        cls._check_keywords(keywords, cls.from_response)
         if outputs is not None:
             output = mapping("from_response", "outputs", outputs, "{'x': 0, 'v': 1}")
         t, u, y = readers.read_response(response, input, output)
@@ -308,13 +309,16 @@ class Measurement:
         >>> [len(part) for part in cdf.Measurement.in_parts(t, u, y + 5 * (t > 2.495))]  # reset at 2.5 s
         [250, 350]
         """
-        cls._check_keywords(keywords)
+        cls._check_keywords(keywords, cls.in_parts)
         return in_parts(cls, t, u, y, keywords)
 
     @classmethod
-    def _check_keywords(cls, keywords):
+    def _check_keywords(cls, keywords, reader):
+        """Refuse keywords that neither a reader knows by itself nor the record that it makes."""
         known = [f.name for f in dataclasses.fields(cls) if f.init and f.name not in ("t", "u", "y")]
-        unknown_keywords([k for k in keywords if k not in known], known)
+        wrong = {k: v for k, v in keywords.items() if k not in known}
+        if wrong:
+            unknown_keywords(f"{cls.__name__}.{reader.__name__}", wrong, (*keywords_of(reader), *known))
 
     # --- what it is -------------------------------------------------------------------------------
 

@@ -1,8 +1,8 @@
 """The ladder: effects added one at a time, looked at again, taken back; at its end all neighbours.
 
 From rung to rung the effect that explains most is added, and all those before it are looked at again beside
-it. Where nothing more is found, every model one exchange away is tried; a better one, or one as good and
-plainer, is where the ladder goes on. No structure is visited twice, so that it ends.
+it. Where nothing more is found, every model that differs by one effect is tried; a better one, or one as good
+and plainer, is where the ladder goes on. No structure is visited twice, so that it ends.
 
 Where something remains that no effect explains, an effect taken early may have stood in for several: the
 ladder then begins again from what came next at its own step, and the better end counts.
@@ -17,6 +17,7 @@ from itertools import islice
 from typing import Any
 
 from ...blocks.effect import Effect
+from ...numerals import percent
 from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
@@ -358,8 +359,8 @@ def _refused(effect: CandidateEffect, held: tuple[float, float]) -> str:
     name = effect.id.replace("_", " ")
     return (
         f"{name.capitalize()} did better on the data that judged the model without it, but not on those that "
-        f"judge the model with it: held out that errs by {held[0]:.2%}, the model without it by "
-        f"{held[1]:.2%}. It was not added."
+        f"judge the model with it: held out that errs by {percent(held[0])}, the model without it by "
+        f"{percent(held[1])}. It was not added."
     )
 
 

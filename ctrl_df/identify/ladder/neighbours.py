@@ -1,4 +1,4 @@
-"""All models one exchange away from one: an effect less, another in its place, one more."""
+"""All models that differ from one by one effect: an effect less, another in its place, one more."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...numerals import digits
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..prediction.simulator import free_run
@@ -82,18 +83,18 @@ def input_that_separates(
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
     if best is None:
         raise ValueError(
-            f"every input tried leaves the stroke of {reach:g} {long}, asks more than {force:g} {strong} or "
-            "moves nothing. Allow more stroke or force, or give loop= (a closed_loop whose controller holds "
-            "the drive in place)."
+            f"every input tried leaves the range of ±{reach:g} {long} (stroke), asks more than {force:g} "
+            f"{strong} or moves nothing. Allow more of either, or give loop= (a closed_loop whose controller "
+            "holds the drive in place)."
         )
     what = (
-        f"{best.kind} of up to {best.force:.3g} {strong}"
+        f"{best.kind} of up to {digits(best.force)} {strong}"
         if loop is None
-        else f"reference as {best.kind}, {best.force:.3g} {strong}"
+        else f"reference as {best.kind}, {digits(best.force)} {strong}"
     )
     reason = (
-        f"{what}: the outputs of {separated(names)} then differ by at least {best.separation:.2g} times the "
-        f"noise, within {best.stroke:.3g} {long} of stroke."
+        f"{what}: the outputs of {separated(names)} then differ by at least {digits(best.separation, 2)} "
+        f"times the noise, within {digits(best.stroke)} {long} of the centre."
     )
     return replace(best, reason=reason)
 

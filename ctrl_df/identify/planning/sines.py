@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...numerals import digits
 from ..results.experiment import Experiment, separated
 from ..tables.thresholds import WORK_MEDIUM
 from ..thresholds import NOTHING
@@ -80,10 +81,11 @@ def stepped_sines(
         parts.append(a * np.sin(w * dt * np.arange(n)))
     u = np.concatenate(parts)
     least, stroke_used = float(separation[i, k].min()), float(far[i, k].max())
-    points = ", ".join(f"{a:.3g} {strong} at {w:.3g} rad/s" for a, w in chosen)
+    points = ", ".join(f"{digits(a)} {strong} at {digits(w)} rad/s" for a, w in chosen)
     reason = (
-        f"sines of {points}: there {separated(names)} differ by {least:.2g} to "
-        f"{float(separation[i, k].max()):.2g} times the scatter, within {stroke_used:.3g} {long} of swing."
+        f"sines of {points}: there {separated(names)} differ by {digits(least, 2)} to "
+        f"{digits(float(separation[i, k].max()), 2)} times the scatter, within {digits(stroke_used)} {long} "
+        "of swing."
     )
     return Experiment(
         dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from ...table import Brief
 from ..thresholds import UNMOVED
 
 
-@dataclass(frozen=True, eq=False)
-class ComparisonBase:
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparisonBase(Brief):
     """A model beside records, each by itself in `records`.
 
     `simulated` and `residual` are arrays for one record, tuples of arrays for several.

@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...blocks.coordinates import moving_in
+from ...numerals import SMALLEST_P, digits
 from ..data.quantities import word_of
 from ..thresholds import LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
-from .thresholds import AFTER_REVERSAL, FAINT, FASTEST, LOW_SPEED, MEDIUM_SPEED, REGION_SAMPLES, SMALLEST_SAID
+from .thresholds import AFTER_REVERSAL, EDGE_ZERO, FAINT, FASTEST, LOW_SPEED, MEDIUM_SPEED, REGION_SAMPLES
 
 KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
 
@@ -57,6 +58,12 @@ class Region:
     span: tuple[float, float]
     sentence: str = ""
 
+    def __repr__(self) -> str:
+        return (
+            f"<Region {self.kind}, {self.label}: {self.share:.1%} of the squared error, expected "
+            f"{self.expected_share:.1%}, p {_p(self.p_value)}>"
+        )
+
     @property
     def excess(self) -> float:
         """Share of the error beyond the share expected."""
@@ -75,7 +82,7 @@ class Regions(tuple[Region, ...]):
     def sentences(self) -> tuple[str, ...]:
         """One sentence per significant region, or one that says there is none."""
         return tuple(r.sentence for r in self.significant) or (
-            "The error is spread evenly: no region stands out.",
+            "No region holds more of the squared error than chance would leave there.",
         )
 
     def of(self, kind: str) -> Regions:
@@ -159,7 +166,7 @@ def _parts(t, bins, units, position=None, velocity=None, force=None) -> Iterator
     """Yield (kind, label, mask, span) of every region of samples."""
     edges = np.linspace(t[0], t[-1], bins + 1)
     for a, b in zip(edges[:-1], edges[1:], strict=True):
-        yield "time", f"{a:.3g} to {b:.3g} s", (t >= a) & ((t < b) | (b == edges[-1])), (a, b)
+        yield "time", f"{digits(a)} to {digits(b)} s", (t >= a) & ((t < b) | (b == edges[-1])), (a, b)
     if velocity is not None:
         yield from _by_velocity(t, velocity, position, units[0])
     if position is not None:
@@ -175,16 +182,16 @@ def _by_velocity(t, velocity, position, unit):
     yield "direction", f"{v} > 0", velocity > low, (low, math.inf)
     yield "direction", f"{v} < 0", velocity < -low, (-math.inf, -low)
     speed = np.abs(velocity)
-    yield "low_speed", f"|{v}| < {low:.2g} {unit}/s", speed < low, (0.0, low)
+    yield "low_speed", f"|{v}| < {digits(low, 2)} {unit}/s", speed < low, (0.0, low)
     yield (
         "low_speed",
-        f"{low:.2g} < |{v}| < {MEDIUM_SPEED * fast:.2g} {unit}/s",
+        f"{digits(low, 2)} < |{v}| < {digits(MEDIUM_SPEED * fast, 2)} {unit}/s",
         (speed >= low) & (speed < MEDIUM_SPEED * fast),
         (low, MEDIUM_SPEED * fast),
     )
     yield (
         "low_speed",
-        f"|{v}| > {MEDIUM_SPEED * fast:.2g} {unit}/s",
+        f"|{v}| > {digits(MEDIUM_SPEED * fast, 2)} {unit}/s",
         speed >= MEDIUM_SPEED * fast,
         (MEDIUM_SPEED * fast, math.inf),
     )
@@ -194,24 +201,26 @@ def _by_velocity(t, velocity, position, unit):
     since = time_since(t, turns)
     usual = float(np.median(np.diff(t[turns])))
     first = AFTER_REVERSAL * usual
-    yield "after_reversal", f"within {first:.2g} s", since < first, (0.0, first)
+    yield "after_reversal", f"within {digits(first, 2)} s", since < first, (0.0, first)
     middle = 0.5 * usual
     yield (
         "after_reversal",
-        f"{first:.2g} to {middle:.2g} s after",
+        f"{digits(first, 2)} to {digits(middle, 2)} s after",
         (since >= first) & (since < middle),
         (first, middle),
     )
-    yield "after_reversal", f"later than {middle:.2g} s", since >= middle, (middle, math.inf)
+    yield "after_reversal", f"later than {digits(middle, 2)} s", since >= middle, (middle, math.inf)
     if position is not None:
         yield from _quantiles("amplitude", unit, swing(position, turns), 3)
 
 
 def _quantiles(kind, unit, values, count, prefix=""):
     edges = np.unique(np.quantile(values, np.linspace(0, 1, count + 1)))
+    reach = float(np.max(np.abs(edges)))
     for i, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
         inside = (values >= a) & ((values < b) | (i == len(edges) - 2))
-        yield kind, f"{prefix}{a:.3g} to {b:.3g} {unit}", inside, (float(a), float(b))
+        ends = " to ".join(digits(end if abs(end) > EDGE_ZERO * reach else 0.0) for end in (a, b))
+        yield kind, f"{prefix}{ends} {unit}", inside, (float(a), float(b))
 
 
 # --- what chance alone would do -------------------------------------------------------------------
@@ -303,7 +312,7 @@ def _bands(t, r, signals) -> list[Region]:
         share = float(power[a:b].sum()) / total
         span = (float(f[a]), float(f[b - 1]))
         expected = min(share, _background(density, near) * (b - a) / total)
-        label = f"{span[0]:.3g} to {span[1]:.3g} Hz"
+        label = f"{digits(span[0])} to {digits(span[1])} Hz"
         found.append(Region("frequency", label, share, expected, p, 0.0, 1.0, span))
     return found
 
@@ -325,11 +334,11 @@ def _periodogram(x):
 _PLACE = {
     "time": "the time from {label}",
     "direction": "motion with {label}",
-    "low_speed": "speeds {label}",
+    "low_speed": "motion with {label}",
     "after_reversal": "the time after reversals, {label}",
     "position": "{word}s from {label}",
-    "load": "{word}s {label}",
-    "amplitude": "swings of half stroke {label}",
+    "load": "samples with {label}",
+    "amplitude": "swings of amplitude {label}",
     "frequency": "the band {label}",
 }
 
@@ -352,7 +361,7 @@ def _sentence(region: Region, words: dict[str, str]) -> str:
 
 
 def _p(p: float) -> str:
-    return "< 1e-6" if p < SMALLEST_SAID else f"{p:.2g}"
+    return "< 1e-6" if p < SMALLEST_P else f"{p:.2g}"
 
 
 def _checked(t, values, name="residual"):

@@ -24,8 +24,8 @@ REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
 FAINT = 1e-30
 """Power, over all of it, that is none."""
 
-SMALLEST_SAID = 1e-6
-"""Probability below which that is all that is said."""
+EDGE_ZERO = 1e-3
+"""Edges of regions nearer to zero than this share of the largest are called zero."""
 
 TWO_SIDED = round(NormalDist().inv_cdf(0.975), 2)
 """Standard deviations of a 95 % band."""

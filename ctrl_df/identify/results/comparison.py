@@ -12,6 +12,8 @@ import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...drawing import draw
+from ...numerals import probability
+from ...table import Brief
 from ..data.derivatives import automatic_cutoff, derivative
 from ..data.imposed import imposed_motion
 from ..data.measurement import Measurement
@@ -33,8 +35,8 @@ from ..thresholds import RECORD_SAMPLES
 from .thresholds import SMOOTHED_ENDS, SPECTRUM_LEAST
 
 
-@dataclass(frozen=True, eq=False)
-class RecordComparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordComparison(Brief):
     """A model beside one record.
 
     Attributes
@@ -60,6 +62,10 @@ class RecordComparison:
     fitted: int = 0
     model: Any = None
     outputs: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        over = "a free run" if self.windows == 1 else f"{self.windows} segments"
+        return f"{self.record.name}, nrmse {self.nrmse:.4g} over {over}"
 
     @cached_property
     def by_output(self) -> dict[str, RecordComparison]:
@@ -166,7 +172,7 @@ class RecordComparison:
         return out[first : last + 1], slice(int(first), int(last) + 1)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison(ComparisonBase):
     """Outcome of `compare`: the sum over all records, and each by itself in `records`.
 
@@ -258,16 +264,13 @@ class Comparison(ComparisonBase):
             ]
         test = self.worst.input_test
         if test is not None:
-            lines.append(
-                f"The residual shows {'no trace' if test else 'traces'} of the input (p = {test.p_value:.2g})"
-                + (
-                    ", and is white: nothing is missing."
-                    if test and self.white
-                    else "."
-                    if test
-                    else ": something is missing."
-                )
-            )
+            if not test:
+                so = "A correlation of the residual with the input is found: something is missing"
+            elif self.white:
+                so = "The residual is white, and not correlated with the input: nothing is missing"
+            else:
+                so = "The residual is neither white nor a linear response to the input"
+            lines.append(f"{so} (p{probability(test.p_value)} of no correlation).")
         if self.where:
             lines += ["", *self.places[:6], "", self.where.table(8)]
         return "\n".join(lines)
@@ -291,7 +294,7 @@ class Comparison(ComparisonBase):
         return (
             f"{count}: nrmse {self.nrmse:.4g}, fit {self.fit_percent:.2f} %, rmse {self._sizes()}, "
             f"residual {'white' if self.white else 'not white'} "
-            f"(p = {self.white.p_value:.2g}); {how}."
+            f"(p{probability(self.white.p_value)}); {how}."
         )
 
     def _sizes(self) -> str:

@@ -10,6 +10,9 @@ from typing import Any
 
 from ...blocks.effect import Effect
 from ...drawing import draw, go_on
+from ...numerals import certainty as sure
+from ...numerals import digits, percent
+from ...table import Brief
 from ..course import COMPLETE
 from ..data.measurement import Measurement
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
@@ -26,7 +29,18 @@ CALIBRATED = (
 )
 """On what the probabilities rest, in words; the counts are those of docs/calibration.md."""
 
+_WHICH = (
+    "nrmse: rms error over rms of the {of}, in the segments of this search, each from a fitted start. "
+    "compare() takes segments of its own, or a free run: its nrmse of the same model is another number."
+)
+"""Why one model has several errors; said where they are printed."""
+
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
+
+
+def which_errors(measure: str) -> str:
+    """Return which errors a ranking or ladder has; nothing for a table N(A, omega), which has one alone."""
+    return "" if measure == "N" else _WHICH.format(of=measure)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +82,8 @@ class Baseline(Predicting):
     nrmse_holdout: float = math.nan
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CandidateEffect(Predicting):
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class CandidateEffect(Brief, Predicting):
     """One effect of the library, fitted to the data.
 
     Attributes
@@ -82,7 +96,7 @@ class CandidateEffect(Predicting):
         Error of the block with this effect on training and on held-out data, over the rms of the centred
         output.
     evidence : float
-        Log likelihood ratio [nats] over the refitted baseline, less the price of its parameters (Schwarz). Of
+        Log-likelihood ratio over the refitted baseline, less the price of its parameters (Schwarz). Of
         several segments held out the one that speaks most for the effect does not count.
     probability : float
         Among all candidates and "nothing missing", equal before the data.
@@ -93,7 +107,7 @@ class CandidateEffect(Predicting):
     model : block
         The refitted block with the effect.
     evidence_holdout : float
-        Log likelihood ratio [nats] on the held-out data alone, without the same segment.
+        Log-likelihood ratio on the held-out data alone, without the same segment.
     confirmed : bool
         Whether it was refitted at the full rate and tried on held-out data (the best few are).
     errors : dict
@@ -133,9 +147,15 @@ class CandidateEffect(Predicting):
         """Whether it is confirmed, and the data determine all parameters of the effect."""
         return self.confirmed and not self.undetermined
 
+    def __str__(self) -> str:
+        return (
+            f"{self.id}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, probability "
+            f"{sure(self.probability)}"
+        )
+
     @property
     def evidence_fitted(self) -> float:
-        """Evidence of the records fitted alone [nats]."""
+        """Evidence of the records fitted alone."""
         return self.evidence - self.evidence_holdout
 
 
@@ -151,8 +171,8 @@ def certainty(ranking) -> float:
     return first.probability + sum(c.probability for c in ranking if c.id in first.equivalents)
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Brief):
     """What is missing in a model, or that nothing is.
 
     Attributes
@@ -246,7 +266,12 @@ class Diagnosis:
         lines = [f"{'effect':<{w}} {'nrmse':>9} {'held out':>9} {'evidence':>9} {'prob.':>6}  parameters"]
         lines.append(f"{none:<{w}} {self.nrmse:>9.3g} {self.nrmse_holdout:>9.3g} {0:>9.1f}")
         for name, c in zip(names, shown, strict=True):
-            values = ", ".join(f"{k} {v:.4g}" for k, v in c.parameters.items())
+            its = (
+                c.model.parameters
+            )  # of two bodies a joint divides none: its share of a mass is no parameter
+            values = ", ".join(
+                f"{k} {digits(v, 4)}" for k, v in c.parameters.items() if f"{c.model.newest}.{k}" in its
+            )
             lines.append(
                 f"{name:<{w}} {c.nrmse:>9.3g} {c.nrmse_holdout:>9.3g} {c.evidence:>9.1f} "
                 f"{c.probability:>6.1%}  {values}"
@@ -259,4 +284,5 @@ class Diagnosis:
 
     def __str__(self) -> str:
         how = "" if self.status == COMPLETE else f" ({self.status})"
-        return f"{self.verdict}{how}: {self.explanation}\n{self.table()}"
+        lines = f"{self.verdict}{how}: {self.explanation}", self.table(), which_errors(self.measure)
+        return "\n".join(filter(None, lines))

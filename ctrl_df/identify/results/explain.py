@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from ...numerals import certainty as sure
+from ...numerals import digits, percent
 from .diagnosis import AMBIGUOUS, NONE, UNKNOWN, certainty, rivals
 from .thresholds import SHOWN_PROBABILITY
 
@@ -17,7 +19,7 @@ def values_of(candidate) -> str:
     """Return a candidate's fitted parameters as text, in the units of its machine."""
     table, key = candidate.model.parameters, candidate.model.newest
     fitted = ((k, table[f"{key}.{k}"]) for k in candidate.parameters if f"{key}.{k}" in table)
-    return ", ".join(f"{k.replace('_', ' ')} {p.value:.4g} {p.unit}".rstrip() for k, p in fitted)
+    return ", ".join(f"{k.replace('_', ' ')} {digits(p.value, 4)} {p.unit}".rstrip() for k, p in fitted)
 
 
 def places(where) -> str:
@@ -30,24 +32,24 @@ def explain(d, words) -> str:
     first: Any = d.ranking[0] if d.ranking else None
     if d.verdict == NONE:
         return (
-            f"Nothing is missing: with its parameters refitted the model errs by {d.nrmse:.2%}{words.of} "
-            f"(held out {d.nrmse_holdout:.2%}), which is {words.noise}. "
+            "Nothing is missing: with its parameters refitted the model errs by "
+            f"{percent(d.nrmse)}{words.of} (held out {percent(d.nrmse_holdout)}), which is {words.noise}. "
             "No effect of the library improves on it beyond chance."
         )
     if d.verdict == UNKNOWN:
-        tried = f"The best of the library, {named(first.effect)}, leaves {first.nrmse:.2%}. " if first else ""
+        tried = first and f"The best of the library, {named(first.effect)}, leaves {percent(first.nrmse)}."
         return (
-            f"Something outside the library is missing. The refitted model errs by {d.nrmse:.2%}{words.of}. "
-            + " ".join(filter(None, (tried.rstrip(), *d.doubts, d.remains)))
+            "Something outside the library is missing. The refitted model errs by "
+            f"{percent(d.nrmse)}{words.of}. " + " ".join(filter(None, (tried, *d.doubts, d.remains)))
         )
     size = (
-        f"{d.nrmse:.2%} to {first.nrmse:.2%}{words.of} (held out {d.nrmse_holdout:.2%} to "
-        f"{first.nrmse_holdout:.2%})"
+        f"{percent(d.nrmse)} to {percent(first.nrmse)}{words.of} (held out {percent(d.nrmse_holdout)} to "
+        f"{percent(first.nrmse_holdout)})"
     )
     same = ""
     if first.equivalents:
         same = (
-            " On these data the same map as "
+            " These data do not tell it from "
             + ", ".join(e.replace("_", " ") for e in first.equivalents)
             + "."
         )
@@ -65,7 +67,7 @@ def explain(d, words) -> str:
     doubts = "".join(f" {s}" for s in d.doubts)
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
-        f"probability {certainty(d.ranking):.1%}.{same}{doubts}"
+        f"probability {sure(certainty(d.ranking))}.{same}{doubts}"
         + (f" Before, {where[0].lower() + where[1:]}" if where else "")
     )
 
@@ -78,10 +80,10 @@ def falls_behind(first, long) -> str:
             f"the motion for long: over the shortest stretch it errs by {long.errors[first.id]:.0%}."
         )
     who = [(n.replace("_", " ") or "the model without it", long.errors[n]) for n in long.better]
-    others = " and ".join(f"{name} by {error:.2%}" for name, error in who)
+    others = " and ".join(f"{name} by {percent(error)}" for name, error in who)
     return (
         f"Predicting {long.horizon:.3g} s freely, hidden states going on, {named(first.effect)} errs by "
-        f"{long.errors[first.id]:.2%}, but {others}: that it follows short segments is no proof."
+        f"{percent(long.errors[first.id])}, but {others}: that it follows short segments is no proof."
     )
 
 
@@ -93,8 +95,8 @@ def grows(short: float, error: float, seconds: float, effect=None) -> str:
     who = "The refitted model" if effect is None else f"With {named(effect)} the model"
     more = "" if effect is None else ", so that more is missing"
     return (
-        f"{who} follows short segments to {short:.2%}, but not long ones: over {seconds:.3g} s "
-        f"each, refitted to these, it errs by {error:.2%}{more}."
+        f"{who} follows short segments to {percent(short)}, but not long ones: over {seconds:.3g} s "
+        f"each, refitted to these, it errs by {percent(error)}{more}."
     )
 
 
@@ -107,9 +109,9 @@ def far_off(judged, names, stated) -> str:
     """Return that the model without an effect explains more with parameters far from those stated."""
     now, before = judged.block.parameters, stated.parameters
     values = ", ".join(
-        f"{k} {now[k].value:.3g} {now[k].unit} in place of {before[k].value:.3g}" for k in names
+        f"{k} {digits(now[k].value)} {now[k].unit} in place of {digits(before[k].value)}" for k in names
     )
-    return f"With {values} the model errs by {judged.train.nrmse:.2%} without any effect. {_UNITS}"
+    return f"With {values} the model errs by {percent(judged.train.nrmse)} without any effect. {_UNITS}"
 
 
 _UNITS = "Do record and model agree in their units?"
@@ -123,7 +125,7 @@ def undetermined(first) -> str:
 
 def explain_so_far(d, words) -> str:
     """Return what a `Diagnosis` under way knows."""
-    size = f"So far: with its parameters refitted the model errs by {d.nrmse:.2%}{words.of}"
+    size = f"So far: with its parameters refitted the model errs by {percent(d.nrmse)}{words.of}"
     if d.verdict == NONE:
         return f"{size}; nothing is missing, as far as is known."
     if d.verdict == UNKNOWN:
@@ -132,6 +134,6 @@ def explain_so_far(d, words) -> str:
     behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
     how = "It is refitted and tried on what is held out" if first.confirmed else "None of them is confirmed"
     return (
-        f"{size}; {named(first.effect)} explains most of that (it leaves {first.nrmse:.2%}){behind}. {how}; "
-        "the diagnosis is not complete."
+        f"{size}; {named(first.effect)} explains most of that (it leaves {percent(first.nrmse)}){behind}. "
+        f"{how}; the diagnosis is not complete."
     )

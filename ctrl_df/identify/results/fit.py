@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...checks import known_name
+from ...numerals import digits
 from ...record_name import RecordName, among
 from ..prediction.values import for_record
 from ..residuals.comparison_base import ComparisonBase
@@ -53,7 +54,7 @@ class FittedParameter:
         return f"{self.name:<28} {self.value:>12.6g} ± {self.standard_error:<9.2g} {self.unit:<10}{marks}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """Outcome of `refit`.
 
@@ -160,3 +161,7 @@ class Fit:
     def __str__(self) -> str:
         """Return it as text."""
         return self.report()
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{k} {digits(p.value, 4)} {p.unit}".rstrip() for k, p in self.parameters.items())
+        return f"<Fit: {values}>"

@@ -8,14 +8,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...drawing import draw, go_on
+from ...numerals import percent
+from ...table import Brief
 from ..course import COMPLETE
-from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis
+from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, which_errors
 from .neighbours import Neighbours
 from .thresholds import LEAST_WIDTH
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
+@dataclass(frozen=True, eq=False, repr=False)
+class Step(Brief):
     """One model of the ladder.
 
     Attributes
@@ -30,7 +32,7 @@ class Step:
     nrmse, nrmse_holdout : float
         Over segments with fitted starts.
     evidence : float
-        Log likelihood ratio over the step before [nats].
+        Log-likelihood ratio over the step before.
     parameters : dict
         All parameters of the model.
     equivalents : tuple of str
@@ -66,6 +68,12 @@ class Step:
         """The same in one line."""
         return " ".join(self.signs) or "refitted"
 
+    def __str__(self) -> str:
+        return (
+            f"{self.name}, nrmse {percent(self.nrmse)}, held out {percent(self.nrmse_holdout)}, evidence "
+            f"{self.evidence:.1f}"
+        )
+
     @property
     def sentence(self) -> str:
         """What became of effects added earlier, in plain words; empty where they all stayed."""
@@ -84,16 +92,16 @@ class Step:
             return f"In the end {gone} {_are(self.dropped)} not needed, and {_were(self.dropped)} dropped."
         if self.evidence > 0:
             return (
-                f"In the end {new} {_do(self.instead)} better than {gone} by {self.evidence:.0f} nats, "
-                f"and took {_its(self.dropped)} place."
+                f"In the end {new} {_do(self.instead)} better than {gone} (log-likelihood higher by "
+                f"{self.evidence:.0f}), and took {_its(self.dropped)} place."
             )
         if not gone:
             return f"The ladder went back, and on with {new}: what it had tried left more than noise."
         return f"The ladder went back: {new} in place of {gone}, which had led to no end without remainder."
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
+@dataclass(frozen=True, eq=False, repr=False)
+class Study(Brief):
     """Outcome of `improve`.
 
     Attributes
@@ -109,7 +117,7 @@ class Study:
     status : {'complete', 'under way', 'budget spent', 'interrupted'}
         How far the ladder came. Before it is complete the last step holds what is known so far.
     neighbours : Neighbours
-        The model against all that are one exchange away.
+        The model against all that differ from it by one effect.
 
     Examples
     --------
@@ -167,17 +175,19 @@ class Study:
         first, last = self.steps[0], self.steps[-1]
         if self.verdict == NONE:
             head = (
-                f"Nothing is missing: with refitted parameters the model errs by {first.nrmse:.2%}, "
+                f"Nothing is missing: with refitted parameters the model errs by {percent(first.nrmse)}, "
                 "the noise of these data."
             )
         else:
             added = ", ".join(_words(e) for e in self.effects) or "nothing"
             held = ""
             if math.isfinite(first.nrmse_holdout + last.nrmse_holdout):
-                held = f", on held-out data from {first.nrmse_holdout:.2%} to {last.nrmse_holdout:.2%}"
+                held = (
+                    f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
+                )
             head = (
-                f"Added: {added}. The error falls from {first.nrmse:.2%} to {last.nrmse:.2%}{held} "
-                f"(noise {self.noise:.2%})."
+                f"Added: {added}. The error falls from {percent(first.nrmse)} to {percent(last.nrmse)}{held} "
+                f"(noise {percent(self.noise)})."
             )
         if self.verdict == UNKNOWN and last.diagnosis is not None:
             d = last.diagnosis
@@ -185,7 +195,8 @@ class Study:
             head += " " + left
         if self.status != COMPLETE:
             head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
-        lines = [" ".join([head, *self.story]), "", self.table(), ""]
+        told = [line for line in (which_errors(self.measure),) if line]
+        lines = [" ".join([head, *self.story]), "", self.table(), *told, ""]
         if self.neighbours:
             lines += [str(self.neighbours.table()), ""]
         for name, p in self.model.parameters.items():

@@ -1,4 +1,4 @@
-"""The final model of a ladder beside all models that are one exchange away."""
+"""The final model of a ladder beside all models that differ from it by one effect."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...numerals import percent
 from ...table import Table, frame
 
 BETTER, EQUAL, WORSE = "better", "equal", "worse"
@@ -15,7 +16,7 @@ DROP, EXCHANGE, ADD = "drop", "exchange", "add"
 
 @dataclass(frozen=True, eq=False)
 class Neighbour:
-    """A model one exchange away from the final one.
+    """A model that differs from the final one by one effect.
 
     Attributes
     ----------
@@ -26,7 +27,7 @@ class Neighbour:
     added : str
         Id of the effect put in; empty where none was.
     evidence : float
-        Log likelihood ratio over the final model [nats], less the price of parameters (Schwarz): positive
+        Log-likelihood ratio over the final model, less the price of parameters (Schwarz): positive
         where the data speak for the neighbour.
     nrmse, nrmse_holdout : float
         Errors, on training and on held-out data (NaN: not `refitted`).
@@ -62,7 +63,7 @@ class Neighbour:
 
 @dataclass(frozen=True, eq=False)
 class Neighbours(Sequence):
-    """The final model of a ladder against all models that are one exchange away, nearest first.
+    """The final model of a ladder against all models that differ by one effect, nearest first.
 
     Attributes
     ----------
@@ -108,7 +109,7 @@ class Neighbours(Sequence):
         """What they come to, in plain words."""
         if not self.rows:
             return ""
-        how = f"{len(self.rows)} models one exchange away were looked at"
+        how = f"{len(self.rows)} models that differ from it by one effect were tried"
         how += "" if self.complete else " before the time was over"
         better, equal = self.of(BETTER), [n for n in self.of(EQUAL) if n.change != ADD]
         found = [f"{how}: {_listed(better)} would do better." if better else f"{how}: none does better."]
@@ -122,8 +123,8 @@ class Neighbours(Sequence):
         nearest = next((n for n in self.rows if n.verdict == WORSE and n.change == EXCHANGE), None)
         if nearest is not None and not others and not better:
             found.append(
-                f"The nearest exchange, {_told(nearest)}, is {-nearest.evidence:.0f} nats behind"
-                + ("." if nearest.refitted else " at a first look.")
+                f"The best with one effect replaced, {_told(nearest)}, has a log-likelihood lower by "
+                f"{-nearest.evidence:.0f}" + ("." if nearest.refitted else " (not refitted in full).")
             )
         return " ".join(found)
 
@@ -171,4 +172,4 @@ def _words(name: str) -> str:
 
 
 def _percent(value: float) -> str:
-    return f"{100 * value:.3g} %" if math.isfinite(value) else "–"
+    return percent(value)

@@ -9,7 +9,7 @@ from ...drawing import draw
 from .diagnosis import Diagnosis
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrequencyDiagnosis(Diagnosis):
     """A `Diagnosis` from tables; `noise` and `structure` are relative to ``|N|``.
 

@@ -62,7 +62,7 @@ class TableComparison:
         return rms(self.relative[np.isfinite(self.relative)])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FrequencyComparison(ComparisonBase):
     """Outcome of `compare` for tables: all points together in the figures, each table in `records`.
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...numerals import percent
 from ..course import Course
 from ..estimation.common_friction import inertia
 from ..results.explain import places
@@ -302,8 +303,8 @@ class TableSearch(Search):
         where = plane_regions(self.points, (best if unknown else self.base).error)
         look = places(where) or "the error is spread over the whole plane."
         remains = (
-            f"Neighbouring points err alike: {remainder.structure:.2%} beside {remainder.noise:.2%} of "
-            f"scatter. Look here: {look}"
+            f"Neighbouring points err alike: {percent(remainder.structure)} beside "
+            f"{percent(remainder.noise)} of scatter. Look here: {look}"
         )
         far = np.count_nonzero(outlying(best.error))
         note = (

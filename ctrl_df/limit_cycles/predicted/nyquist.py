@@ -7,6 +7,7 @@ import warnings
 import control as ct
 import numpy as np
 
+from ...calls import unknown_keywords
 from ..thresholds import INDENT, OMEGA_POINTS, OMEGA_POINTS_DRAWN
 from .linear import LinearPart
 from .scan_grid import refined_omega
@@ -62,6 +63,6 @@ def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
 def _rest(kwargs, check):
     known = {"omega_limits", "omega_num", "return_contour", "_kwargs"}
     unknown = [k for k in kwargs if k not in known and not k.startswith(("indent_", "encirclement_"))]
-    if check and unknown:
-        raise TypeError(f"unrecognized keywords: {', '.join(unknown)}")
+    if check:
+        unknown_keywords("the Nyquist plot", {k: kwargs[k] for k in unknown}, (*known, "indent_radius"))
     return kwargs

@@ -13,6 +13,7 @@ from ...blocks.coordinates import moving_in
 from ...checks import known_name
 from ...identify.data.quantities import word_of
 from ...identify.prediction.segments import facts
+from ...numerals import digits, probability
 from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
 _LOOKS = ((MODEL, "-"), ("#b3541e", "--"), ("#1b7837", "-."), ("k", ":"))
@@ -22,7 +23,7 @@ _KINDS = {"low_speed": "speed"}  # the region may as well be one of high speed
 
 
 def comparison_plot(
-    comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None, **keywords
+    comparison, record=None, *, output=None, beside=(), labels=(), title=None, rows=8, width=None
 ) -> ct.ControlPlot:
     """Draw a `Comparison`; see `ctrl_df.identify.compare.Comparison.plot`.
 
@@ -55,7 +56,7 @@ def comparison_plot(
     names = [*labels, *(f"model {i + 1}" for i in range(len(labels), len(models)))]
     if len(models) == 1 and not labels:
         names = ["simulated"]
-    with page(0.72, narrow=1.9, width=width, keywords=keywords) as drawn:
+    with page(0.72, narrow=1.9, width=width) as drawn:
         found = drawn.rows(
             wide=["yw", "ew"], narrow=["y", "e", "w"], width_ratios=(2.0, 1), narrow_ratios=(1.2, 1, 1.3)
         )
@@ -81,8 +82,8 @@ def comparison_plot(
         legend_above(top, told)
         white = chosen.white
         below.set_title(
-            f"rmse {factor * chosen.rmse:.3g} {small}; {'white' if white else 'not white'} "
-            f"(p {'< 1e-6' if white.p_value < 1e-6 else f'= {white.p_value:.2g}'})"
+            f"rmse {digits(factor * chosen.rmse)} {small}; {'white' if white else 'not white'} "
+            f"(p{probability(white.p_value)})"
         )
         below.set_ylabel(f"measured - simulated [{small}]")
         below.set_xlabel("time [s]")

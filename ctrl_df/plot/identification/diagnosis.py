@@ -7,11 +7,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ...identify.results.diagnosis import rivals
+from ...numerals import certainty, digits
 from ..parts.labels import settle
 from ..parts.page import MODEL, OTHER, QUIET, page
 
 
-def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> ct.ControlPlot:
+def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None) -> ct.ControlPlot:
     """Draw a `Diagnosis`: held-out error of every candidate beside that of the refitted model.
 
     Parameters
@@ -25,7 +26,7 @@ def plot_diagnosis(diagnosis, *, rows=8, title=None, width=None, **keywords) -> 
         Of a new figure [in].
     """
     inches = 1.0 + 0.3 * (min(rows, len(diagnosis.ranking)) + 1)
-    with page(inches / 7.0, narrow=inches / 3.3, width=width, keywords=keywords) as drawn:
+    with page(inches / 7.0, narrow=inches / 3.3, width=width) as drawn:
         ax = drawn.panels(1)[0]
         bars = draw_ranking(ax, diagnosis, rows)
         of = "acceleration" if diagnosis.measure == "acceleration" else "output"
@@ -62,7 +63,11 @@ def draw_ranking(ax, diagnosis, rows):
     end = 1.15 * max(values[np.isfinite(values) & (values <= 2 * values[0])], default=1.0)
     at = np.arange(len(values))[::-1]
     known = np.isfinite(values)
-    bars = ax.barh(at, np.where(known, np.minimum(values, end), 0.0), color=shades, height=0.62)
+    # An error of next to nothing is still a line: a bar's edge has a width.
+    bars = ax.barh(
+        at, np.where(known, np.minimum(values, end), 0.0), color=shades, height=0.62, edgecolor=shades,
+        linewidth=np.where(known, 2.0, 0.0),
+    )  # fmt: skip
     ax.set_yticks(at, labels)
     ax.set_ylim(-0.6, len(values) - 0.4)
     small = plt.rcParams["legend.fontsize"]
@@ -71,12 +76,13 @@ def draw_ranking(ax, diagnosis, rows):
         if not np.isfinite(value):
             notes.append(ax.text(0, y, " not confirmed", va="center", fontsize=small, color="0.45"))
             continue
-        text = f" {value:.3g} %" + (" >>" if value > end else "")
+        text = f"  {digits(value)} %" + (" >>" if value > end else "")
         if c is not None and c.probability >= 0.005:
-            text += f"  p = {c.probability:.0%}"
+            sure = certainty(c.probability)
+            text += f"  p {sure}" if sure.startswith(">") else f"  p = {sure}"
         if c is not None and c.equivalents:
             same = [e.replace("_", " ") for e in c.equivalents]
-            text += "\n same as " + ", ".join(same[:2]) + (" …" if len(same) > 2 else "")
+            text += "\n not told from " + ", ".join(same[:2]) + (" …" if len(same) > 2 else "")
         notes.append(ax.text(min(value, end), y, text, va="center", fontsize=small, linespacing=0.95))
     _make_room(ax, end, notes)
     return bars

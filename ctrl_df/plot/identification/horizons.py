@@ -7,10 +7,12 @@ import control as ct
 from ..parts.curves import log_ticks
 from ..parts.page import ERROR, MEASURED, MODEL, legend_above, page
 
+_LEAST_SPAN = 4.0
+"""Upper over lower end of the errors shown, at least."""
 _COLOURS = (MODEL, ERROR, MEASURED, "#3f8f5f", "#8a5fa8")
 
 
-def horizons_plot(curves, *, labels=(), title=None, width=None, **keywords) -> ct.ControlPlot:
+def horizons_plot(curves, *, labels=(), title=None, width=None) -> ct.ControlPlot:
     """Draw one or more `ErrorByHorizon`.
 
     Parameters
@@ -23,7 +25,7 @@ def horizons_plot(curves, *, labels=(), title=None, width=None, **keywords) -> c
     width : float or None
         Of a new figure [in].
     """
-    with page(0.55, narrow=0.8, width=width, keywords=keywords) as drawn:
+    with page(0.55, narrow=0.8, width=width) as drawn:
         ax, lines = drawn.panels(1)[0], []
         for i, curve in enumerate(curves):
             label = labels[i] if i < len(labels) else None
@@ -31,6 +33,9 @@ def horizons_plot(curves, *, labels=(), title=None, width=None, **keywords) -> c
             lines.append(ax.plot(curve.horizon, 100 * curve.nrmse, "o-", ms=4, color=colour, label=label))
         ax.set_xscale("log")
         ax.set_yscale("log")
+        low, high = ax.get_ylim()
+        spread = max(1.0, (_LEAST_SPAN * low / high) ** 0.5)  # a change of a percent is none to the eye
+        ax.set_ylim(low / spread, high * spread)
         log_ticks(ax.xaxis, *ax.get_xlim())
         log_ticks(ax.yaxis, *ax.get_ylim())
         ax.set_xlabel("time predicted freely [s]")

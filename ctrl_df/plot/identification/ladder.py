@@ -8,6 +8,7 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...numerals import digits
 from ..parts.curves import log_ticks
 from ..parts.page import MODEL, OTHER, legend_above, page
 
@@ -19,7 +20,7 @@ OF = {
 """What errors are drawn as shares of."""
 
 
-def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
+def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
     """Draw the error of each step on training and held-out data; the grey band is the noise floor.
 
     Parameters
@@ -31,7 +32,7 @@ def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
         Of a new figure [in].
     """
     steps = study.steps
-    with page(0.52, narrow=0.95, width=width, keywords=keywords) as drawn:
+    with page(0.52, narrow=0.95, width=width) as drawn:
         ax = drawn.panels(1)[0]
         small = plt.rcParams["legend.fontsize"]
         at = np.arange(len(steps))
@@ -49,9 +50,9 @@ def plot_ladder(study, *, title=None, width=None, **keywords) -> ct.ControlPlot:
         ax.set_ylim(bottom, 2.2 * np.nanmax([*train, *held]))
         log_ticks(ax.yaxis, *ax.get_ylim())
         for x, a, b in zip(at, train, held, strict=True):
-            ax.text(x - 0.19, a * 1.05, f"{a:.2g}", ha="center", fontsize=small)
+            ax.text(x - 0.19, a * 1.05, digits(a, 2), ha="center", fontsize=small)
             if np.isfinite(b):  # a ladder that ended early may not have been tried on what is held out
-                ax.text(x + 0.19, b * 1.05, f"{b:.2g}", ha="center", fontsize=small)
+                ax.text(x + 0.19, b * 1.05, digits(b, 2), ha="center", fontsize=small)
         ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
         room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
         ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])

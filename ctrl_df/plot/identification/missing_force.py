@@ -10,7 +10,7 @@ from ..parts.page import legend_above, page
 _POINTS, _CURVE = "#7f9cc6", "#b3402a"
 
 
-def missing_force_plot(missing, *, against="time", title=None, width=None, **keywords) -> ct.ControlPlot:
+def missing_force_plot(missing, *, against="time", title=None, width=None) -> ct.ControlPlot:
     """Draw a `MissingForce`; see `ctrl_df.identify.smoothing.missing_force.MissingForce.plot`.
 
     Parameters
@@ -24,7 +24,7 @@ def missing_force_plot(missing, *, against="time", title=None, width=None, **key
     width : float or None
         Of a new figure [in].
     """
-    with page(0.55, narrow=0.8, width=width, keywords=keywords) as drawn:
+    with page(0.55, narrow=0.8, width=width) as drawn:
         ax = drawn.panels(1)[0]
         what = missing.words["force"]
         if against == "time":
@@ -44,6 +44,11 @@ def missing_force_plot(missing, *, against="time", title=None, width=None, **key
                 label="mean, two standard errors",
             )  # fmt: skip
             lines = [[points, means]]
+            if not len(curve.points[0]):
+                ax.text(
+                    0.5, 0.6, f"the record tells of no missing {what}:\nnowhere larger than its uncertainty",
+                    transform=ax.transAxes, ha="center", va="bottom",
+                )  # fmt: skip
         ax.axhline(0.0, color="0.6", lw=0.7, zorder=0)
         ax.set_xlabel(f"{missing.words[against]} [{missing.units[against]}]")
         along = " along the motion" if against == "reversal" else ""

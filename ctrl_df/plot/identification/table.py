@@ -6,14 +6,13 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...numerals import digits
 from ..parts.curves import log_ticks
 from ..parts.page import legend_above, page
 from .diagnosis import draw_ranking, verdict_title
 
 
-def table_comparison_plot(
-    comparison, record=None, *, title=None, curves=6, width=None, **keywords
-) -> ct.ControlPlot:
+def table_comparison_plot(comparison, record=None, *, title=None, curves=6, width=None) -> ct.ControlPlot:
     """Draw a `FrequencyComparison`: magnitude and phase over frequency, dots measured, lines model; error.
 
     Parameters
@@ -30,14 +29,14 @@ def table_comparison_plot(
     """
     chosen = comparison.worst if record is None else comparison.records[record]
     data = chosen.record
-    with page(0.62, narrow=2.1, width=width, keywords=keywords) as drawn:
+    with page(0.62, narrow=2.1, width=width) as drawn:
         found = drawn.rows(
             wide=["ne", "pe"], narrow=["n", "p", "e"], width_ratios=(1.25, 1), narrow_ratios=(1.2, 1, 1.2)
         )
         top, below, plane = found["n"], found["p"], found["e"]
         below.sharex(top)
         dots, lines = _over_frequency(top, below, data, chosen, curves)
-        legend_above(top, f"error {100 * chosen.nrmse:.3g} % of |N| (dots measured, lines model)")
+        legend_above(top, f"error {digits(100 * chosen.nrmse)} % of |N| (dots measured, lines model)")
         cells = error_plane(drawn.figure, plane, data, np.abs(chosen.relative))
         plane.set_title("error over the plane")
         drawn.keep = [top, below, plane]
@@ -62,7 +61,7 @@ def _over_frequency(top, below, data, chosen, curves):
         lines += top.loglog(w, np.abs(model), "-", color=shade, lw=1.1)
         below.semilogx(w, phase, "o", color=shade, ms=3)
         below.semilogx(w, phase + step, "-", color=shade, lw=1.1)
-        lines[-1].set_label(f"{data.A[i]:.3g} {data.input_unit}")
+        lines[-1].set_label(f"{digits(data.A[i])} {data.input_unit}")
     top.set_ylabel(f"|N| [{data.output_unit}/{data.input_unit}]")
     below.set_ylabel("phase [deg]")
     below.set_xlabel("frequency ω [rad/s]")
@@ -104,7 +103,7 @@ def _edges(values):
     return np.exp(np.concatenate([[2 * place[0] - middle[0]], middle, [2 * place[-1] - middle[-1]]]))
 
 
-def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **keywords) -> ct.ControlPlot:
+def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None) -> ct.ControlPlot:
     """Draw a `FrequencyDiagnosis`: the ranking, and the error on the plane before and after the first of it.
 
     Parameters
@@ -118,7 +117,7 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **key
         Of a new figure [in].
     """
     inches = 0.9 + 0.3 * (min(rows, len(diagnosis.ranking)) + 1)
-    with page((inches + 2.9) / 7, narrow=(inches + 4.4) / 3.3, width=width, keywords=keywords) as drawn:
+    with page((inches + 2.9) / 7, narrow=(inches + 4.4) / 3.3, width=width) as drawn:
         found = drawn.rows(
             wide=["rr", "ba"], narrow=["r", "b", "a"], height_ratios=(inches, 2.9),
             narrow_ratios=(inches, 2.2, 2.2),
@@ -131,10 +130,10 @@ def plot_frequency_diagnosis(diagnosis, *, rows=6, title=None, width=None, **key
         data = diagnosis.before.records[i].record
         error_plane(drawn.figure, left, data, before, limits, bar=drawn.narrow)
         error_plane(drawn.figure, right, data, after, limits)
-        left.set_title(f"model refitted, {100 * diagnosis.nrmse:.3g} %")
+        left.set_title(f"model refitted, {digits(100 * diagnosis.nrmse)} %")
         name = diagnosis.ranking[0].id.replace("_", " ") if diagnosis.ranking else "nothing"
         error = diagnosis.ranking[0].nrmse if diagnosis.ranking else diagnosis.nrmse
-        right.set_title(f"with {name}, {100 * error:.3g} %")
+        right.set_title(f"with {name}, {digits(100 * error)} %")
         if not drawn.narrow:
             right.set_ylabel("")
         ax.set_xlabel("held-out error, rms over |N| [%]")

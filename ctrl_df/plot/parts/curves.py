@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib import ticker
 
 from ...blocks.mechanism import Mechanism
+from ...numerals import digits
 from ...units import over
 from .labels import Labels, settle
 from .page import AMPLITUDE_COLOR, OMEGA_COLOR
@@ -97,7 +98,7 @@ def name_amplitudes(labels: Labels, amplitudes, curve, color, *, ticks=4):
     chosen = inside[np.unique(np.linspace(0, inside.size - 1, ticks).round().astype(int))]
     ax.plot(np.real(curve[chosen]), np.imag(curve[chosen]), ".", color=color, ms=5)
     for i in chosen:
-        text = f"{'A = ' if i == chosen[0] else ''}{amplitudes[i]:.3g}"
+        text = f"{'A = ' if i == chosen[0] else ''}{digits(amplitudes[i])}"
         labels.write(
             text, [(curve[i].real, curve[i].imag)],
             offsets=((3, -4), (3, 4), (-3, 4), (-3, -4), (0, 8), (0, -8)), color=color,
@@ -144,7 +145,7 @@ def name_curves(labels: Labels, names):
             continue
         some = inside[np.unique(np.linspace(0, inside.size - 1, 16).round().astype(int))]
         written = labels.write(
-            f"{value:.3g}" if symbol in said else f"{symbol} = {value:.3g}{unit}",
+            f"{digits(value)}" if symbol in said else f"{symbol} = {digits(value)}{unit}",
             [(z.real, z.imag) for z in some], offsets=((3, 3), (3, -3), (-3, 3), (-3, -3)), color=color,
             bbox=dict(boxstyle="round,pad=0.05", fc="white", ec="none", alpha=0.8),
         )  # fmt: skip

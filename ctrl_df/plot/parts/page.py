@@ -38,7 +38,7 @@ def style(width: float) -> dict:
         "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7,
         "axes.grid": False, "grid.color": "0.92", "grid.linewidth": 0.6, "lines.linewidth": 1.4,
         "xtick.major.width": 0.7, "ytick.major.width": 0.7,
-        "axes.formatter.use_mathtext": True, "axes.formatter.limits": (-4, 4),
+        "axes.formatter.use_mathtext": True, "axes.formatter.limits": (-4, 6),
     }  # fmt: skip
 
 
@@ -146,7 +146,7 @@ class Page:
 
 
 @contextmanager
-def page(height: float, *, narrow: float | None = None, width: float | None = None, ax=None, keywords=None):
+def page(height: float, *, narrow: float | None = None, width: float | None = None, ax=None):
     """Begin a picture: on the axes given, else on the current figure if it is empty, else on a new one.
 
     Parameters
@@ -156,16 +156,7 @@ def page(height: float, *, narrow: float | None = None, width: float | None = No
     width : float or None
         Of a new figure [in]; None: `WIDE`.
     ax : Axes, array of them, or None
-    keywords : mapping or None
-        Further ones of the caller, which no picture knows.
-
-    Raises
-    ------
-    TypeError
-        `keywords`.
     """
-    if keywords:
-        raise TypeError(f"unrecognized keyword(s): {', '.join(keywords)}")
     given = [] if ax is None else list(np.ravel(np.asarray(ax, dtype=object)))
     wide = WIDE if width is None else positive("a picture", "width", width, "in")
     if given:
