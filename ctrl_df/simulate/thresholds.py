@@ -209,8 +209,8 @@ EXPONENTIAL_HALVINGS, CURVED_HALVINGS = 12, 40
 and where stiff laws decay within the step."""
 
 CURVATURE_TERMS, CURVATURE_SHARE, CURVATURE_EXCESS = 64, 1e-6, 1.001
-"""Terms at most of the series that limits a margin's curvature, all of one sign; the share of its sum at which
-it ends; what stands for the rest. More terms sum exp(20), a limit that no margin keeps."""
+"""Terms at most of the series that limits a margin's curvature, all of one sign; the share of its sum at
+which it ends; what stands for the rest. More terms sum exp(20), a limit that no margin keeps."""
 
 EXPONENTIAL_SHARE, CURVED_SHARE = 1e-3, 0.1
 """Share of an eps at which its series ends: twelve squarings make four eps of it; and where steps
