@@ -83,8 +83,8 @@ def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Ca
     """Return the model without an effect, refitted without limits, where that explains more than the best.
 
     Fits keep the model's own parameters within a range of what they were stated to be. Where one ends there,
-    a record or a model in other units than it says is as likely as a missing effect. Where the best errs no
-    more than over the shortest segments nothing is left to explain.
+    a record or a model in other units than it says is as likely as a missing effect. Where the best errs by
+    noise alone nothing is left to explain.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Ca
     spans = {k: span for k, span in at.data.limits.items() if k in at.base.train.names}
     if (
         at.data.disturbed
-        or best.train.rmse <= at.floor
+        or best.train.rmse <= FLOOR * at.data.noise
         or all(a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items())
     ):
         return None
