@@ -67,7 +67,7 @@ for share in (0.7, 1.5):
     ax.plot(t, x, lw=0.8, label=f"pushed by {share:g} times the border")
 ax.set_xlabel("time [s]")
 ax.set_ylabel("position [mm]")
-ax.legend()
+figure.legend(loc="outside upper center", ncols=2, frameon=False)
 corrected = large.corrected[1]
 print(f"corrected: {corrected:.3f} rad/s; simulated: {check.rows[1].simulated[0]:.3f} rad/s")
 assert not found[0.02].limit_cycles and not found[0.04].limit_cycles

@@ -67,7 +67,9 @@ for k in range(0, 24, 4):
     ax.loglog(omega, np.abs(family.N[k]), color=plt.cm.copper(k / 24), label=f"{A[k]:.3g} N")
 ax.set_xlabel("frequency [rad/s]")
 ax.set_ylabel("|N| [m/N]")
-ax.legend(title="amplitude", fontsize=8)
+ax.set_xticks([4, 6, 10, 20, 40], ["4", "6", "10", "20", "40"])
+ax.set_xticks([], minor=True)
+figure.legend(title="amplitude", loc="outside right center", frameon=False)
 
 # %%
 # **Check.** What was kept and what was computed after it are bitwise what one call computes without a stop;

@@ -62,7 +62,7 @@ ax.plot(t, 1e3 * np.asarray(theirs.outputs)[0], "0.6", lw=3, label="ct.input_out
 ax.plot(t, 1e3 * np.asarray(ours.outputs)[0], "k", lw=1, label="cdf.event_response")
 ax.set_xlabel("time [s]")
 ax.set_ylabel("position [mm]")
-ax.legend()
+ax.legend(frameon=False)
 
 # %%
 # **Check.** The mass rests where the controller's force is below the friction:

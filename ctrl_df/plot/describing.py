@@ -73,7 +73,7 @@ def describing_function_plot(
         A response, or H, F, A and optionally omega.
     point_label : str or None
         Format of the crossings' labels, two numbers: amplitude and frequency. None: no labels. The default is
-        python-control's, for a mechanism with units and more digits.
+        python-control's, for a mechanism or a family with units and more digits.
     label : str, False or None
         Name of the Nyquist curve.
     exact : Check or sequence of Orbit, optional
@@ -142,8 +142,7 @@ def _placed(response, exact) -> list:
 
 def _over_nyquist(response, point_label, label, exact, kwargs):
     """python-control's Nyquist plot with the single -1/N curve of a memoryless block."""
-    reach = max([15.0, *(3 * abs(p) for p in response.positions)])
-    kwargs.setdefault("max_curve_magnitude", reach)  # its default would bend the curve where the crossing is
+    kwargs.setdefault("max_curve_magnitude", _reach(response))
     if isinstance(label, str):
         kwargs["label"] = label
     width = _width_of(kwargs.get("ax"))
@@ -166,6 +165,20 @@ def _over_nyquist(response, point_label, label, exact, kwargs):
         _mark(labels, response, point_label, exact)
         name_amplitudes(labels, amplitudes, curve, OMEGA_COLOR)
     return ct.ControlPlot(lines, cplt.axes, cplt.figure)
+
+
+def _reach(response) -> float:
+    """Return where a Nyquist curve is cut: five times as far as -1 and the crossings lie.
+
+    A curve that python-control draws whole, within 15, stays whole.
+    """
+    seen = max(_NEAR * abs(p) for p in (-1.0, *response.positions))
+    farthest = np.abs(np.asarray(response.response.response))
+    whole = farthest[np.isfinite(farthest)].max(initial=0.0) <= _CUT
+    return max(seen, _CUT) if whole else seen
+
+
+_NEAR, _CUT = 5.0, 15.0  # python-control's ``nyquist.max_curve_magnitude``
 
 
 def _family_picture(response, point_label, label, exact, kwargs):
@@ -248,7 +261,7 @@ def _kinds(response, exact) -> list[Line2D]:
 def _mark(labels, response, point_label, exact):
     """Mark the crossings and the exact orbits, and write amplitude and frequency beside each."""
     ax, force = labels.ax, units(response.family)[0]
-    if force and point_label == _POINT_LABEL:
+    if point_label == _POINT_LABEL and (force or not memoryless(response.family)):
         point_label = f"%.4g{force} @ %.4g rad/s"
     for position, cycle in zip(response.positions, response.limit_cycles, strict=True):
         ax.plot(position.real, position.imag, **{**_look(cycle), "ms": 7})

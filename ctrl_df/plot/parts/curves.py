@@ -90,19 +90,35 @@ def draw_single(ax, amplitudes, curve, **kwargs):
 
 
 def name_amplitudes(labels: Labels, amplitudes, curve, color, *, ticks=4):
-    """Mark a few amplitudes along the -1/N curve of a memoryless block."""
+    """Mark a few amplitudes along the -1/N curve of a memoryless block, fewer where it is short.
+
+    A mark on a crossing, or without room for its number, is left out.
+    """
     ax = labels.ax
     inside = np.nonzero(_inside(ax, curve))[0]
     if not inside.size:
         return
-    chosen = inside[np.unique(np.linspace(0, inside.size - 1, ticks).round().astype(int))]
-    ax.plot(np.real(curve[chosen]), np.imag(curve[chosen]), ".", color=color, ms=5)
+    at = ax.transData.transform(np.column_stack([curve.real, curve.imag])[inside])
+    letter = ax.xaxis.label.get_size() * ax.figure.dpi / 72
+    length = float(np.linalg.norm(np.diff(at, axis=0), axis=1).sum())
+    count = int(np.clip(length / (_APART * letter) + 1, 2, ticks))
+    wanted = np.linspace(0, length, count)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(at, axis=0), axis=1))])
+    chosen = inside[np.unique([int(np.argmin(np.abs(along - w))) for w in wanted])]
+    named = False
     for i in chosen:
-        text = f"{'A = ' if i == chosen[0] else ''}{digits(amplitudes[i])}"
-        labels.write(
-            text, [(curve[i].real, curve[i].imag)],
-            offsets=((3, -4), (3, 4), (-3, 4), (-3, -4), (0, 8), (0, -8)), color=color,
-        )  # fmt: skip
+        place = (curve[i].real, curve[i].imag)
+        if labels.covers(place):
+            continue
+        text = f"{'' if named else 'A = '}{digits(amplitudes[i])}"
+        if labels.write(text, [place], offsets=_BESIDE, color=color) is not None:
+            named = True
+            ax.plot(*place, ".", color=color, ms=5)
+
+
+_APART = 4.0  # between two amplitudes named along a curve, in heights of a letter
+_BESIDE = ((0, 5), (0, -5), (3, -4), (3, 4), (-3, 4), (-3, -4), (0, 14), (0, -14), (8, 14), (-8, -14))
+"""Where the number of an amplitude may stand [pt], the best first."""
 
 
 def draw_curves(ax, family, amplitudes=5, frequencies=5, **kwargs):

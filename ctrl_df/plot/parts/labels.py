@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.transforms import Bbox
 
-_ROOM = 1.0  # [pixels] between two labels
+_ROOM = 2.0  # [pt] around a label: two of them side by side stand a letter apart
 
 
 class Labels:
@@ -52,6 +52,10 @@ class Labels:
         reach = 0.5 * size * self.ax.figure.dpi / 72
         for x, y in self.ax.transData.transform(np.reshape(places, (-1, 2))):
             self.block([[x - reach, y - reach], [x + reach, y + reach]])
+
+    def covers(self, place) -> bool:
+        """Whether a label or a marker kept free of labels lies on a place in data."""
+        return any(box.contains(*self.ax.transData.transform(place)) for box in self.taken)
 
     def write(self, text, places, *, offsets=((4, 4),), must=False, avoid=True, **style):
         """Write a label at the first of some places, or of those the one that covers least; None: nowhere.
@@ -104,7 +108,7 @@ class Labels:
         out = max(frame.x0 - box.x0, box.x1 - frame.x1, frame.y0 - box.y0, box.y1 - frame.y1)
         if out > 0:
             cost += _COVERED * (1 + out)
-        spared = box.padded(_ROOM)
+        spared = box.padded(_ROOM * self.ax.figure.dpi / 72)
         cost += _COVERED * sum(spared.overlaps(other) for other in self.taken)
         if not avoid:
             return cost
