@@ -131,7 +131,7 @@ def characteristic(effect, bare, full, path):
         units = dict.fromkeys(b.signals[b.input_labels[0]] for b in (bare, full))
         axes[0, 0].set_xlabel(f"{words.force}, slow [{' or '.join(units)}]")
         axes[0, 0].set_ylabel(f"{words.position} shown [m{words.unit}]")
-        axes[0, 0].legend()
+        figure.legend(loc="outside upper left", ncols=2)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -146,7 +146,7 @@ def on_plane(bare, full, path):
     for k, (a, style) in enumerate(zip(A, (":", "--", "-"), strict=True)):
         axes[0].semilogx(
             omega, 20 * np.log10(np.abs(ratio[k])), color=ACCENT, ls=style, lw=1.3,
-            label=f"{a:g} {words.force_unit}",
+            label=f"{words.force} {a:g} {words.force_unit}",
         )  # fmt: skip
         axes[1].semilogx(omega, np.degrees(np.angle(ratio[k])), color=ACCENT, ls=style, lw=1.3)
     for ax, title, unit in zip(
@@ -160,7 +160,7 @@ def on_plane(bare, full, path):
         ax.set_ylabel(unit)
         low, high = ax.get_ylim()
         ax.set_ylim(min(low, -0.1), max(high, 0.1))
-    axes[0].legend(title=words.force)
+    figure.legend(loc="outside lower center", ncols=3)
     figure.savefig(path, dpi=110)
     plt.close(figure)
 

@@ -168,6 +168,11 @@ def hunting(model, gains, share):
     return cdf.describing_function_response(cdf.pid(stiffness, integral, damping), model, *box)
 
 
+def tell(line):
+    """Print what is being done beside the table."""
+    print(line, file=sys.stderr, flush=True)
+
+
 # %%
 def main(folder, report=None):
     """Tell the story; returns the study and the model with the effect of our own."""
@@ -178,8 +183,15 @@ def main(folder, report=None):
     print(f"{'':<26}{'   train    test   ' * 2}{'   train    with    test    with'}")
     print(line("published, symmetric", published, train, test), flush=True)
 
-    # the ladder: what does the library find? A fourth rung, a lag of the drive, takes as long as these three.
-    study = cdf.improve(published, train, test, 3, candidates=LIBRARY)
+    # the ladder: what does the library find? It tells on stderr what it does, and here what it knows so far.
+    known: list = []
+
+    def so_far(study):
+        if not known or known[-1] != (study.verdict, study.effects):
+            known.append((study.verdict, study.effects))
+            print(f"  so far: {study.verdict}, {', '.join(study.effects) or 'nothing added'}", flush=True)
+
+    study = cdf.improve(published, train, test, 3, candidates=LIBRARY, progress=tell, callback=so_far)
     for step in study.steps:
         print(line(f"+ {step.effect}" if step.effect else "refitted", step.model, train, test), flush=True)
 
