@@ -157,8 +157,11 @@ LIBRARY = tuple(k for k in cdf.effect_library() if k != "rising_friction")
 def hunting(model, gains, share):
     """Return the predicted limit cycles in the drive's own loop with an integral added.
 
-    `share`: of the integral gain at which the loop without dry friction would be unstable.
+    `share`: of the integral gain at which the loop without dry friction would be unstable. A ripple is
+    left out: it is another force wherever the loop cycles.
     """
+    if "position_ripple" in (e.id for e in model.effects):
+        model = model.without_effect("position_ripple")
     gtau, kp, kv = gains
     stiffness, damping = gtau * kv * kp, gtau * kv
     mass, viscous = (model.parameters[k].value for k in ("mass", "viscous.coefficient"))
@@ -187,9 +190,11 @@ def main(folder, report=None):
     known: list = []
 
     def so_far(study):
-        if not known or known[-1] != (study.verdict, study.effects):
-            known.append((study.verdict, study.effects))
-            print(f"  so far: {study.verdict}, {', '.join(study.effects) or 'nothing added'}", flush=True)
+        added = ", ".join(study.effects) or "nothing"
+        likely = next((c.id for c in study.steps[-1].diagnosis.ranking if c.id not in study.effects), "none")
+        if (added, likely) not in known:
+            known.append((added, likely))
+            print(f"  so far added: {added}; likely next: {likely}", flush=True)
 
     study = cdf.improve(published, train, test, 3, candidates=LIBRARY, progress=tell, callback=so_far)
     for step in study.steps:

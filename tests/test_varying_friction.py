@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.prediction.initial_states import MEASURED
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator
+from ctrl_df.identify.selection.named import whole_refit
 from ctrl_df.identify.shooting.noise_model import (
     acceleration_filter,
     noise_model,
@@ -142,3 +144,11 @@ def test_hidden_states_go_on_from_window_to_window(effect):
     begun_anew = Simulator(block, data).run(exact) - y[windows.samples]
     later = windows.samples >= windows.begins[1]
     assert np.abs(gone_on[later]).max() < 0.02 * np.abs(begun_anew[later]).max()
+
+
+def test_what_accelerations_judge_is_not_refitted_by_outputs(study):
+    """On such records a refit by outputs moved the best candidate by hundreds of nats, off the truth."""
+    data = SimpleNamespace(disturbed=True)
+    tried = SimpleNamespace(train=SimpleNamespace(names=("mass",)))
+    assert whole_refit(SimpleNamespace(data=SimpleNamespace(fine=data)), tried, None, seen=True) is tried
+    assert study.steps[0].diagnosis.ranking[0].evidence > 20

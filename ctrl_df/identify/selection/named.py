@@ -47,7 +47,8 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> Candida
     """Return a candidate with the values that `refit` finds from its own.
 
     It stays as it is where the segments that judge speak against these, or tell parameters that the refit
-    leaves open.
+    leaves open; and where disturbance forces outweigh the noise: then accelerations judge, the refit goes by
+    outputs, and what is best by these may be far from the best by those.
 
     Parameters
     ----------
@@ -58,6 +59,8 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> Candida
         of them that are held out, what is told else is of the last fit that has not.
     """
     data, names = at.data.fine, tried.train.names
+    if data.disturbed:
+        return tried
 
     def found_from(model, start):
         return refit_records(
@@ -66,7 +69,7 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> Candida
         )[0]  # fmt: skip
 
     found = found_from(tried.block, {})
-    if not data.disturbed and found.rmse > FLOOR * at.floor:
+    if found.rmse > FLOOR * at.floor:
         # a minimum beside the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
     if blurred(found) - blurred(tried.train):

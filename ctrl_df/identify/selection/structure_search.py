@@ -118,8 +118,8 @@ class StructureSearch(Search):
 
     def in_full(self):
         """Return the model refitted over stretches as long as it can be followed."""
-        found = None if self.at.data.disturbed else self._whole_refit(self.at, self.base)
-        return None if found is None or found is self.base else found.block
+        found = self._whole_refit(self.at, self.base)
+        return None if found is self.base else found.block
 
     def _whole_refit(self, at: Standing, tried: CandidateFit, seen: bool = False) -> CandidateFit:
         return whole_refit(at, tried, self.prior, seen or bool(self.records[1]))

@@ -42,7 +42,8 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
             ax.bar(at - 0.19, train, 0.36, color=OTHER, label="fitted data"),
             ax.bar(at + 0.19, held, 0.36, color=MODEL, label="held-out data"),
         ]
-        bottom = 0.5 * min(100 * study.noise, train.min(), np.nanmin([*held, *train]))
+        levels = np.array([100 * study.noise, *train, *held])
+        bottom = 0.5 * levels[levels > 0].min()  # noise is 0 where disturbance forces outweigh it
         noise = ax.axhspan(
             bottom, max(100 * study.noise, bottom * 1.001), color="0.88", zorder=0, label="noise"
         )
