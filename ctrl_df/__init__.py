@@ -12,6 +12,7 @@ Two flows run through the package::
 
 import sys as _sys
 from importlib import import_module as _import_module
+from typing import TYPE_CHECKING as _TYPE_CHECKING
 
 from .blocks.effect import Effect, effect_class, effect_library, register_effect
 from .blocks.effects import *  # noqa: F403
@@ -76,6 +77,38 @@ _LAZY = {
     "warm_up": "warm",
     "show_versions": "versions",
 }
+
+if _TYPE_CHECKING:  # the same names for editors and type checkers, which run nothing
+    from .df.describing import describing_function as describing_function
+    from .df.describing import describing_function_family as describing_function_family
+    from .df.family import Family as Family
+    from .df.family import load_family as load_family
+    from .df.warning import DescribingFunctionWarning as DescribingFunctionWarning
+    from .gains.limit_cycle_map import limit_cycle_map as limit_cycle_map
+    from .gains.map import LimitCycleMap as LimitCycleMap
+    from .gains.tune import TunedPID as TunedPID
+    from .gains.tune import tune_pid as tune_pid
+    from .identify.compare import compare as compare
+    from .identify.data.frequency_measurement import FrequencyMeasurement as FrequencyMeasurement
+    from .identify.data.measurement import Measurement as Measurement
+    from .identify.diagnose import diagnose as diagnose
+    from .identify.improve import improve as improve
+    from .identify.refit import refit as refit
+    from .limit_cycles.exact.orbit import Orbit as Orbit
+    from .limit_cycles.finder import find_limit_cycle as find_limit_cycle
+    from .limit_cycles.predicted.grade import LimitCycle as LimitCycle
+    from .limit_cycles.predicted.predict import DescribingFunctionResponse as DescribingFunctionResponse
+    from .limit_cycles.predicted.predict import describing_function_response as describing_function_response
+    from .limit_cycles.verify import verify as verify
+    from .plot.describing import describing_function_plot as describing_function_plot
+    from .plot.explore import explore as explore
+    from .simulate.batch import batch_response as batch_response
+    from .simulate.imposed_response import imposed_response as imposed_response
+    from .simulate.loop import closed_loop as closed_loop
+    from .simulate.response import event_response as event_response
+    from .simulate.sampled import sampled as sampled
+    from .versions import show_versions as show_versions
+    from .warm import warm_up as warm_up
 
 __all__ = [  # pyright: ignore[reportUnsupportedDunderAll]
     "DescribingFunctionNonlinearity",

@@ -126,7 +126,7 @@ def read_model(path) -> ModelFile:
     plant = _within(path, "plant and effects", lambda: _plant(table))
     controller = dt = None
     if "controller" in table:
-        controller, dt = _within(path, "[controller]", lambda: _controller(table["controller"]))
+        controller, dt = _within(path, "[controller]", lambda: _controller(table["controller"], plant))
     amplitudes, omega = _within(path, "[box]", lambda: _box(table.get("box")))
     data = _within(path, "[data]", lambda: _data(table.get("data", {})))
     closed = bool(data.pop("closed_loop", False))
@@ -145,15 +145,17 @@ def _plant(table) -> Mechanism:
     cls = _PLANTS[kind]
     needed = [n for n, p in inspect.signature(cls).parameters.items() if p.default is inspect.Parameter.empty]
     _known(None, kind, given, (*needed, "measured", "name"))
+    any_values: dict[str, Any] = dict.fromkeys(needed, 1.0)
+    unit_of = cls(**any_values).coordinates.unit_of
     for name in needed:
         if name not in given:
-            raise ValueError(f"{kind} needs {name} [kg]; add it.")
+            raise ValueError(f"{kind} needs {name} [{unit_of('kg')}]; add it.")
         _unquoted(kind, name, given[name])
-    return cls(**given, effects=_effects(table.get("effects", {})))
+    return cls(**given, effects=_effects(table.get("effects", {}), unit_of))
 
 
-def _effects(given) -> list[Effect]:
-    """Build effects from tables [effects.ID] or from a list [[effects]] with id."""
+def _effects(given, unit_of) -> list[Effect]:
+    """Build effects from tables [effects.ID], or a list [[effects]] with id; `unit_of`: as the plant has it."""
     if isinstance(given, Mapping):
         pairs = [(key, dict(_mapping(values, f"effects.{key}"))) for key, values in given.items()]
     elif isinstance(given, list):
@@ -177,16 +179,18 @@ def _effects(given) -> list[Effect]:
         for f in fields:
             if f.name not in values and f.default is f.default_factory is dataclasses.MISSING:
                 unit = f.metadata.get("parameter", {}).get("unit", "")
-                raise ValueError(f"effect {key} needs {f.name} [{unit or '-'}]; add it.")
+                raise ValueError(f"effect {key} needs {f.name} [{unit_of(unit) or '-'}]; add it.")
         made.append(cls(**values))
     return made
 
 
-def _controller(given):
+def _controller(given, plant):
     given = dict(_mapping(given, "controller"))
     _known(None, "controller", given, _GAINS)
     if "kp" not in given:
-        raise ValueError("a controller needs kp [N/m]; add it (0 if there is none).")
+        raise ValueError(
+            f"a controller needs kp [{plant.coordinates.unit_of('N/m')}]; add it (0 if there is none)."
+        )
     numbers = {k: _number(k, v) for k, v in given.items()}
     dt = numbers.pop("dt", 0.0)
     number(

@@ -3,6 +3,7 @@
 import functools
 import json
 import queue
+import re
 import struct
 import sys
 
@@ -186,3 +187,20 @@ def test_what_stops_compiling_ahead_is_said(monkeypatch):
     monkeypatch.setattr(warm, "STEPS", {"nothing": warm.Step(print)})
     with pytest.raises(RuntimeError, match="compiling nothing failed: KeyError: 'nothing'"):
         warm.warm_up()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[plant]\nkind = "inertia"\n', "inertia [kg m^2]"),
+        ('[plant]\nkind = "inertia"\ninertia = 1.0\n[effects.coulomb]\n', "level [N m]"),
+        ('[plant]\nkind = "inertia"\ninertia = 1.0\n[controller]\nki = 1.0\n', "kp [N m/rad]"),
+        ('[plant]\nkind = "mass"\n', "mass [kg]"),
+        ('[plant]\nkind = "mass"\nmass = 1.0\n[effects.coulomb]\n', "level [N]"),
+    ],
+)
+def test_what_a_model_lacks_is_asked_for_in_the_units_of_its_machine(tmp_path, text, words):
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=re.escape(words)):
+        read_model(path)

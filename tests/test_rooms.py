@@ -64,3 +64,10 @@ def test_no_private_name_is_imported_from_another_package():
         if private(alias.name)
     ]
     assert not found, found
+
+
+def test_editors_know_every_name_that_is_loaded_on_first_use():
+    tree = ast.parse(Path(ctrl_df.__file__).read_text(encoding="utf-8"))
+    (block,) = (n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "_TYPE_CHECKING")
+    stated = {a.asname: n.module for n in block.body if isinstance(n, ast.ImportFrom) for a in n.names}
+    assert stated == ctrl_df._LAZY
