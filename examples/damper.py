@@ -19,6 +19,7 @@ against another of half the stroke, and judge the answer at another frequency to
 """
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -76,7 +77,8 @@ def main(folder):
 
     # Half the stroke is held out: what describes one record, not the damper, makes the error there larger.
     # The third record is not touched before the end.
-    study = cdf.improve(begin, runs[TRAIN], runs.get(HELD_OUT), max_effects=2)
+    tell = partial(print, file=sys.stderr, flush=True)  # what is being done, a line a stage
+    study = cdf.improve(begin, runs[TRAIN], runs.get(HELD_OUT), max_effects=2, progress=tell)
     print(study.summary(), "\n")
 
     print("Error of force, relative rms, on records that were not fitted:")

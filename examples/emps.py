@@ -151,6 +151,7 @@ class RisingFriction(cdf.Effect):
         return -p[0] * math.tanh(v / p[1])
 
 
+BUDGET = 240.0  # s
 LIBRARY = tuple(k for k in cdf.effect_library() if k != "rising_friction")
 
 
@@ -187,6 +188,7 @@ def main(folder, report=None):
     print(line("published, symmetric", published, train, test), flush=True)
 
     # the ladder: what does the library find? It tells on stderr what it does, and here what it knows so far.
+    # Its steps take two minutes on two cores; in the time that is left it tries what differs by one effect.
     known: list = []
 
     def so_far(study):
@@ -196,7 +198,9 @@ def main(folder, report=None):
             known.append((added, likely))
             print(f"  so far added: {added}; likely next: {likely}", flush=True)
 
-    study = cdf.improve(published, train, test, 3, candidates=LIBRARY, progress=tell, callback=so_far)
+    study = cdf.improve(
+        published, train, test, 3, candidates=LIBRARY, progress=tell, callback=so_far, budget=BUDGET
+    )
     for step in study.steps:
         print(line(f"+ {step.effect}" if step.effect else "refitted", step.model, train, test), flush=True)
 
