@@ -155,7 +155,7 @@ def _plant(table) -> Mechanism:
 
 
 def _effects(given, unit_of) -> list[Effect]:
-    """Build effects from tables [effects.ID], or a list [[effects]] with id; `unit_of`: as the plant has it."""
+    """Build effects from tables [effects.ID] or from a list [[effects]] with id."""
     if isinstance(given, Mapping):
         pairs = [(key, dict(_mapping(values, f"effects.{key}"))) for key, values in given.items()]
     elif isinstance(given, list):
