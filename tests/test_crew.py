@@ -62,12 +62,37 @@ def test_a_diagnosis_repeats_itself_to_the_last_bit(monkeypatch):
     assert found[0] == found[1]
 
 
-def test_jobs_within_jobs_are_done_in_their_thread():
-    def inner(_):
-        return threading.get_ident()
+def test_threads_without_a_job_help_with_jobs_within_jobs():
+    def inner(i):
+        time.sleep(0.05)
+        return i, threading.get_ident()
 
-    for ids in crew.side_by_side(lambda _: crew.side_by_side(inner, range(3)), range(4)):
-        assert len(set(ids)) == 1 and ids[0] != threading.get_ident()
+    def job(i):
+        return crew.side_by_side(inner, range(4)) if i else []
+
+    _, found = crew.side_by_side(job, range(2))
+    assert [i for i, _ in found] == [0, 1, 2, 3]
+    assert len({ident for _, ident in found}) == 2 and threading.get_ident() not in {t for _, t in found}
+
+
+def test_jobs_within_jobs_within_jobs_come_to_an_end():
+    def of(depth):
+        def job(i):
+            return i if depth == 0 else sum(crew.side_by_side(of(depth - 1), range(3)))
+
+        return job
+
+    assert crew.side_by_side(of(4), range(3)) == [3**4] * 3
+
+
+def test_the_first_failure_of_jobs_within_jobs_is_told():
+    def inner(i):
+        time.sleep(0.02 * (3 - i))
+        if i:
+            raise ValueError(f"job {i}")
+
+    with pytest.raises(ValueError, match="job 1"):
+        crew.side_by_side(lambda i: crew.side_by_side(inner, range(3)) if i else None, range(2))
 
 
 def test_the_first_failure_in_order_is_told():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
 import control as ct
 import numpy as np
 
+from ..cached import cached_property
 from ..checks import known_name, mapping, number, shown, system_name
 from ..table import Table
 from . import compliant

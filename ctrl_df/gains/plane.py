@@ -8,7 +8,6 @@ gains: one family of describing functions serves all of them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 from scipy.ndimage import distance_transform_edt
 
 from ..blocks.mechanism import Mechanism
+from ..cached import cached_property
 from ..df.describing import describing_function_family
 from ..df.dispatch import method_for
 from ..df.methods import ElementIntegrals, Method

@@ -5,8 +5,9 @@ from __future__ import annotations
 import functools
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor, wait
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from typing import Any, Protocol
 
@@ -109,8 +110,8 @@ def require_compiled(engine) -> None:
 def side_by_side(function: Callable, items: Iterable, executor: Executor | None = None) -> list[Any]:
     """Return what a function makes of every item, in their order, on all processors.
 
-    A job that calls side by side itself has its own done one after the other. `executor`: runs the jobs in
-    place of threads of this process; those begun are waited for.
+    A job that calls side by side itself does its own, and threads that have no job left help. `executor`:
+    runs the jobs in place of threads of this process; those begun are waited for.
 
     Raises
     ------
@@ -120,25 +121,15 @@ def side_by_side(function: Callable, items: Iterable, executor: Executor | None 
         The time of this thread's `Watch` is over; jobs have stopped likewise.
     """
     items = list(items)
-    threads = min(processors(), len(items))
-    if executor is None and (threads < 2 or flag() is not None):
+    if executor is None and min(processors(), len(items)) < 2:
         return [_alone(function, item) for item in items]
+    outer = flag()
+    if executor is None and outer is not None:
+        return _Shared(function, items, outer).results()
     stop = np.zeros(1, np.int64)
-
-    def job(item):
-        _here.flag = stop
-        _at_work.add(threading.get_ident())
-        try:
-            if stop[0]:
-                raise Stopped
-            return function(item)
-        finally:
-            _here.flag = None
-            _at_work.discard(threading.get_ident())
-
     check()
     if executor is None:
-        jobs = [pool(os.getpid(), threads, "jobs").submit(job, item) for item in items]
+        jobs = [_jobs().submit(_in_a_job, function, item, stop) for item in items]
     else:
         jobs = [executor.submit(function, item) for item in items]
     results = []
@@ -158,8 +149,58 @@ def side_by_side(function: Callable, items: Iterable, executor: Executor | None 
     return results
 
 
+def _jobs() -> ThreadPoolExecutor:
+    return pool(os.getpid(), processors(), "jobs")
+
+
+def _in_a_job(function: Callable, item, stop: np.ndarray):
+    """Do one job in this thread, which has none."""
+    _here.flag = stop
+    _at_work.add(threading.get_ident())
+    try:
+        if stop[0]:
+            raise Stopped
+        return function(item)
+    finally:
+        _here.flag = None
+        _at_work.discard(threading.get_ident())
+
+
 def _alone(function: Callable, item):
     check()
     result = function(item)
     _done()
     return result
+
+
+class _Shared:
+    """Jobs within a job: taken in their order by its thread, and by threads that have none."""
+
+    def __init__(self, function: Callable, items: list, stop: np.ndarray):
+        self.function, self.stop = function, stop
+        self.waiting = deque((item, Future()) for item in items)
+        self.jobs = [job for _, job in self.waiting]
+
+    def results(self) -> list[Any]:
+        """Return what the function makes of the items; the first failure in order is raised."""
+        # behind all jobs that wait for a thread: who comes to these has nothing else to do
+        most = min(processors(), len(self.jobs)) - 1
+        helpers = [_jobs().submit(_in_a_job, _Shared.work, self, self.stop) for _ in range(most)]
+        self.work()
+        _at_work.discard(threading.get_ident())  # its processor is free for runs of the others
+        wait([h for h in helpers if not h.cancel()])
+        _at_work.add(threading.get_ident())
+        return [job.result() for job in self.jobs]
+
+    def work(self) -> None:
+        """Do jobs until none is left that nobody does."""
+        while self.waiting:
+            try:
+                item, job = self.waiting.popleft()
+            except IndexError:  # another thread was faster
+                return
+            try:
+                job.set_result(_alone(self.function, item))
+            except BaseException as failure:
+                job.set_exception(failure)
+                self.waiting.clear()

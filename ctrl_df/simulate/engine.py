@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import control as ct
 import numpy as np
 
+from ..cached import cached_property
 from ..status import Status
 from .dynamics import history
 from .kernel import driver

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...blocks.probing import stiffness
+from ...cached import cached_property
 from ..data.measurement import Measurement
 from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE

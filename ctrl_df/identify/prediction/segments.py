@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...cached import cached_property
 from ..data import derivatives
 from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...cached import cached_property
 from ...units import dimension, written
 from ..data import derivatives
 from ..data.measurement import Measurement

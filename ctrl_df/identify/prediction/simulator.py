@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Ramp
+from ...cached import cached_property
 from ...simulate.crew import require_compiled
 from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped

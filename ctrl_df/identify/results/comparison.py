@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...blocks.coordinates import moving_in
+from ...cached import cached_property
 from ...drawing import draw
 from ...numerals import probability
 from ...table import Brief

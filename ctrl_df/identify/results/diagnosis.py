@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 from ...blocks.effect import Effect
+from ...cached import cached_property
 from ...drawing import draw, go_on
 from ...numerals import certainty as sure
 from ...numerals import digits, percent

@@ -45,6 +45,13 @@ class Lasting:
         return self.horizon > 0 and not self.better
 
 
+def compared(ranking: Sequence[CandidateEffect], significant: float) -> list[CandidateEffect]:
+    """Return what `lasting` compares with the baseline: the first of a ranking, and those nearest to it."""
+    first, *others = ranking
+    near = [c for c in others if c.confirmed and c.evidence > significant and c.id not in first.equivalents]
+    return [first, *near[:OUTLASTING]]
+
+
 def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: float) -> Lasting | None:
     """Compare the first of a ranking with its rivals over all stretches up to the longest that one predicts.
 
@@ -66,15 +73,14 @@ def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: flo
     Lasting or None
         None where there is nothing to predict.
     """
-    first, *others = ranking
+    first = ranking[0]
     if first.predicted is None:
         return None
-    near = [c for c in others if c.confirmed and c.evidence > significant and c.id not in first.equivalents]
-    models = [base, first, *near[:OUTLASTING]]
-    curves = side_by_side(lambda m: m.error_by_horizon, models)
+    models = compared(ranking, significant)
+    curves = side_by_side(lambda m: m.error_by_horizon, [base, *models])
     facts_of = [facts(r) for r in first.predicted[1]]
     noise = math.sqrt(sum(f.noise**2 for f in facts_of) / sum(f.spread**2 for f in facts_of))
-    names = ["", *(c.id for c in models[1:])]
+    names = ["", *(c.id for c in models)]
     table = np.maximum([c.nrmse for c in curves], noise)  # errors below tell nothing
     told = np.flatnonzero(np.min(table, axis=0) < UNMOVED)
     if not told.size:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...simulate.crew import side_by_side
 from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import (
     AMBIGUOUS,
@@ -21,7 +22,7 @@ from ..results.diagnosis import (
 )
 from ..results.explain import explain, explain_so_far, falls_behind, undetermined
 from ..thresholds import EXPONENT
-from .lasting import lasting
+from .lasting import compared, lasting
 from .search import Remainder, Search
 from .thresholds import FLOOR
 
@@ -91,19 +92,24 @@ class _Asked:
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
         recorded = search.as_recorded(chosen[0]) if chosen else ""
         significant = bool(ranking) and worth(ranking[0], search) and not recorded
-        remainder = search.remainder(best, significant)
-        if search.exact():
+        base = self._base()
+        if search.exact() or not significant:
             verdict = NONE
-        elif remainder.unexplained:
-            verdict = UNKNOWN
-        elif not significant:
-            verdict = NONE
+        elif all(c.id in ranking[0].equivalents for c in rivals(ranking)):
+            verdict = EFFECT
         else:
-            open_ones = rivals(ranking)
-            verdict = EFFECT if all(c.id in ranking[0].equivalents for c in open_ones) else AMBIGUOUS
-        base, doubts = self._base(), (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
+            verdict = AMBIGUOUS
+        far: list = []
         if verdict == EFFECT:
             course.stage("free prediction over long stretches")
+            far = [base, *compared(ranking, search.significant)]
+        # neither needs the other's answer; what takes longest first
+        jobs = [lambda: search.remainder(best, significant), *(lambda m=m: m.error_by_horizon for m in far)]
+        remainder, *_ = side_by_side(lambda job: job(), jobs)
+        if remainder.unexplained and not search.exact():
+            verdict = UNKNOWN
+        doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
+        if verdict == EFFECT:
             verdict, ranking, further = doubted(ranking, base, search.significant)
             doubts = further if verdict == UNKNOWN else (*further, *doubts)
             if verdict == UNKNOWN:

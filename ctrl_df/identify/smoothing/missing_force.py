@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...blocks.mechanism import Mechanism
+from ...cached import cached_property
 from ...checks import choice
 from ...drawing import draw
 from ..data.measurement import Measurement

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from ...cached import cached_property
 from ...drawing import draw
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..residuals.comparison_base import ComparisonBase

@@ -90,7 +90,7 @@ def address() -> int:
     return native_address(advance, arguments)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", nogil=True)
 def run(
     engine, prog, drive, clock, x, mode, t_end, tout, xout, yout, order, rtol, atol, hmax, locate,
     stop_at_event, watch, watch_level, watch_sign, height, max_steps, log_t, log_n, log_k, before, scale,
