@@ -93,6 +93,8 @@ def _at_most(expected: float, best: CandidateFit, data: SegmentedData, colour: N
         return expected
     left = there.sensitivity.left_by_starts(colour) / best.train.sensitivity.left_by_starts(colour)
     columns = np.concatenate(there.sensitivity.parameters) / there.slopes
+    if not (np.all(np.isfinite(covariance)) and np.all(np.isfinite(columns))):
+        return math.inf  # nothing is known of some: they may be off by anything
     power = float(np.sum((columns @ covariance) * columns)) / len(columns) / there.unit**2
     most = max(left, 1.0) * expected**2 + BY_CHANCE**2 * power
     return math.sqrt(most) if math.isfinite(most) else math.inf
