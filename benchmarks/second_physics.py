@@ -25,6 +25,7 @@ AT = {name: i for i, name in enumerate(NAMES)}
 RIGID, LOOSE, SPRUNG = 0, 1, 2
 STATES = 8  # x, v of the motor; motor less load: place, speed; bristle; pad; lag; friction with a memory
 HALVINGS = 60
+MOST_STEPS = 1_000_000  # between two ticks: a hundred thousand times what any machine here takes
 # only compiled functions call these: no references are counted, nothing is made for Python
 _part = njit(error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 REST = 1e-7  # rebounds slower than this (of a speed of the order of one) end in contact
@@ -303,9 +304,17 @@ def _stand(t, y, u, mode, p):
 
 @_part
 def _advance(t, y, end, h, u0, slope, mode, p, k, z, a, b):
-    """Carry the state from t to `end` in steps of at most h, through all events; returns their number."""
-    events, same = 0, 0
+    """Carry the state from t to `end` in steps of at most h, through all events; returns their number.
+
+    Where events follow each other without end (an accumulation that no rule here resolves) the state is lost.
+    """
+    events, same, steps = 0, 0, 0
     while t < end:
+        steps += 1
+        if steps > MOST_STEPS:
+            for i in range(STATES):
+                y[i] = np.nan
+            break
         kind = _event(t, y, u0 + slope * t, mode, p)
         if kind != 0 and same < 20:
             _meet(kind, t, y, u0 + slope * t, mode, p)

@@ -27,6 +27,15 @@ def places(where) -> str:
     return " ".join(r.sentence for r in (where.significant[:2] if where is not None else ()))
 
 
+def unconfirmed(first) -> str:
+    """Return that the data held out say nothing of an effect that those fitted speak for."""
+    return (
+        f"The data fitted speak for {named(first.effect)} (log-likelihood higher by "
+        f"{first.evidence_fitted:.0f}), those held out say nothing of it (by {first.evidence_holdout:.1f}): "
+        "it may not act there. A record held out in which it acts would tell."
+    )
+
+
 def explain(d, words) -> str:
     """Return the verdict of a `Diagnosis` in sentences; `words`: those of its data (`Words`)."""
     first: Any = d.ranking[0] if d.ranking else None
@@ -58,10 +67,13 @@ def explain(d, words) -> str:
         shared = [c for c in d.ranking if c not in open_ones and c.probability > SHOWN_PROBABILITY]
         names = ", ".join(f"{named(c.effect)} ({c.probability:.0%})" for c in [*open_ones, *shared])
         doubts = "".join(f" {s}" for s in d.doubts)
+        alone = len(open_ones) + len(shared) == 1
+        which, it, separate = (
+            ("confirm it", "It", "tell") if alone else ("tell which", "The first", "separate them")
+        )
         return (
-            f"An effect is missing, and these {words.data} do not tell which: {names}. The first reduces the "
-            f"error from {size}.{same}{doubts} next_experiment gives {words.separates} that would separate "
-            "them."
+            f"An effect is missing, and these {words.data} do not {which}: {names}. {it} reduces the error "
+            f"from {size}.{same}{doubts} next_experiment gives {words.separates} that would {separate}."
         )
     where, shows = places(d.where), words.shows.format(first.model.coordinates.text(first.effect.shows))
     doubts = "".join(f" {s}" for s in d.doubts)

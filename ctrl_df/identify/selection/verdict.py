@@ -20,7 +20,7 @@ from ..results.diagnosis import (
     Diagnosis,
     rivals,
 )
-from ..results.explain import explain, explain_so_far, falls_behind, undetermined
+from ..results.explain import explain, explain_so_far, falls_behind, unconfirmed, undetermined
 from ..thresholds import EXPONENT
 from .lasting import compared, lasting
 from .search import Remainder, Search
@@ -91,9 +91,12 @@ class _Asked:
             ranking.append(_entry(judged, search, weight, same))
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
         recorded = search.as_recorded(chosen[0]) if chosen else ""
-        significant = bool(ranking) and worth(ranking[0], search) and not recorded
+        asked = bool(ranking) and not recorded and not search.exact()
+        silent = asked and unheld(ranking[0], search)
         base = self._base()
-        if search.exact() or not significant:
+        if silent:
+            verdict = AMBIGUOUS
+        elif not asked or not worth(ranking[0], search):
             verdict = NONE
         elif all(c.id in ranking[0].equivalents for c in rivals(ranking)):
             verdict = EFFECT
@@ -104,11 +107,13 @@ class _Asked:
             course.stage("free prediction over long stretches")
             far = [base, *compared(ranking, search.significant)]
         # neither needs the other's answer; what takes longest first
-        jobs = [lambda: search.remainder(best, significant), *(lambda m=m: m.error_by_horizon for m in far)]
+        told = verdict != NONE
+        jobs = [lambda: search.remainder(best, told), *(lambda m=m: m.error_by_horizon for m in far)]
         remainder, *_ = side_by_side(lambda job: job(), jobs)
         if remainder.unexplained and not search.exact():
             verdict = UNKNOWN
         doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
+        doubts = (unconfirmed(ranking[0]), *doubts) if silent else doubts
         if verdict == EFFECT:
             verdict, ranking, further = doubted(ranking, base, search.significant)
             doubts = further if verdict == UNKNOWN else (*further, *doubts)
@@ -177,6 +182,16 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     return (
         first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
     )
+
+
+def unheld(first: CandidateEffect, search: Search) -> bool:
+    """Whether the data fitted speak for an effect, and those held out neither for nor against it.
+
+    It may not act there at all: a stop that is not met, for instance.
+    """
+    quiet = abs(first.evidence_holdout) <= search.significant_validation
+    steady = first.nrmse_holdout <= FLOOR * search.errors(search.base)[1]
+    return first.evidence_fitted > search.significant and quiet and steady
 
 
 def _probabilities(chosen) -> list[float]:
