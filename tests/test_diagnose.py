@@ -105,6 +105,29 @@ def test_a_stop_that_is_hit_once_is_found_by_what_short_segments_tell_of_the_mac
     assert found.best.parameters["limit"] == pytest.approx(rig.truth["hard_stop.limit"], rel=1e-3)
 
 
+def test_an_effect_that_held_out_data_never_reach_is_ambiguous():
+    """A stop met once, in the record fitted only: 812 of log-likelihood there, 0.3 held out."""
+    t = np.arange(0, 4, 0.002)
+    free = cdf.Mass(2.0, [cdf.Viscous(8.0), cdf.LinearSpring(300.0)])
+    rng = np.random.default_rng(5)
+
+    def moved(machine, push):
+        force = 4 * (np.sin(6 * t) + 0.6 * np.sin(17 * t + 1)) + push * ((t > 3.4) & (t < 3.45))
+        return force, np.asarray(cdf.event_response(machine, t, force, input_hold="zoh").outputs)[0]
+
+    def recorded(push):
+        force, x = moved(machine, push)
+        return Measurement(t, force, x + 1e-3 * rng.standard_normal(t.size))
+
+    machine = free.with_effect(cdf.HardStop(moved(free, 30.0)[1].max() - 2e-4, restitution=0.3))
+    found = diagnose(
+        free.with_parameters({"viscous.coefficient": 7.9}), recorded(30.0), holdout=recorded(0.0),
+        free=["viscous.coefficient"], candidates=["hard_stop", "cubic_spring", "quadratic_drag"],
+    )  # fmt: skip
+    assert found.verdict == "ambiguous" and found.best.id == "hard_stop"
+    assert "those held out say nothing of it" in found.explanation
+
+
 def test_static_levels_are_chosen_before_what_is_held_out_counts_as_luck():
     rig = rigs.draw("stiction", 1022, excitation="steps", noise="coloured")
     found = diagnose(rig.baseline, of(rig)[0], holdout=of(rig)[1], candidates=("stiction",))
