@@ -114,12 +114,13 @@ class _Asked:
             verdict = UNKNOWN
         doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
         doubts = (unconfirmed(ranking[0]), *doubts) if silent else doubts
-        if verdict == EFFECT:
-            verdict, ranking, further = doubted(ranking, base, search.significant)
-            doubts = further if verdict == UNKNOWN else (*further, *doubts)
-            if verdict == UNKNOWN:
+        if far:
+            told, ranking, further = doubted(ranking, base, search.significant)
+            doubts = further if told == UNKNOWN else (*further, *doubts)
+            if told == UNKNOWN:
                 # refuted: what is missing is what the model leaves without it
                 best, remainder = search.base, search.remainder(search.base, False)
+            verdict = told if verdict == EFFECT else verdict
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
         return Diagnosed(replace(result, explanation=explain(result, words) + note), search)
@@ -177,8 +178,11 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     those fitted have to speak for themselves. Whitened residuals may speak for an effect that makes slow
     errors larger: the plain error held out must not grow.
     """
-    if first.nrmse_holdout > FLOOR * search.errors(search.base)[1]:
-        return False
+    return speaks_for(first, search) and first.nrmse_holdout <= FLOOR * search.errors(search.base)[1]
+
+
+def speaks_for(first: CandidateEffect, search: Search) -> bool:
+    """Whether the evidence of the data fitted and of those held out is for an effect."""
     return (
         first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
     )
