@@ -62,6 +62,7 @@ def explain(d, words) -> str:
             + ", ".join(e.replace("_", " ") for e in first.equivalents)
             + "."
         )
+    same += sensed_side(d, first)
     if d.verdict == AMBIGUOUS:
         open_ones = [first, *rivals(d.ranking)]
         shared = [c for c in d.ranking if c not in open_ones and c.probability > SHOWN_PROBABILITY]
@@ -81,6 +82,17 @@ def explain(d, words) -> str:
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
         f"probability {sure(certainty(d.ranking))}.{same}{doubts}"
         + (f" Before, {where[0].lower() + where[1:]}" if where else "")
+    )
+
+
+def sensed_side(d, first) -> str:
+    """Return which side of a joint that a candidate adds the sensor is taken to see; empty without one."""
+    if first.model.core.bodies == d.model.core.bodies:
+        return ""
+    side = first.model.measured
+    other = "motor" if side == "load" else "load"
+    return (
+        f' The sensor is taken to see the {side}; if it sees the {other}, the model needs measured="{other}".'
     )
 
 
