@@ -111,6 +111,11 @@ def falls_behind(first, long) -> str:
     )
 
 
+def left_out(first, long) -> str:
+    """Return why the first of a ranking was left out, and all others tried without it (`Lasting`)."""
+    return f"{falls_behind(first, long)} All others were therefore tried again without {named(first.effect)}."
+
+
 def grows(short: float, error: float, seconds: float, effect=None) -> str:
     """Return that a model which follows short segments does not follow long ones, refitted to these.
 
