@@ -182,7 +182,7 @@ class Climb:
             if revision.structure.key in self.rungs:
                 break
             how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
-            ahead = self._rung(revision.structure, rung, how)
+            ahead = self._rung(revision.structure, rung, how, step)
             gain, held = self._compared(_reached(ahead), rung.structure.block, ahead.search)
             # what has dropped or replaced others does not need the evidence of an effect more
             least = rung.search.significant * (-1 if revision.dropped or revision.instead else 1)
@@ -193,12 +193,12 @@ class Climb:
             rung = ahead
         return rung
 
-    def _rung(self, structure: Structure, before: Rung | None, how: dict) -> Rung:
-        """Ask of a structure what it misses."""
+    def _rung(self, structure: Structure, before: Rung | None, how: dict, known: Step | None = None) -> Rung:
+        """Ask of a structure what it misses; `known`: what is told of it until that is known."""
         steps = before.steps if before else ()
         self.course.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
-        last = steps[-1] if steps else None
+        last = known or (steps[-1] if steps else None)
 
         def told(found: Diagnosis) -> Step:
             errors = found.nrmse, found.nrmse_holdout
