@@ -131,7 +131,7 @@ class Course:
             Ctrl-C before anything was known.
         """
         try:
-            with crew.watched(self), self._shown():
+            with crew.watched(self), crew.one_thread_each(), self._shown():
                 return work()
         except crew.TimeUp:
             status = BUDGET_SPENT

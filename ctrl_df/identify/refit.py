@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..simulate.crew import one_thread_each
 from .arguments import (
     check_fit,
     check_quantities,
@@ -106,16 +107,18 @@ def refit(
     names = with_those(dataset.free_parameters(block, free), own)
     check_fit(block, start, robust, budget)
     dataset.warn_of_means(model, names)
-    found = dataset.with_prior(known_beforehand(block, prior, grows=False)).fit(
-        dataset.with_own(model, own),
-        names,
-        start,
-        whole=free is None,
-        mode=mode,
-        window=window,
-        robust=robust,
-        budget=budget,
-    )
+    dataset = dataset.with_prior(known_beforehand(block, prior, grows=False))
+    with one_thread_each():
+        found = dataset.fit(
+            dataset.with_own(model, own),
+            names,
+            start,
+            whole=free is None,
+            mode=mode,
+            window=window,
+            robust=robust,
+            budget=budget,
+        )
     table = found.block.parameters
     before = {k: p.value for k, p in block.parameters.items()} | dict(start or {})
     parameters = {

@@ -68,6 +68,19 @@ def watched(watch: Watch) -> Iterator[None]:
         _here.watch = before
 
 
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Let linear algebra stay in the thread that asks for it.
+
+    Fits solve many small systems. Threads of BLAS make none of them faster, and wait for the next one by
+    keeping the processor busy that another fit could have.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
 def check() -> None:
     """Raise `Stopped` or `TimeUp` where the work of this thread is to end; asked between units of work."""
     stop = flag()

@@ -26,7 +26,7 @@ from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.lasting import lasting
 from ..selection.search import Search
 from ..selection.thresholds import CONFIRMED, FLOOR, SHOWS_HARDLY
-from ..selection.verdict import Diagnosed, diagnosed, speaks_for, worth
+from ..selection.verdict import Diagnosed, diagnosed, worth
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .structure import Structure, plainness
@@ -74,11 +74,10 @@ class Rung:
         in for all of them there, and follow nothing beyond. What is ahead in free prediction of data held out
         need not be so in short segments.
         """
-        found, search = self.found, self.search
-        long = lasting(found.ranking, found.baseline, search.significant)
-        better = () if long is None else long.better
-        told = {c.id: c for c in found.ranking if speaks_for(c, search)}
-        return next((told[i] for i in better if i in told), None)
+        found = self.found
+        long = lasting(found.ranking, found.baseline, self.search.significant)
+        ahead = long.better[:1] if long is not None else ()
+        return next((c for c in found.ranking if c.id in ahead), None)
 
     @property
     def way(self) -> list[Rung]:

@@ -204,11 +204,8 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     those fitted have to speak for themselves. Whitened residuals may speak for an effect that makes slow
     errors larger: the plain error held out must not grow.
     """
-    return speaks_for(first, search) and first.nrmse_holdout <= FLOOR * search.errors(search.base)[1]
-
-
-def speaks_for(first: CandidateEffect, search: Search) -> bool:
-    """Whether the evidence of the data fitted and of those held out is for an effect."""
+    if first.nrmse_holdout > FLOOR * search.errors(search.base)[1]:
+        return False
     return (
         first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
     )
