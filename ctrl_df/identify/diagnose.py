@@ -48,7 +48,7 @@ def diagnose(
     model : block or closed loop
         The model in use. Of a loop its block is diagnosed, driven by the recorded force.
     data : Measurement, FrequencyMeasurement or sequence of them
-        Training records, or tables N(A, omega): every effect leaves its print on the plane, too.
+        Training records, or tables N(A, omega): every effect leaves its signature on the plane, too.
     holdout : as `data`, or None
         Records to confirm on; None: every third part of the training records (every third point of the
         tables) is held out.
@@ -58,8 +58,8 @@ def diagnose(
         Parameters of the model that may be refitted, by name or by effect id, as for `refit`; None: all that
         are free.
     own : sequence of str or None
-        Parameters of the model that every record has for itself, as for `refit`: they are estimated anew on
-        records held out.
+        Parameters of the model that differ between records, as for `refit`: they are re-estimated on
+        held-out records.
     prior : mapping or None
         What is known of parameters besides the records, as for `refit`; also of those of effects that the
         model may be given, ``{"stribeck.level": (9.0, 0.5)}``.

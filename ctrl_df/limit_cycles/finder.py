@@ -58,28 +58,28 @@ def find_limit_cycle(
         first output is taken as the output and the last one as the block's input.
     guess : LimitCycle, Orbit, (amplitude, omega), state array, or None
         Where to start. From a prediction, or an amplitude at the block's input and a frequency [rad/s], the
-        harmonics that the describing function drops are fed back little by little until none is missing,
-        which reaches unstable orbits as well as stable ones; a state is closed as it stands, then simulated.
-        None simulates from starts of several sizes, closes what they settle to and what stands between starts
-        of different fate, and returns the first orbit found, stable ones first.
+        harmonics that the describing function drops are fed back by degrees until none is missing, which
+        reaches unstable orbits as well as stable ones. A state is the start of Newton's method, then of a
+        simulation. None simulates from starts of several sizes, refines what they settle to and what
+        separates starts with different outcomes, and returns the first orbit found, stable ones first.
     max_iterations : int
         Bound on Newton steps.
     search_time : float
-        Longest simulation of the search [s]; by default some hundred swings.
+        Longest simulation of the search [s]; by default some hundred periods.
     raise_on_failure : bool
         Raise RuntimeError (with the answer as ``.orbit``) instead of returning a `NoOrbit`.
 
     Returns
     -------
     Orbit or NoOrbit
-        An orbit whose ``note`` says if it is another one than the guess speaks of; or the false `NoOrbit`,
-        whose ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
+        An orbit whose ``note`` says if it is not the one guessed; or a `NoOrbit`, false in an ``if``, whose
+        ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
 
     Raises
     ------
     ValueError
-        A pure delay stands in the loop: its state is a whole history, no vector that Newton could move. Its
-        motion is found by simulation: `event_response`, or `verify`, whose rows tell what it settles to.
+        The loop contains a pure delay: its state is a history, not a vector that Newton's method could solve
+        for. Its motion is found by simulation: `event_response`, or `verify`, whose rows describe it.
 
     Examples
     --------
@@ -117,7 +117,7 @@ class OrbitFinder:
     """The limit cycles of one loop: by shooting, or by simulation alone where there is nothing to shoot with.
 
     A sampled loop has no period of its own, one with a pure delay no finite state: both are followed until
-    their swings repeat or the bound on work is hit, and averaged.
+    they repeat or the bound on work is hit, and averaged.
 
     Attributes
     ----------
@@ -379,7 +379,7 @@ class OrbitFinder:
     # --- averages -----------------------------------------------------------------------------------------
 
     def _averaged(self, x0, crossings, settled, swings=CROSSINGS_AVERAGED) -> Orbit | None:
-        """Average over the swings after a transient, for motions that are followed only.
+        """Average over the periods after a transient, for motions that can only be simulated.
 
         The amplitude is that of the signal the block sees. A block that acts in continuous time sees the held
         steps of a sampled controller; a law without time sees their values alone, the sequence that the

@@ -46,8 +46,8 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     Check
         ``.rows``, ``.table()``, ``.orbits``, ``.fate``. Where the loop cannot be simulated (H is measured
         points, or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure
-        delay, whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why``
-        tells how. An unstable cycle cannot be seen that way and stays ``not tested``.
+        delay, whose state is a history, no exact orbit is computed: the simulation judges, and ``.why`` says
+        how. An unstable cycle cannot be seen that way and stays ``not tested``.
 
     Examples
     --------

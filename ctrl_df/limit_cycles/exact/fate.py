@@ -22,12 +22,12 @@ class Start:
     size : float
         Displacement at rest [m], or amplitude at the input of an element.
     fate : str
-        ``rests`` (or slows down without end, each swing longer than the last by a steady ratio), ``cycles``,
+        ``rests`` (or slows down without end, each period longer than the last by a steady ratio), ``cycles``,
         ``diverges``, or ``undecided`` within the bound on work.
     orbit : Orbit or None
         The one it cycles on.
     growth : float
-        Change of the swings at the end, a ratio a quarter of the course.
+        Ratio of the amplitudes in the last quarter of the course to those in the quarter before.
     wind_up : float
         Factor by which the controller's integral outgrew the block's output, where it did; else 1.
     """

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import control as ct
 import numpy as np
 
-from ...blocks.element import Element
+from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
 from ...df.forced_orbit.periodic_response import PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
