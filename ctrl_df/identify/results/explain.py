@@ -89,7 +89,7 @@ def falls_behind(first, long) -> str:
     if long.horizon == 0:
         return (
             f"In free prediction, internal states continued, neither {named(first.effect)} nor any other "
-            f"follows the motion for long: over the shortest horizon its error is {long.errors[first.id]:.0%}."
+            f"follows the motion for long: it errs by {long.errors[first.id]:.0%} over the shortest horizon."
         )
     who = [(n.replace("_", " ") or "the model without it", long.errors[n]) for n in long.better]
     others = " and ".join(f"that of {name} {percent(error)}" for name, error in who)
