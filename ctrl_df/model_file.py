@@ -24,6 +24,7 @@ EXAMPLE = """\
 [plant]
 kind = "mass"              # "two_mass" (then motor_mass, load_mass), "inertia", "two_inertias"
 mass = 9.0                 # kg
+# measured = "motor"       # where the sensor sees the motor of a joint, found or given; else the load
 
 [effects.coulomb]          # any effect id, parameters by name, SI units; several: one table each
 level = 5.0                # N

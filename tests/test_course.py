@@ -16,6 +16,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 import ctrl_df as cdf
+from ctrl_df.identify.course import Course
+from ctrl_df.simulate import crew
 
 RIG = rigs.draw("linear_spring", 11, snr_db=60, n=4000)
 TRAIN, HELD = RIG.train[0].measurement(), RIG.holdout[0].measurement()
@@ -131,6 +133,18 @@ def test_progress_and_log(told, caplog, capsys):
     assert capsys.readouterr().err == ""
     ask(progress=True, budget=1e-3)
     assert "diagnose" in capsys.readouterr().err
+
+
+def test_a_stage_that_lasts_tells_that_it_goes_on(monkeypatch):
+    monkeypatch.setattr("ctrl_df.identify.course.SILENT_MOST", 0.05)
+    monkeypatch.setattr(Course, "beat", 0.02)
+    lines = []
+    course = Course("improve", lines.append)
+    course.stage("four rests")
+    with crew.watched(course):
+        crew.side_by_side(time.sleep, [0.3, 0.1, 0.1, 0.1])
+    assert len(lines) > 3 and all("s, four rests" in line for line in lines)
+    assert "jobs done" in lines[1]
 
 
 def test_errors_are_clear():

@@ -1,6 +1,7 @@
 """Diagnosis: the right effect on a few rigs, nothing where nothing is, equivalents together, clear errors."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.prediction.values import feasible
 from ctrl_df.identify.residuals.missing_forces import missing_forces
+from ctrl_df.identify.results import explain
 from ctrl_df.identify.shooting.noise_model import prediction_error_filter
 from ctrl_df.identify.shooting.variables import default_free
 
@@ -231,6 +233,16 @@ def test_a_time_in_another_unit_is_no_missing_effect(forced):
     t, force, x = forced
     found = diagnose(FORCED, Measurement(1e3 * t, force, x), candidates=["input_lag"])
     assert found.verdict == "unknown" and "units" in found.explanation
+
+
+def test_a_joint_that_is_found_says_which_side_the_sensor_sees():
+    axis = cdf.Inertia(0.1).with_effect(cdf.Coulomb(0.2))
+    for side, other in (("load", "motor"), ("motor", "load")):
+        model = axis.with_measured(side)
+        first = SimpleNamespace(model=model.with_effect(cdf.Backlash(0.02)))
+        text = explain.sensed_side(SimpleNamespace(model=model), first)
+        assert f"to see the {side}" in text and f'measured="{other}"' in text
+        assert explain.sensed_side(SimpleNamespace(model=model), SimpleNamespace(model=model)) == ""
 
 
 def test_one_record_alone():

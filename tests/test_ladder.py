@@ -11,6 +11,7 @@ from ctrl_df.identify.course import Course
 from ctrl_df.identify.ladder.climb import Climb
 from ctrl_df.identify.ladder.revision import revised
 from ctrl_df.identify.ladder.structure import Structure
+from ctrl_df.identify.selection.lasting import Lasting
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
 from ctrl_df.identify.starting.extend import applicable, extended
 
@@ -248,6 +249,20 @@ def test_of_two_that_hide_each_other_neither_need_be_significant():
     finally:
         Given.errors = before
     assert set(study.effects) == {"coulomb", "constant_force"}
+
+
+def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):
+    # over segments hysteresis stands in for both that are missing; freely it follows nothing
+    levels = {"": 0, "hysteresis": 700, "linear_spring": 500, "constant_force": 40,
+              "linear_spring constant_force": 1000, "hysteresis constant_force": 720}  # fmt: skip
+
+    def lasting(ranking, base, significant):
+        return Lasting(1.0, {"hysteresis": 0.7, "linear_spring": 0.1, "": 0.3}, ("linear_spring", ""))
+
+    monkeypatch.setattr("ctrl_df.identify.ladder.climb.lasting", lasting)
+    study = climb(Data(levels))
+    assert [s.effect for s in study.steps[1:]] == ["linear_spring", "constant_force"]
+    assert set(study.effects) == {"linear_spring", "constant_force"}
 
 
 def test_several_of_a_kind_are_known_by_their_places():

@@ -16,6 +16,7 @@ from typing import Any
 from ..checks import CHECK_VALUE, positive, shown
 from ..df.work import progress_bar
 from ..simulate import crew
+from .thresholds import BEAT, SILENT_MOST
 
 COMPLETE, UNDER_WAY, BUDGET_SPENT, INTERRUPTED = "complete", "under way", "budget spent", "interrupted"
 """How far an answer has come."""
@@ -61,6 +62,7 @@ class Course:
             seconds = positive(owner, "budget", budget, "s", remedy=CHECK_VALUE)
             self._until = self.began + seconds
         self._jobs, self._stage, self._bar = 0, "", None
+        self._told = self.began
 
     # --- what happens on the way ----------------------------------------------------------------------
 
@@ -68,12 +70,17 @@ class Course:
         """Tell what is done from here on."""
         crew.check()
         self._stage, self._jobs = text, 0
+        self._tell(text)
+        if self._bar is not None:
+            self._bar.set_description_str(f"{self.owner}: {text}")
+
+    def _tell(self, text: str) -> None:
+        """Log a line, and hand it to who takes lines."""
         line = f"{self.owner}: {time.perf_counter() - self.began:.1f} s, {text}"
+        self._told = time.perf_counter()
         _log.info(line)
         if callable(self._progress):
             self._progress(line)
-        elif self._bar is not None:
-            self._bar.set_description_str(f"{self.owner}: {text}")
 
     def detail(self, text: str, *values) -> None:
         """Log what only a developer wants to know."""
@@ -93,6 +100,8 @@ class Course:
 
     # --- crew.Watch -----------------------------------------------------------------------------------
 
+    beat = BEAT
+
     def left(self) -> float | None:
         """Return how many seconds are left; None: no end is set, or nothing is known yet."""
         if self.latest is None or math.isinf(self._until):
@@ -104,6 +113,12 @@ class Course:
         self._jobs += 1
         if self._bar is not None:
             self._bar.update(1)
+        self.waiting()
+
+    def waiting(self) -> None:
+        """Tell of a stage that lasts how many jobs it has made."""
+        if time.perf_counter() - self._told > SILENT_MOST:
+            self._tell(f"{self._stage} ({self._jobs} jobs done)")
 
     # --- from begin to end ----------------------------------------------------------------------------
 
@@ -157,6 +172,9 @@ class _Part(Course):
 
     def done(self):
         self.outer.done()
+
+    def waiting(self):
+        self.outer.waiting()
 
 
 class _Bar:

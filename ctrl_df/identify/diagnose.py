@@ -46,7 +46,9 @@ def diagnose(
     Parameters
     ----------
     model : block or closed loop
-        The model in use. Of a loop its block is diagnosed, driven by the recorded force.
+        The model in use. Of a loop its block is diagnosed, driven by the recorded force. Where a gap or an
+        elastic joint may be missing it says which side of it the sensor sees: the load, or, as
+        ``model.with_measured("motor")``, the motor. That is not tried.
     data : Measurement, FrequencyMeasurement or sequence of them
         Training records, or tables N(A, omega): every effect leaves its signature on the plane, too.
     holdout : as `data`, or None

@@ -109,3 +109,7 @@ EXPONENT = 700.0
 
 REPORT_BUDGET, REPORT_DPI = 200, 130
 """Simulations of the refit that tells standard errors; dots per inch of its pictures."""
+
+SILENT_MOST, BEAT = 10.0, 2.0
+"""Seconds for which a stage goes on without a line: an attention is kept no longer (Nielsen 1993). How often
+that is looked at while jobs go on: five times in them."""

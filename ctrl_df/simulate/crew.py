@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import os
 import threading
 from collections import deque
@@ -33,7 +34,15 @@ class TimeUp(Exception):  # noqa: N818 - not an error: no more time was given
 
 
 class Watch(Protocol):
-    """Who waits for the work of a thread."""
+    """Who waits for the work of a thread.
+
+    Attributes
+    ----------
+    beat : float
+        Seconds after which it hears that jobs go on.
+    """
+
+    beat: float
 
     def left(self) -> float | None:
         """Return how many seconds are left; None: as many as it takes."""
@@ -41,6 +50,10 @@ class Watch(Protocol):
 
     def done(self) -> None:
         """Hear that one job of many is done."""
+        ...
+
+    def waiting(self) -> None:
+        """Hear now and then that jobs go on."""
         ...
 
 
@@ -77,6 +90,27 @@ def _done() -> None:
     watch = getattr(_here, "watch", None)
     if watch is not None:
         watch.done()
+
+
+def _await(job: Future) -> None:
+    """Wait for a job.
+
+    Raises
+    ------
+    TimeUp
+        The time of this thread's `Watch` is over.
+    """
+    watch = getattr(_here, "watch", None)
+    beat = math.inf if watch is None else watch.beat
+    while True:
+        rest = left()
+        seconds = beat if rest is None else min(rest, beat)
+        if wait([job], None if math.isinf(seconds) else seconds).done:
+            return
+        if rest == seconds:
+            raise TimeUp
+        if watch is not None:
+            watch.waiting()
 
 
 def processors() -> int:
@@ -135,8 +169,7 @@ def side_by_side(function: Callable, items: Iterable, executor: Executor | None 
     results = []
     try:
         for item, awaited in zip(items, jobs, strict=True):
-            if not wait([awaited], left()).done:
-                raise TimeUp
+            _await(awaited)
             try:
                 results.append(awaited.result())
             except Elsewhere:

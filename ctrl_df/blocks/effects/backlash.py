@@ -14,7 +14,8 @@ class Backlash(Effect):
     """A gap between motor and load, closed by impacts with Newton's restitution.
 
     ``0 <= x_motor - x <= gap``. Together with `Compliance` the faces are elastic and the restitution unused.
-    Added to a single `Mass`, it splits off `load_fraction` of it as the load.
+    Added to a single `Mass`, it splits off `load_fraction` of it as the load;
+    the sensor sees the load unless the block has ``measured="motor"``.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ class Compliance(Effect):
     """An elastic joint: ``F_load = k (x_motor - x) + c (v_motor - v)``.
 
     Together with `Backlash` the spring acts outside the gap only. Added to a single `Mass`, it splits off
-    `load_fraction` of it as the load.
+    `load_fraction` of it as the load; the sensor sees the load unless the block has ``measured="motor"``.
 
     Parameters
     ----------

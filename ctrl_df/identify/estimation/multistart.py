@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,6 +28,7 @@ from .thresholds import (
     MOTOR_LEAST,
     NEAR,
     NEAR_STATES,
+    NEXT_TO_NOTHING,
     OPEN_RANGE,
     RESTART_FACTORS,
     RESTARTED_AGAIN,
@@ -124,10 +125,15 @@ def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> Fi
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
         model = found.model.with_parameters(feasible(found.model, shared))
-        near = data.fit(model, (), starts=found.starts, iterations=NEAR_STATES, hopeless=hopeless)
-        again = data.fit(model, found.names, starts=near.starts, iterations=NEAR, hopeless=hopeless)
+        again = _begun(model, found.names, found.starts, data, hopeless)
         found = min(found, again, key=lambda f: f.rmse)
     return restarted(found, data.fit, own(found), hopeless)
+
+
+def _begun(model, names, starts, data: SegmentedData, hopeless: float) -> FitResult:
+    """Fit a model with values of another, its initial states first."""
+    near = data.fit(model, (), starts=starts, iterations=NEAR_STATES, hopeless=hopeless)
+    return data.fit(model, names, starts=near.starts, iterations=NEAR, hopeless=hopeless)
 
 
 def cross_started(
@@ -175,6 +181,31 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
         if fitted.rmse < BETTER * tried.train.rmse:
             return data.validate(replace(tried, train=fitted))
     return tried
+
+
+def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: SegmentedData) -> list:
+    """Return models that have an effect more than another, none of them left in a minimum that errs more.
+
+    With the effect next to nothing a model is the one without it: what errs more has lost its minimum. It is
+    begun again from the other one, where it can be with so little of the effect, and else with as much of it
+    as was found.
+    """
+    return side_by_side(lambda f: f and _from_base(f, base, data), fits)
+
+
+def _from_base(found: FitResult, base: FitResult, data: SegmentedData) -> FitResult:
+    if found.rmse <= base.rmse:
+        return found
+    model, key = found.model, found.model.newest
+    values = {k: v for k, v in base.parameters.items() if k in found.names}
+    effect = model.effects[-1]
+    if effect.proportional:
+        size = next(iter(effect.parameters))
+        values[f"{key}.{size}"] = NEXT_TO_NOTHING * effect.values[0]
+    model = model.with_parameters(feasible(model, values))
+    starts = data.starts_as(model, data.train.records, base)
+    again = _begun(model, found.names, starts, data, found.rmse)
+    return min(found, again, key=lambda f: f.rmse)
 
 
 def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:

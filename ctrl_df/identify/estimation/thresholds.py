@@ -119,3 +119,7 @@ them go on: those that lead nowhere show it by then."""
 NEAR_STATES, NEAR = 4, 6
 """Steps of a fit with values of another: of initial states alone, which settles what these values moved, then
 of all. It is near its minimum, or it is dropped."""
+
+NEXT_TO_NOTHING = 1e-3
+"""Share of its size with which an effect is next to nothing: what it changes, a few hundred times the noise
+at most, is then below it."""

@@ -17,14 +17,16 @@ from itertools import islice
 from typing import Any
 
 from ...blocks.effect import Effect
+from ...cached import cached_property
 from ...numerals import percent
 from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
+from ..selection.lasting import lasting
 from ..selection.search import Search
 from ..selection.thresholds import CONFIRMED, FLOOR, SHOWS_HARDLY
-from ..selection.verdict import Diagnosed, diagnosed, worth
+from ..selection.verdict import Diagnosed, diagnosed, speaks_for, worth
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .structure import Structure, plainness
@@ -62,7 +64,21 @@ class Rung:
         ranking = self.found.ranking
         if self.refused or not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
             return None
-        return plainest(ranking)
+        return self._lasts_longest or plainest(ranking)
+
+    @cached_property
+    def _lasts_longest(self) -> CandidateEffect | None:
+        """The candidate that clearly predicts better than the first over long stretches; None: none does.
+
+        While several effects are missing, one whose hidden states are fitted anew in every segment may stand
+        in for all of them there, and follow nothing beyond. What is ahead in free prediction of data held out
+        need not be so in short segments.
+        """
+        found, search = self.found, self.search
+        long = lasting(found.ranking, found.baseline, search.significant)
+        better = () if long is None else long.better
+        told = {c.id: c for c in found.ranking if speaks_for(c, search)}
+        return next((told[i] for i in better if i in told), None)
 
     @property
     def way(self) -> list[Rung]:
@@ -166,7 +182,7 @@ class Climb:
             if revision.structure.key in self.rungs:
                 break
             how = _added(best) | {"dropped": revision.dropped, "instead": revision.instead}
-            ahead = self._rung(revision.structure, rung, how)
+            ahead = self._rung(revision.structure, rung, how, step)
             gain, held = self._compared(_reached(ahead), rung.structure.block, ahead.search)
             # what has dropped or replaced others does not need the evidence of an effect more
             least = rung.search.significant * (-1 if revision.dropped or revision.instead else 1)
@@ -177,12 +193,12 @@ class Climb:
             rung = ahead
         return rung
 
-    def _rung(self, structure: Structure, before: Rung | None, how: dict) -> Rung:
-        """Ask of a structure what it misses."""
+    def _rung(self, structure: Structure, before: Rung | None, how: dict, known: Step | None = None) -> Rung:
+        """Ask of a structure what it misses; `known`: what is told of it until that is known."""
         steps = before.steps if before else ()
         self.course.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
-        last = steps[-1] if steps else None
+        last = known or (steps[-1] if steps else None)
 
         def told(found: Diagnosis) -> Step:
             errors = found.nrmse, found.nrmse_holdout

@@ -62,6 +62,7 @@ def explain(d, words) -> str:
             + ", ".join(e.replace("_", " ") for e in first.equivalents)
             + "."
         )
+    same += sensed_side(d, first)
     if d.verdict == AMBIGUOUS:
         open_ones = [first, *rivals(d.ranking)]
         shared = [c for c in d.ranking if c not in open_ones and c.probability > SHOWN_PROBABILITY]
@@ -84,6 +85,17 @@ def explain(d, words) -> str:
     )
 
 
+def sensed_side(d, first) -> str:
+    """Return which side of a joint that a candidate adds the sensor is taken to see; empty without one."""
+    if first.model.core.bodies == d.model.core.bodies:
+        return ""
+    side = first.model.measured
+    other = "motor" if side == "load" else "load"
+    return (
+        f' The sensor is taken to see the {side}; if it sees the {other}, the model needs measured="{other}".'
+    )
+
+
 def falls_behind(first, long) -> str:
     """Return how the first of a ranking predicts over long horizons (`Lasting`)."""
     if long.horizon == 0:
@@ -97,6 +109,11 @@ def falls_behind(first, long) -> str:
         f"In free prediction over {long.horizon:.3g} s, internal states continued, the error with "
         f"{named(first.effect)} is {percent(long.errors[first.id])}, {others}: short segments are no proof."
     )
+
+
+def left_out(first, long) -> str:
+    """Return why the first of a ranking was left out, and all others tried without it (`Lasting`)."""
+    return f"{falls_behind(first, long)} All others were therefore tried again without {named(first.effect)}."
 
 
 def grows(short: float, error: float, seconds: float, effect=None) -> str:

@@ -16,6 +16,7 @@ from ..estimation.multistart import (
     begun_as,
     beyond,
     cross_started,
+    no_worse_than,
     own,
     restarted,
     thresholds_refined,
@@ -186,7 +187,8 @@ def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     follows. Where disturbance forces prevail the shortest segments alone may judge.
     """
     shortest, middle, longest = at.segmentations
-    short = side_by_side(shortest.moved, fits)
+    base, *others = side_by_side(shortest.moved, fits)
+    short = [base, *no_worse_than(base, others, shortest)]
     floor = FLOOR * min(f.rmse for f in short)
     if at.data.disturbed:
         return [short], floor
@@ -257,7 +259,7 @@ def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | No
     there = [i for i, f in enumerate(found) if f is not None]
     for i, f in zip(there, all_restarted([found[i] for i in there], data, floor), strict=True):
         found[i] = f
-    return found
+    return [found[0], *no_worse_than(found[0], found[1:], data)]
 
 
 def _longest_coherent(stages: Stages) -> int:

@@ -17,7 +17,7 @@ from ...simulate.crew import side_by_side
 from ..prediction.segments import facts
 from ..results.diagnosis import Baseline, CandidateEffect
 from ..thresholds import GROWTH, UNMOVED
-from .thresholds import OUTLASTING
+from .thresholds import LEFT, OUTLASTING
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,15 @@ class Lasting:
         nrmse there, by id; that of the baseline has an empty one.
     better : tuple of str
         Ids of those that err clearly less than the first, the best first.
+    refuted : bool
+        Whether the first is none of the right ones: the model without it is ahead, or the first explains no
+        motion where one of these explains nearly all of it.
     """
 
     horizon: float
     errors: Mapping[str, float]
     better: tuple[str, ...]
+    refuted: bool = False
 
     @property
     def ahead(self) -> bool:
@@ -91,4 +95,6 @@ def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: flo
     others = np.array([n != first.id for n in names])
     shown = int(np.argmax(table[1] / np.min(table[others], axis=0))) if better else len(table[0]) - 1
     errors = dict(zip(names, table[:, shown].tolist(), strict=True))
-    return Lasting(float(curves[0].horizon[shown]), errors, tuple(better))
+    farthest = dict(zip(names, table[:, -1].tolist(), strict=True))
+    nothing = farthest[first.id] >= UNMOVED and any(farthest[n] < LEFT for n in better)
+    return Lasting(float(curves[0].horizon[shown]), errors, tuple(better), "" in better or nothing)

@@ -113,6 +113,10 @@ CONFIRMED, CONFIRMED_FORCED = 6, 10
 """Most candidates that are refitted at the full rate: two, and all that the first look left near the best;
 where disturbance forces let it tell little."""
 
+REFUTED_MOST = 2
+"""Candidates that long stretches refute, after each of which all others are looked at again without it: a
+joint and a gap, which have the hidden states that follow short segments. Each look is a whole search."""
+
 OUTLASTING = 2
 """Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
 comparison at eight lengths."""

@@ -20,11 +20,11 @@ from ..results.diagnosis import (
     Diagnosis,
     rivals,
 )
-from ..results.explain import explain, explain_so_far, falls_behind, unconfirmed, undetermined
+from ..results.explain import explain, explain_so_far, falls_behind, left_out, unconfirmed, undetermined
 from ..thresholds import EXPONENT
 from .lasting import compared, lasting
 from .search import Remainder, Search
-from .thresholds import FLOOR
+from .thresholds import FLOOR, REFUTED_MOST
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +56,30 @@ def diagnosed(search: Search, classes, executor=None, course: Course | None = No
         return _Asked(known[0], began, limits).so_far(known[1])
 
     course = (course or Course()).within(so_far)
-    search, found = search.candidates(classes, executor, course)
-    search, chosen = search.confirm(found, course)
-    course.stage("verdict")
-    return _Asked(search, began, limits).answer(chosen, found, course)
+    first: Diagnosed | None = None
+    refuted: tuple[tuple[str, str], ...] = ()
+    while True:
+        left = [c for c in classes if c.id not in dict(refuted)]
+        after, found = search.candidates(left, executor, course)
+        after, chosen = after.confirm(found, course)
+        course.stage("verdict")
+        known, fallen = _Asked(after, began, limits, refuted).answer(chosen, found, course)
+        ranking = known.diagnosis.ranking
+        if first is not None and not (ranking and worth(ranking[0], after)):
+            return first  # without what was refuted nothing is explained
+        if fallen is None or len(refuted) == REFUTED_MOST:
+            return known
+        first = first or known
+        course.known((after, found))
+        course.stage(f"the same without {fallen[0].replace('_', ' ')}, which long stretches refute")
+        refuted = (*refuted, fallen)
 
 
 class _Asked:
     """One question: which effect the model of a search misses."""
 
-    def __init__(self, search: Search, began: float, limits):
-        self.search, self.began, self.limits = search, began, limits
+    def __init__(self, search: Search, began: float, limits, refuted: Sequence[tuple[str, str]] = ()):
+        self.search, self.began, self.limits, self.refuted = search, began, limits, refuted
 
     def so_far(self, found: Sequence) -> Diagnosed:
         """Return the diagnosis as it stands with these candidates, best first; it names no effect."""
@@ -80,8 +93,14 @@ class _Asked:
         result, _ = self._made(verdict, ranking, search.so_far(best), best, self._base(), UNDER_WAY)
         return Diagnosed(replace(result, explanation=explain_so_far(result, search.words)), search)
 
-    def answer(self, chosen: Sequence, found: Sequence, course: Course) -> Diagnosed:
-        """Return what confirmed candidates amount to, `found` beside them."""
+    def answer(
+        self, chosen: Sequence, found: Sequence, course: Course
+    ) -> tuple[Diagnosed, tuple[str, str] | None]:
+        """Return what confirmed candidates amount to, `found` beside them; and the first if it is refuted.
+
+        That is its id, and why in a sentence. What follows short segments by its hidden states alone, begun
+        anew in each, has set the pace at which others were given up: they are worth a look without it.
+        """
         search = self.search
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
@@ -103,26 +122,34 @@ class _Asked:
         else:
             verdict = AMBIGUOUS
         far: list = []
-        if verdict == EFFECT:
+        open_ = verdict == EFFECT or (verdict == AMBIGUOUS and not silent)
+        if open_:
             course.stage("free prediction over long stretches")
             far = [base, *compared(ranking, search.significant)]
         # neither needs the other's answer; what takes longest first
         told = verdict != NONE
         jobs = [lambda: search.remainder(best, told), *(lambda m=m: m.error_by_horizon for m in far)]
         remainder, *_ = side_by_side(lambda job: job(), jobs)
+        fallen = None
+        if open_:
+            long, named = lasting(ranking, base, search.significant), ranking[0].id
+            if long is not None and long.refuted:
+                fallen = named, left_out(ranking[0], long)
         if remainder.unexplained and not search.exact():
             verdict = UNKNOWN
         doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
         doubts = (unconfirmed(ranking[0]), *doubts) if silent else doubts
-        if verdict == EFFECT:
-            verdict, ranking, further = doubted(ranking, base, search.significant)
-            doubts = further if verdict == UNKNOWN else (*further, *doubts)
-            if verdict == UNKNOWN:
+        if far and verdict != AMBIGUOUS:
+            lasts, ranking, further = doubted(ranking, base, search.significant)
+            doubts = further if lasts == UNKNOWN else (*further, *doubts)
+            if lasts == UNKNOWN:
                 # refuted: what is missing is what the model leaves without it
                 best, remainder = search.base, search.remainder(search.base, False)
+            verdict = lasts if verdict == EFFECT else verdict
+        doubts = (*doubts, *(why for _, why in self.refuted))
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
-        return Diagnosed(replace(result, explanation=explain(result, words) + note), search)
+        return Diagnosed(replace(result, explanation=explain(result, words) + note), search), fallen
 
     def _base(self) -> Baseline:
         search = self.search
@@ -177,8 +204,11 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     those fitted have to speak for themselves. Whitened residuals may speak for an effect that makes slow
     errors larger: the plain error held out must not grow.
     """
-    if first.nrmse_holdout > FLOOR * search.errors(search.base)[1]:
-        return False
+    return speaks_for(first, search) and first.nrmse_holdout <= FLOOR * search.errors(search.base)[1]
+
+
+def speaks_for(first: CandidateEffect, search: Search) -> bool:
+    """Whether the evidence of the data fitted and of those held out is for an effect."""
     return (
         first.evidence_fitted > search.significant and first.evidence_holdout > search.significant_validation
     )

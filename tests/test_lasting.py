@@ -1,0 +1,78 @@
+"""What long stretches refute is left out, and all others are tried again without it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_ladder import Data, climb
+
+import ctrl_df as cdf
+from ctrl_df.identify.selection import verdict
+from ctrl_df.identify.selection.lasting import Lasting, lasting
+
+T = np.arange(0, 4, 0.01)
+RECORD = cdf.Measurement(
+    T, np.sin(3 * T), np.sin(2 * T) + 1e-4 * np.random.default_rng(0).standard_normal(T.size)
+)
+
+
+def model(id, *errors):
+    curve = SimpleNamespace(nrmse=np.array(errors), horizon=np.array([0.5, 1.0, 2.0]))
+    return SimpleNamespace(
+        id=id, error_by_horizon=curve, predicted=(None, (RECORD,)), confirmed=True, evidence=100.0,
+        equivalents=(),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "first, rival, base, refuted",
+    [
+        (
+            (1.4, 2.6, 1.1),
+            (0.07, 0.4, 0.6),
+            (0.2, 0.4, 0.7),
+            True,
+        ),  # worse than nothing: a joint for a weight
+        ((0.04, 0.15, 0.7), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), True),  # explains nothing in the end
+        ((0.04, 0.15, 0.4), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), False),  # behind, and still in question
+        ((0.04, 0.05, 0.06), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), False),
+    ],
+)
+def test_who_is_refuted(first, rival, base, refuted):
+    found = lasting([model("compliance", *first), model("gravity", *rival)], model("", *base), 20.0)
+    assert found is not None and found.refuted == refuted and found.ahead == (first[2] == 0.06)
+
+
+def refuting(*ids):
+    """Return what long stretches say of a ranking where these effects come to nothing over them."""
+
+    def judged(ranking, base, significant):
+        first, better = ranking[0].id, ("",)
+        if first not in ids:
+            return Lasting(2.0, {first: 0.1, "": 0.5}, ())
+        return Lasting(2.0, {first: 0.9, "": 0.5}, better, True)
+
+    return judged
+
+
+def level(added):
+    """Return the likelihood of models in which the two do not add up."""
+    return 500.0 if "linear_spring" in added else 600.0 if "hysteresis" in added else 0.0
+
+
+def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
+    monkeypatch.setattr(verdict, "lasting", refuting("hysteresis"))
+    data = Data({"": 0, "hysteresis": 600, "linear_spring": 500})
+    data.top = 500
+    monkeypatch.setattr(Data, "level", lambda self, block: level(self.added(block)))
+    study = climb(data)
+    assert study.effects == ("linear_spring",)
+    first = study.steps[0].diagnosis
+    assert first.verdict == "effect" and "hysteresis" not in [c.id for c in first.ranking]
+    assert "again without hysteresis" in first.explanation
+
+
+def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):
+    monkeypatch.setattr(verdict, "lasting", refuting("hysteresis"))
+    first = climb(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
+    assert first.verdict == "unknown" and first.ranking[0].id == "hysteresis"
