@@ -17,16 +17,14 @@ from typing import TYPE_CHECKING as _TYPE_CHECKING
 from .blocks.effect import Effect, effect_class, effect_library, register_effect
 from .blocks.effects import *  # noqa: F403
 from .blocks.effects import __all__ as _effects
-from .blocks.hysteresis import (
+from .blocks.elements.hysteresis import (
     friction_backlash_nonlinearity,
     play,
     rate_limiter,
     relay_hysteresis_nonlinearity,
     relay_with_hysteresis,
 )
-from .blocks.massless import Massless
-from .blocks.mechanism import Mass, Mechanism, TwoMass, backlash_masses, friction_mass
-from .blocks.memoryless import (
+from .blocks.elements.memoryless import (
     DescribingFunctionNonlinearity,
     cubic,
     dead_zone,
@@ -38,6 +36,8 @@ from .blocks.memoryless import (
     saturation,
     saturation_nonlinearity,
 )
+from .blocks.massless import Massless
+from .blocks.mechanism import Mass, Mechanism, TwoMass, backlash_masses, friction_mass
 from .blocks.parameter import Parameter, parameter
 from .blocks.pid import pid
 from .blocks.rotary import Inertia, TwoInertias

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from .column import Column
-from .per_record import PerRecord
+from .values.column import Column
+from .values.per_record import PerRecord
 
 CHECK_VALUE = "Check the value and its unit (SI)."
 _SHOWN = 60  # characters of a value that an error repeats

@@ -157,7 +157,7 @@ def _paces():
 
 def _laws():
     from .blocks.effect import effect_library
-    from .blocks.memoryless import cubic
+    from .blocks.elements.memoryless import cubic
     from .simulate.engine import Engine
     from .simulate.program.nodes import signature_of
     from .simulate.program.pointers import address

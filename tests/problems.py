@@ -15,9 +15,9 @@ import control as ct
 import numpy as np
 from scipy.optimize import brentq
 
-from ctrl_df.blocks.hysteresis import relay_with_hysteresis
+from ctrl_df.blocks.elements.hysteresis import relay_with_hysteresis
+from ctrl_df.blocks.elements.memoryless import relay, saturation
 from ctrl_df.blocks.mechanism import backlash_masses, friction_mass
-from ctrl_df.blocks.memoryless import relay, saturation
 from ctrl_df.blocks.pid import pid
 
 

@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.column import Column, Differs
 from ctrl_df.simulate.batch import _require_room
 from ctrl_df.simulate.engine import Engine, sampled_drive
 from ctrl_df.simulate.groups import Group, assigned, groups_of
 from ctrl_df.simulate.runs import harmonic_drives, run_many, sampled_drives
+from ctrl_df.values.column import Column, Differs
 
 T = np.linspace(0, 0.8, 401)
 U = 15 * np.sin(9 * T) + 9 * np.sin(41 * T + 1)

@@ -127,7 +127,7 @@ def test_an_effect_that_held_out_data_never_reach_is_ambiguous():
         free=["viscous.coefficient"], candidates=["hard_stop", "cubic_spring", "quadratic_drag"],
     )  # fmt: skip
     assert found.verdict == "ambiguous" and found.best.id == "hard_stop"
-    assert "those held out say nothing of it" in found.explanation
+    assert "the held-out data do not confirm it" in found.explanation
 
 
 def test_static_levels_are_chosen_before_what_is_held_out_counts_as_luck():

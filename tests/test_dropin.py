@@ -10,8 +10,12 @@ import control as ct
 import numpy as np
 import pytest
 
-from ctrl_df.blocks.hysteresis import friction_backlash_nonlinearity, relay_hysteresis_nonlinearity
-from ctrl_df.blocks.memoryless import DescribingFunctionNonlinearity, saturation, saturation_nonlinearity
+from ctrl_df.blocks.elements.hysteresis import friction_backlash_nonlinearity, relay_hysteresis_nonlinearity
+from ctrl_df.blocks.elements.memoryless import (
+    DescribingFunctionNonlinearity,
+    saturation,
+    saturation_nonlinearity,
+)
 from ctrl_df.df.describing import describing_function
 from ctrl_df.limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
 from ctrl_df.plot.describing import describing_function_plot

@@ -1,4 +1,4 @@
-"""Families, scans of starts and laps in compiled calls: the numbers are those of one run after the other."""
+"""Families, scans of starts, Poincaré maps in one call: the numbers are those of one run after the other."""
 
 import numpy as np
 import pytest
@@ -47,21 +47,27 @@ def test_work_on_threads_stops_where_one_part_fails():
 
 def test_passages_are_those_of_single_runs():
     finder = OrbitFinder(cdf.closed_loop(cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5)))
-    swings, engine = finder.swings, finder.engine
-    state = swings.start(swings.kicks.state(3 * swings.kicks.scale))
-    mine = strides(engine, state, swings._signal, swings.row, swings.stride, np.inf, 1e-8)
+    search, engine = finder.poincare, finder.engine
+    state = search.start(search.kicks.state(3 * search.kicks.scale))
+    mine = strides(engine, state, search._signal, search.row, search.stride, np.inf, 1e-8)
     before = []
     for _ in range(70):  # more than are made in one call
-        ahead = 4 * (before[-1] - before[-2]) if len(before) >= 2 else swings.stride
+        ahead = 4 * (before[-1] - before[-2]) if len(before) >= 2 else search.stride
         times = state.time + np.linspace(0.0, ahead, 129)
         run = engine.run(
-            state, state.time + ahead, times=times, rtol=1e-8, watch=swings._signal, log=1, max_steps=400_000
+            state,
+            state.time + ahead,
+            times=times,
+            rtol=1e-8,
+            watch=search._signal,
+            log=1,
+            max_steps=400_000,
         )
         state, stride = run.state, next(mine)
         assert stride.passed == (run.reason == driver.SECTION)
         assert np.isclose(stride.time, state.time, rtol=1e-12, atol=0)
         assert np.allclose(stride.x, state.x, rtol=1e-9, atol=1e-12 * np.max(np.abs(state.x)))
-        peak = np.max(np.abs(run.outputs[: run.recorded, swings.row]))
+        peak = np.max(np.abs(run.outputs[: run.recorded, search.row]))
         assert np.isclose(stride.peak, peak, rtol=1e-9)
         if stride.passed:
             before.append(state.time)

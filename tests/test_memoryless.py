@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from ctrl_df.blocks.hysteresis import play, rate_limiter, relay_with_hysteresis
-from ctrl_df.blocks.mechanism import friction_mass
-from ctrl_df.blocks.memoryless import (
+from ctrl_df.blocks.elements.hysteresis import play, rate_limiter, relay_with_hysteresis
+from ctrl_df.blocks.elements.memoryless import (
     cubic,
     dead_zone,
     piecewise_linear,
@@ -22,6 +21,7 @@ from ctrl_df.blocks.memoryless import (
     relay_with_dead_zone,
     saturation,
 )
+from ctrl_df.blocks.mechanism import friction_mass
 from ctrl_df.blocks.primitives import PiecewiseAffine
 from ctrl_df.df import work
 from ctrl_df.df.describing import describing_function, describing_function_family

@@ -94,9 +94,9 @@ def test_a_loop_closed_on_the_velocity_is_verified_there():
 
 def test_starts_of_six_sizes():
     finder = OrbitFinder(cdf.closed_loop(cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5)))
-    starts = finder.swings.kicks.all()
+    starts = finder.poincare.kicks.all()
     assert len(starts) == 6
-    assert len(finder.swings.follow(starts[0][1], 5).laps) == 5
+    assert len(finder.poincare.iterate(starts[0][1], 5).crossings) == 5
 
 
 BLOCK = cdf.friction_mass(9, 5, 0.5)

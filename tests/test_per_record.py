@@ -14,7 +14,7 @@ from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.values import for_record, with_own, with_values
 from ctrl_df.identify.shooting.multiple_shooting import Stage
 from ctrl_df.identify.shooting.problem import Problem
-from ctrl_df.per_record import PerRecord
+from ctrl_df.values.per_record import PerRecord
 
 START = cdf.friction_mass(2.0, 2.5, 5.0).with_effect(cdf.ConstantForce(0.0))
 OWN = {"viscous.coefficient": (4.0, 6.0, 9.0), "constant_force.force": (0.5, -1.0, 1.5)}

@@ -13,9 +13,9 @@ import matplotlib.pyplot as plt
 from problems import PROBLEMS, tsypkin_relay
 
 from ctrl_df.blocks.effects import InputSaturation
-from ctrl_df.blocks.hysteresis import play, rate_limiter, relay_with_hysteresis
+from ctrl_df.blocks.elements.hysteresis import play, rate_limiter, relay_with_hysteresis
+from ctrl_df.blocks.elements.memoryless import relay, saturation
 from ctrl_df.blocks.mechanism import backlash_masses, friction_mass
-from ctrl_df.blocks.memoryless import relay, saturation
 from ctrl_df.blocks.pid import pid
 from ctrl_df.df.describing import describing_function, describing_function_family
 from ctrl_df.limit_cycles.predicted.predict import describing_function_response

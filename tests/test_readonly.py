@@ -25,7 +25,7 @@ COUNTED = FRICTION + (
 )
 
 SMALL = (
-    "from ctrl_df.df.closed_form.wall_map import wrap"
+    "from ctrl_df.df.closed_form.impact_map import wrap"
     "; print(wrap(7.0), 'hits', sum(wrap.stats.cache_hits.values()))"
 )
 PLACES = sorted({file.parent.relative_to(PACKAGE) for file in PACKAGE.rglob("*.py")})
@@ -142,7 +142,7 @@ def test_a_law_of_the_users_compiles_where_nothing_can_be_kept(cold):
 def test_where_the_package_cannot_be_written_the_next_place_is_used(place, cold, tmp_path):
     done = run(cold, "-c", SMALL, **{place: tmp_path / "place"})
     assert "hits 0" in done.stdout and not done.stderr, done.stderr
-    assert len(list((tmp_path / "place").rglob("wall_map.wrap*.nbi"))) == 1
+    assert len(list((tmp_path / "place").rglob("impact_map.wrap*.nbi"))) == 1
 
 
 def test_machine_code_in_a_read_only_place_is_used(warm):
@@ -154,7 +154,7 @@ def test_machine_code_in_a_read_only_place_is_used(warm):
 def test_damaged_machine_code_is_compiled_anew(tmp_path):
     folder = copied(tmp_path / "copy", bare=True)
     assert "hits 0" in run(folder, "-c", SMALL).stdout
-    files = list((folder / "ctrl_df" / "df" / "closed_form" / "__pycache__").glob("wall_map.wrap*.nb*"))
+    files = list((folder / "ctrl_df" / "df" / "closed_form" / "__pycache__").glob("impact_map.wrap*.nb*"))
     assert len(files) == 2
     for file in files:
         file.write_bytes(file.read_bytes()[:40])

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
+from ctrl_df.df.forced_orbit.orbit_search import OrbitSearch
 from ctrl_df.df.forced_orbit.orbits import OrbitSolver
 
 
@@ -151,7 +152,7 @@ def shooting(rates, n, A, omega, x):
 def test_lightly_damped_cubic_spring_is_its_own_periodic_orbit(omega):
     b, k3 = 2e-3, 0.02
     plant = block(cdf.Mass(1), cdf.LinearSpring(100.0), cdf.Viscous(b), cdf.CubicSpring(k3))
-    solver = OrbitSolver(plant)
+    solver = OrbitSolver(OrbitSearch(plant))
     y, regime, _ = solver.solve(1.0, omega, 3)
     N, multiplier = shooting(
         lambda x, F: (x[1], F - b * x[1] - 100 * x[0] - k3 * x[0] ** 3), 2, 1.0, omega, solver.previous.x
@@ -165,7 +166,7 @@ def test_lightly_damped_elastic_joint_is_its_own_periodic_orbit():
         cdf.TwoMass(1.0, 2.0), cdf.Compliance(k, c), cdf.LinearSpring(10.0), cdf.QuadraticDrag(drag)
     )
     omega = math.sqrt(k * 1.5)
-    solver = OrbitSolver(plant)
+    solver = OrbitSolver(OrbitSearch(plant))
     y, regime, _ = solver.solve(3.0, omega, 3)
 
     def rates(x, F):

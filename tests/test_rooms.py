@@ -1,6 +1,7 @@
-"""Rooms keep their privacy: no attribute with an underscore is read from outside its package."""
+"""Rooms keep their privacy and their size, and docs/architecture.md names the files there are."""
 
 import ast
+import re
 from pathlib import Path
 
 import ctrl_df
@@ -8,6 +9,11 @@ import ctrl_df
 ROOT = Path(ctrl_df.__file__).parent
 
 OF_PYTHON_CONTROL = {"_isstatic"}  # which blocks answer as its own systems do
+
+MOST_FILES = 15
+
+ALIKE = {"blocks/effects", "demo", "plot", "plot/identification", "plot/parts"}
+"""Folders whose files are of one kind: an effect, a picture; no page names them one by one."""
 
 
 def room(path):
@@ -71,3 +77,30 @@ def test_editors_know_every_name_that_is_loaded_on_first_use():
     (block,) = (n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "_TYPE_CHECKING")
     stated = {a.asname: n.module for n in block.body if isinstance(n, ast.ImportFrom) for a in n.names}
     assert stated == ctrl_df._LAZY
+
+
+def test_no_folder_has_more_than_fifteen_unlike_files():
+    folders: dict[str, int] = {}
+    for path in ROOT.rglob("*.py"):
+        folder = path.parent.relative_to(ROOT).as_posix()
+        if not path.name.startswith("__") and folder not in ALIKE:
+            folders[folder] = folders.get(folder, 0) + 1
+    assert max(folders.values()) <= MOST_FILES, folders
+
+
+def test_architecture_names_the_files_there_are():
+    page = (ROOT.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"[\w/]+\.py", page))
+    files = {p.relative_to(ROOT.parent).as_posix() for p in ROOT.parent.glob("*/**/*.py")}
+    gone = {n for n in named if not any(f == n or f.endswith(f"/{n}") for f in files)}
+    assert not gone, gone
+    inside = {p.relative_to(ROOT) for p in ROOT.rglob("*.py")}
+    unnamed = {
+        path.as_posix()
+        for path in inside
+        if path.name not in ("__init__.py", "thresholds.py")
+        and path.parent.as_posix() not in ALIKE
+        and path.name not in {n.rpartition("/")[2] for n in named}
+        and not re.search(rf"\b{path.stem}\b", page)
+    }
+    assert not unnamed, unnamed

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.limit_cycles.exact import swings
+from ctrl_df.limit_cycles.exact import poincare
 from ctrl_df.limit_cycles.exact.closing import Closing
 from ctrl_df.limit_cycles.exact.orbit import NoOrbit
-from ctrl_df.limit_cycles.exact.swings import Lap
+from ctrl_df.limit_cycles.exact.poincare import Crossing
 from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.limit_cycles.pieces import by_pieces
 from ctrl_df.limit_cycles.predicted.path import End
@@ -243,15 +243,15 @@ def test_simulations_in_other_units(units):
         assert np.abs(runs[0][0] - runs[1][0]).max() < 1e-8 * np.abs(runs[0][0]).max()
 
 
-# --- findings 5 and 9: several laps, centres ----------------------------------------------------------------
+# --- findings 5 and 9: several rounds, centres --------------------------------------------------------------
 
 
-@pytest.mark.parametrize("laps", [2, 3, 5, 7, 11])
-def test_an_orbit_closed_after_several_laps_is_the_one_of_a_single_lap(laps):
+@pytest.mark.parametrize("rounds", [2, 3, 5, 7, 11])
+def test_an_orbit_closed_after_several_rounds_is_the_one_of_a_single_round(rounds):
     loop = cdf.closed_loop(cdf.pid(1800, 19500, 100), cdf.backlash_masses(1, 8, 0.018, 0.2))
     closing = OrbitFinder(loop).closing
     orbit = cdf.find_limit_cycle(loop, guess=(17.75, 14.84))
-    again = closing.close(orbit.states[:, 0], laps * orbit.period)
+    again = closing.close(orbit.states[:, 0], rounds * orbit.period)
     assert again.period == pytest.approx(orbit.period, rel=1e-8)
     assert again.multiplier == pytest.approx(orbit.multiplier, rel=1e-6)
 
@@ -266,24 +266,24 @@ def test_a_centre_is_no_limit_cycle():
 # --- fates by trend, not by waiting -------------------------------------------------------------------------
 
 
-def _laps(durations, peaks):
+def _crossings(durations, peaks):
     times = np.cumsum(np.concatenate([[0.0], durations]))
-    return [Lap(t, np.zeros(1), p) for t, p in zip(times, peaks, strict=True)]
+    return [Crossing(t, np.zeros(1), p) for t, p in zip(times, peaks, strict=True)]
 
 
 def test_growth_without_end_is_told_from_growth_towards_a_limit():
     """exp(c (1 - 0.9^n)) rises by e^c and no more; a steady ratio is told after a few steps."""
     n = np.arange(40)
-    assert swings._endless(1.3 ** n[:6], 1e4) and swings._endless(12.0 ** n[:3], 1e4)
-    assert not swings._endless(np.exp(5 * (1 - 0.9**n)), 1e4)
-    assert not swings._endless(1.0 + n, 1e4) and not swings._endless(np.ones(40), 1e4)
+    assert poincare._endless(1.3 ** n[:6], 1e4) and poincare._endless(12.0 ** n[:3], 1e4)
+    assert not poincare._endless(np.exp(5 * (1 - 0.9**n)), 1e4)
+    assert not poincare._endless(1.0 + n, 1e4) and not poincare._endless(np.ones(40), 1e4)
 
 
 def test_a_motion_that_slows_down_by_a_ratio_each_swing_comes_to_rest():
     slower = 1.6 ** np.arange(8)
-    assert swings._creeps(_laps(slower, np.full(9, 0.05)))
-    assert not swings._creeps(_laps(slower, 1.3 ** np.arange(9)))  # its swings grow: it does not creep
-    assert not swings._creeps(_laps(np.full(8, 2.0), np.full(9, 0.05)))
+    assert poincare._creeps(_crossings(slower, np.full(9, 0.05)))
+    assert not poincare._creeps(_crossings(slower, 1.3 ** np.arange(9)))  # its swings grow: it does not creep
+    assert not poincare._creeps(_crossings(np.full(8, 2.0), np.full(9, 0.05)))
     loop = cdf.closed_loop(ct.tf([429], [1, 17.01, 63.17, 0]), cdf.play(0.3725))
     begun = time.perf_counter()
     fate = OrbitFinder(loop).explorer.explore()
@@ -291,7 +291,7 @@ def test_a_motion_that_slows_down_by_a_ratio_each_swing_comes_to_rest():
 
 
 def test_a_simulation_that_spends_its_work_is_undecided(monkeypatch):
-    monkeypatch.setattr(swings, "WORK", 30)
+    monkeypatch.setattr(poincare, "WORK", 30)
     finder = OrbitFinder(cdf.closed_loop(ct.tf([8], [1, 2, 2, 1]), np.tanh))
     assert {row.fate for row in finder.explorer.explore(edges=False)} == {"undecided"}
 
@@ -302,7 +302,7 @@ def test_the_scale_of_a_smooth_law_in_other_units(force):
 
     def scale(f):
         loop = cdf.closed_loop(ct.tf([11.5], [1, 1.92, 2.15, 1.65]), lambda v: f * (v / f) / (1 + abs(v / f)))
-        return OrbitFinder(loop).swings.kicks.scale / f
+        return OrbitFinder(loop).poincare.kicks.scale / f
 
     assert scale(force) == pytest.approx(scale(1.0), rel=1e-6)
 
@@ -394,13 +394,13 @@ def test_a_quantizer_may_balance_a_loop_at_very_many_amplitudes(grid):
 
 
 def test_swings_of_a_law_fade_where_it_is_straight():
-    """A start below the bend decays as the linear loop does; a tenth of the laps to 1e-6 tell so."""
+    """A start below the bend decays as the linear loop does; a tenth of the crossings to 1e-6 tell so."""
     loop = cdf.closed_loop(ct.tf([6.0], [1, 3, 3, 1]), lambda v: v + v**3)
-    swing = OrbitFinder(loop).swings
-    assert swing.kicks.straight == pytest.approx(swing.kicks.scale)
-    course = swing.follow(swing.kicks.state(0.03 * swing.kicks.scale), 1000)
-    assert course.fate == "rests" and len(course.laps) < 40
-    assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).swings.kicks.straight == 0
+    search = OrbitFinder(loop).poincare
+    assert search.kicks.straight == pytest.approx(search.kicks.scale)
+    course = search.iterate(search.kicks.state(0.03 * search.kicks.scale), 1000)
+    assert course.fate == "rests" and len(course.crossings) < 40
+    assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).poincare.kicks.straight == 0
 
 
 def test_no_passage_is_lost_between_two_strides_of_samples():
@@ -411,9 +411,9 @@ def test_no_passage_is_lost_between_two_strides_of_samples():
     )
     check = cdf.verify(response)
     assert [row.verdict for row in check] == ["confirmed"]
-    swings_of = OrbitFinder(check.loop).swings
-    laps = swings_of.follow(check.orbits[0].states[:, 0], 500, until_repeated=False).laps
-    spans = np.diff([lap.time for lap in laps])[10:]
+    search = OrbitFinder(check.loop).poincare
+    crossings = search.iterate(check.orbits[0].states[:, 0], 500, until_repeated=False).crossings
+    spans = np.diff([c.time for c in crossings])[10:]
     assert len(spans) > 400 and spans.max() < 1.5 * np.median(spans)
 
 

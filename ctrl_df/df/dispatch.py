@@ -8,11 +8,11 @@ import control as ct
 import numpy as np
 from control import descfcn
 
-from ..blocks.element import Element
-from ..blocks.hysteresis import play, relay_with_hysteresis
+from ..blocks.elements.element import Element
+from ..blocks.elements.hysteresis import play, relay_with_hysteresis
+from ..blocks.elements.memoryless import saturation
 from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
-from ..blocks.memoryless import saturation
 from .methods import (
     ElementIntegrals,
     ForcedOrbit,

@@ -21,7 +21,7 @@ class Method:
 
     Attributes
     ----------
-    subject : object
+    block : object
         The block, or what stands for it.
     output : str
         Name of the output described.
@@ -49,7 +49,7 @@ class Method:
         What every answer of it has to be read with.
     """
 
-    subject: Any
+    block: Any
     output: str = "y"
 
     needs_omega: ClassVar[bool] = True
@@ -117,7 +117,7 @@ class ElementIntegrals(Method):
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
-        return _spread(element_harmonics(self.subject, A, None, orders), A, omega, orders)
+        return _spread(element_harmonics(self.block, A, None, orders), A, omega, orders)
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class RateLimiterForm(Method):
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
-        columns = [element_harmonics(self.subject, A, w, orders) for w in omega]
+        columns = [element_harmonics(self.block, A, w, orders) for w in omega]
         regime = np.array([c[1] for c in columns], dtype=str).T
         return np.stack([c[0] for c in columns], axis=1), regime, np.stack([c[2] for c in columns], axis=1)
 
@@ -156,7 +156,7 @@ class Quadrature(Method):
 
     def law(self):
         """See `Method.law`."""
-        return self.subject if callable(self.subject) else None
+        return self.block if callable(self.block) else None
 
     def identity(self) -> tuple:
         """See `Method.identity`."""
@@ -168,7 +168,7 @@ class Quadrature(Method):
         return self._integrals(A, orders)
 
     def _integrals(self, A, orders):
-        return callable_harmonics(self.subject, A, orders)
+        return callable_harmonics(self.block, A, orders)
 
     def _by_own_method(self, A, orders):
         """N from the user's ``describing_function``; the other harmonics, if asked, from the law itself."""
@@ -210,7 +210,7 @@ class Sampled(Quadrature):
     def copied(self) -> Method | None:
         """See `Method.copied`: parts must not disturb each other's memory."""
         try:
-            return replace(self, subject=copy.deepcopy(self.subject))
+            return replace(self, block=copy.deepcopy(self.block))
         except Exception:  # whatever cannot be copied: one part after the other, then
             return None
 
@@ -219,7 +219,7 @@ class Sampled(Quadrature):
         return (*super().identity(), self.samples)
 
     def _integrals(self, A, orders):
-        return swept_harmonics(self.subject, A, orders, self.samples)
+        return swept_harmonics(self.block, A, orders, self.samples)
 
 
 # --- blocks with dynamics -----------------------------------------------------------------------------------
@@ -234,7 +234,7 @@ class FrequencyResponse(Method):
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
-        return _linear(self.subject, A, omega, orders)
+        return _linear(self.block, A, omega, orders)
 
 
 @dataclass(frozen=True)
@@ -287,7 +287,7 @@ class FrictionClosedForm(_OfPosition):
     def _of_position(self, A, omega, orders):
         from .closed_form.friction import FRICTION_REGIMES, friction_family
 
-        block = self.subject
+        block = self.block
         given = {type(e): e.values[0] for e in block.effects}
         y, code, residual = friction_family(
             block.core.masses[0],
@@ -329,7 +329,7 @@ class ImpactMap(_OfPosition):
         """See `Method.branches`."""
         from .closed_form.backlash_branches import backlash_branches
 
-        found = backlash_branches(self.subject, A, omega, near_A, near_omega)
+        found = backlash_branches(self.block, A, omega, near_A, near_omega)
         return [b.differentiated(self.order) for b in found] if self.order else found
 
     def identity(self) -> tuple:
@@ -339,7 +339,7 @@ class ImpactMap(_OfPosition):
     def _of_position(self, A, omega, orders):
         from .closed_form import backlash
 
-        block, joint = self.subject, self.subject.effects[0]
+        block, joint = self.block, self.block.effects[0]
         load, motor = block.core.masses
         y, code, residual = backlash.backlash_family(
             motor, load, joint.gap, joint.restitution, A, omega, orders, **self.options
@@ -368,7 +368,7 @@ class ForcedOrbit(Method):
         from .forced_orbit import orbits
 
         y, code, residual = orbits.orbit_family(
-            self.subject, A, omega, orders=orders, output=self.output, **self.options
+            self.block, A, omega, orders=orders, output=self.output, **self.options
         )
         return y, named(code, orbits.ORBIT_REGIMES), residual
 
@@ -376,7 +376,7 @@ class ForcedOrbit(Method):
         """See `Method.compiled`."""
         from .forced_orbit import orbits
 
-        return not orbits.solver_for(self.subject, self.output, **self.options).engine.calls_python
+        return not orbits.solver_for(self.block, self.output, **self.options).search.engine.calls_python
 
     def identity(self) -> tuple:
         """See `Method.identity`."""
@@ -396,7 +396,7 @@ class ImposedForce(Method):
         y = np.empty((A.size, omega.size, orders + 1), complex)
         residual = np.empty((A.size, omega.size))
         for i, k in np.ndindex(residual.shape):
-            y[i, k], residual[i, k] = force_harmonics(self.subject.core, A[i], omega[k], orders)
+            y[i, k], residual[i, k] = force_harmonics(self.block.core, A[i], omega[k], orders)
         return y, np.where(np.isfinite(residual), "slip", "aperiodic"), residual
 
 

@@ -90,7 +90,7 @@ def _slope_at_zero(method, largest, zero_check):
     if isinstance(method, Quadrature) and method.own_method is not None:
         return complex(method.own_method(0.0))
     if zero_check and isinstance(method, Quadrature):
-        at_zero = np.squeeze(np.asarray(method.subject(0.0), dtype=float))
+        at_zero = np.squeeze(np.asarray(method.block(0.0), dtype=float))
         if at_zero != 0:
             raise ValueError(
                 f"function must evaluate to zero at zero; got f(0) = {at_zero}. "

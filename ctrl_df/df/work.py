@@ -211,7 +211,7 @@ class Work:
     def _fingerprint(self) -> str:
         method, labels = self.method, list(getattr(self.F, "output_labels", []))
         output = labels.index(method.output) if method.output in labels else method.output
-        law = method.subject.law if isinstance(method.subject, Guarded) else method.subject
+        law = method.block.law if isinstance(method.block, Guarded) else method.block
         return fingerprint(FORMAT, law, output, method.identity(), self.A, self._omega, self.orders)
 
     @property

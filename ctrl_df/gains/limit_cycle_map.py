@@ -40,7 +40,7 @@ def limit_cycle_map(
     seed: int = 0,
     progress: bool | None = None,
 ) -> LimitCycleMap:
-    """Map what a PID loop around a block does over two of its gains: whether it rests, cycles or diverges.
+    """Map what a PID loop around a block does, over two of its gains: whether it rests, cycles or diverges.
 
     One family of describing functions N(a, omega) serves all gains: a cycle of amplitude a and frequency
     omega needs ``P C = -1/N``, which are two equations for two gains. Folds, where cycles appear in pairs,

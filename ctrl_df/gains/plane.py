@@ -20,7 +20,7 @@ from ..df.describing import describing_function_family
 from ..df.dispatch import method_for
 from ..df.methods import ElementIntegrals, Method
 from ..df.points import points
-from ..limit_cycles.exact.swings import Swings
+from ..limit_cycles.exact.poincare import PoincareSearch
 from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.scan_grid import noisy, with_corners
 from ..simulate.engine import Engine
@@ -140,7 +140,7 @@ def plane_of(
 def _scales(structure, gains) -> tuple[float, float]:
     """Return the frequency at which a loop moves [rad/s] and the input amplitude at which its block bends."""
     loop: Any = structure.loop(gains)
-    kicks = Swings(loop, Engine(loop)).kicks
+    kicks = PoincareSearch(loop, Engine(loop)).kicks
     if isinstance(loop.parts.block, Mechanism):
         return kicks.pace, kicks.scale * sum(kicks.core.masses) * kicks.pace**2
     return kicks.pace, kicks.scale
@@ -149,7 +149,7 @@ def _scales(structure, gains) -> tuple[float, float]:
 def _amplitudes(method, a, w):
     """Refine an axis of amplitudes where the block begins to move, and where an element bends."""
     if isinstance(method, ElementIntegrals):
-        return with_corners(a, method.subject.primitive)
+        return with_corners(a, method.block.primitive)
     if not method.quick:
         return a
     middle = w[w.size // 2 : w.size // 2 + 1] if method.needs_omega else None

@@ -50,7 +50,7 @@ def diagnose(
         elastic joint may be missing it says which side of it the sensor sees: the load, or, as
         ``model.with_measured("motor")``, the motor. That is not tried.
     data : Measurement, FrequencyMeasurement or sequence of them
-        Training records, or tables N(A, omega): every effect leaves its print on the plane, too.
+        Training records, or tables N(A, omega): every effect leaves its signature on the plane, too.
     holdout : as `data`, or None
         Records to confirm on; None: every third part of the training records (every third point of the
         tables) is held out.
@@ -60,8 +60,8 @@ def diagnose(
         Parameters of the model that may be refitted, by name or by effect id, as for `refit`; None: all that
         are free.
     own : sequence of str or None
-        Parameters of the model that every record has for itself, as for `refit`: they are estimated anew on
-        records held out.
+        Parameters of the model that differ between records, as for `refit`: they are re-estimated on
+        held-out records.
     prior : mapping or None
         What is known of parameters besides the records, as for `refit`; also of those of effects that the
         model may be given, ``{"stribeck.level": (9.0, 0.5)}``.

@@ -37,9 +37,9 @@ def improve(
 ) -> Study:
     """Add the effects a model misses, one at a time, as long as held-out error falls beyond noise.
 
-    After each, those added before are looked at again; at the end every model that differs by one effect is
-    tried (`Study.neighbours`), and the ladder goes on from one that is better, or as good and plainer. What
-    the model given has stays.
+    After each, those added before are examined again; at the end every model that differs by one effect is
+    tried (`Study.neighbours`), and the ladder goes on from one that is better, or as good and simpler.
+    Effects of the given model stay.
 
     Parameters
     ----------

@@ -39,8 +39,8 @@ def refit(
 ) -> Fit:
     """Adjust parameters until the simulated output fits the records best.
 
-    The sum of squared differences of measured and simulated output is minimized; the model starts anew in
-    each segment, from states that are fitted along (multiple shooting), first over short segments, then over
+    The sum of squared differences of measured and simulated output is minimized; each segment starts
+    from initial states that are fitted, too (multiple shooting), first over short segments, then over
     those `mode` asks for. A loop of `ctrl_df.closed_loop` whose records hold the reference in a channel is
     fitted through its block, driven by the recorded force.
 
@@ -54,14 +54,13 @@ def refit(
         Parameters to move, by name or by effect id; None: every parameter that is meant to be fitted
         (``parameter.free``).
     own : sequence of str or None
-        Parameters that every one of several records has for itself (an offset, friction at another
-        temperature), by name or by effect id; they are moved, also where `free` does not name them. Those
-        that say so themselves (``parameter.per_record``: a ripple's phase), and those that the model has
-        from such a fit, always are.
+        Parameters that differ between records (an offset, friction at another temperature), by name or by
+        effect id; they are fitted even where `free` does not name them. Those declared so
+        (``parameter.per_record``: a ripple's phase), and those the model has from such a fit, always do.
     prior : mapping or None
-        What is known of parameters besides the records: value and standard deviation by name, each in its
-        unit, ``{"mass": (2.0, 0.05)}``. Of the others the model's own values count, each known within a
-        factor of three (one standard deviation): no more than one sample does.
+        What is known of parameters from elsewhere: value and standard deviation by name, each in its unit,
+        ``{"mass": (2.0, 0.05)}``. The others are taken to be known within a factor of three (one standard
+        deviation) of the model's own values, which weighs no more than one sample.
     start : mapping or None
         Start values other than the model's; the short segments are then left out.
     mode, window

@@ -44,7 +44,7 @@ def check_search(owner: str, *, max_iterations: Any = 1, search_time: Any = None
     if search_time is not None:
         positive(
             owner, "search_time", search_time, "s", infinite=True, meaning="longest simulation of the search",
-            remedy="Leave it out for some hundred swings.",
+            remedy="Leave it out for some hundred periods.",
         )  # fmt: skip
     for name, value in flags.items():
         flag(owner, name, value)

@@ -17,8 +17,8 @@ from .arguments import check_search, checked_guess
 from .exact.closing import Centre, Closing, NoClosure
 from .exact.fate import Explorer
 from .exact.orbit import NoOrbit, Orbit, Try
+from .exact.poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch
 from .exact.shrinking import Merged, trace
-from .exact.swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Swings
 from .forced_start import harmonic_start, path_starts
 from .pieces import by_pieces
 from .predicted.answer import responder
@@ -28,6 +28,8 @@ from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
     COURSE_RTOL,
+    CROSSINGS,
+    CROSSINGS_AVERAGED,
     ENOUGH,
     EVENTS_KEPT,
     NEAR_MISS,
@@ -41,8 +43,6 @@ from .thresholds import (
     RETURN_RTOL,
     SAME_AS_PATH,
     SAME_CYCLE,
-    SWINGS,
-    SWINGS_AVERAGED,
 )
 
 
@@ -58,28 +58,28 @@ def find_limit_cycle(
         first output is taken as the output and the last one as the block's input.
     guess : LimitCycle, Orbit, (amplitude, omega), state array, or None
         Where to start. From a prediction, or an amplitude at the block's input and a frequency [rad/s], the
-        harmonics that the describing function drops are fed back little by little until none is missing,
-        which reaches unstable orbits as well as stable ones; a state is closed as it stands, then simulated.
-        None simulates from starts of several sizes, closes what they settle to and what stands between starts
-        of different fate, and returns the first orbit found, stable ones first.
+        harmonics that the describing function drops are fed back by degrees until none is missing, which
+        reaches unstable orbits as well as stable ones. A state is the start of Newton's method, then of a
+        simulation. None simulates from starts of several sizes, refines what they settle to and what
+        separates starts with different outcomes, and returns the first orbit found, stable ones first.
     max_iterations : int
         Bound on Newton steps.
     search_time : float
-        Longest simulation of the search [s]; by default some hundred swings.
+        Longest simulation of the search [s]; by default some hundred periods.
     raise_on_failure : bool
         Raise RuntimeError (with the answer as ``.orbit``) instead of returning a `NoOrbit`.
 
     Returns
     -------
     Orbit or NoOrbit
-        An orbit whose ``note`` says if it is another one than the guess speaks of; or the false `NoOrbit`,
-        whose ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
+        An orbit whose ``note`` says if it is not the one guessed; or a `NoOrbit`, false in an ``if``, whose
+        ``status`` and ``tried`` say what was tried and how each try ended. Not found is no proof.
 
     Raises
     ------
     ValueError
-        A pure delay stands in the loop: its state is a whole history, no vector that Newton could move. Its
-        motion is found by simulation: `event_response`, or `verify`, whose rows tell what it settles to.
+        The loop contains a pure delay: its state is a history, not a vector that Newton's method could solve
+        for. Its motion is found by simulation: `event_response`, or `verify`, whose rows describe it.
 
     Examples
     --------
@@ -117,7 +117,7 @@ class OrbitFinder:
     """The limit cycles of one loop: by shooting, or by simulation alone where there is nothing to shoot with.
 
     A sampled loop has no period of its own, one with a pure delay no finite state: both are followed until
-    their swings repeat or the bound on work is hit, and averaged.
+    they repeat or the bound on work is hit, and averaged.
 
     Attributes
     ----------
@@ -138,8 +138,8 @@ class OrbitFinder:
         self.sampled = bool(getattr(self.parts, "dt", 0))
         self.by_simulation = self.sampled or self.engine.delayed
         self.closing: Any = None if self.engine.delayed else Closing(loop, self.engine, max_iterations)
-        self.swings = Swings(loop, self.engine)
-        self.explorer = Explorer(self.swings, self._closed_from)
+        self.poincare = PoincareSearch(loop, self.engine)
+        self.explorer = Explorer(self.poincare, self._closed_from)
         self.tried: list[Try] = []
         self.merged = False
         self.centre = False
@@ -205,8 +205,8 @@ class OrbitFinder:
 
     def _returns(self, x0, most=4):
         """Return times after which a simulation from a state comes near it again, nearest first."""
-        course = self.swings.follow(x0, 4, until_repeated=False)
-        span = course.laps[-1].time if course.laps else self.swings.stride
+        course = self.poincare.iterate(x0, 4, until_repeated=False)
+        span = course.crossings[-1].time if course.crossings else self.poincare.stride
         times = np.linspace(0.0, span, RETURN_POINTS)
         run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
         states = run.states[: run.recorded]
@@ -226,11 +226,11 @@ class OrbitFinder:
             answer, linear = self._answer()
             if answer is None:
                 return
-            respond, count = answer
-            path = follow_path(respond, count, linear, amplitude, omega)
+            steady_state, count = answer
+            path = follow_path(steady_state, count, linear, amplitude, omega)
             if path.end is not End.REACHED:
                 # no prediction stands at an arbitrary guess: to all its harmonics at once
-                direct = corrected_near(respond, count, linear, amplitude, omega)
+                direct = corrected_near(steady_state, count, linear, amplitude, omega)
                 if direct is not None:
                     yield "harmonic balance from the guess", direct
             yield "its path", path
@@ -268,7 +268,7 @@ class OrbitFinder:
                 orbit = exact
         if orbit is None and self.missed < NEAR_MISS:
             orbit = self._closed(
-                start, period, "the mismatch after a lap, let shrink", lambda *at: trace(self.closing, *at)
+                start, period, "the mismatch after a period, let shrink", lambda *at: trace(self.closing, *at)
             )
         return orbit
 
@@ -303,7 +303,7 @@ class OrbitFinder:
         self.tried, self.merged, self.centre = [], False, False
         fate = self.explorer.explore(search_time, edges=not self.by_simulation)
         self.tried += [
-            Try(f"rest, displaced: {row.size:.3g} {self.swings.kicks.unit}", row.told) for row in fate
+            Try(f"rest, displaced: {row.size:.3g} {self.poincare.kicks.unit}", row.told) for row in fate
         ]
         found = [o for o in fate.orbits if o.status.ok]
         # averages over irregular motion are an answer only where nothing repeats
@@ -311,25 +311,25 @@ class OrbitFinder:
 
     def _closed_from(self, x0, course, complete=True) -> Orbit | None:
         """Orbit that a course comes near: closed where it can be, else an average where it is sustained."""
-        laps = course.laps
-        if len(laps) < ENOUGH or course.fate in (RESTS, DIVERGES):
+        crossings = course.crossings
+        if len(crossings) < ENOUGH or course.fate in (RESTS, DIVERGES):
             return None
-        if not np.all(np.isfinite(laps[-1].state)):
+        if not np.all(np.isfinite(crossings[-1].state)):
             return None
         if self.by_simulation:
-            return self._averaged(x0, laps, self.swings.repeats(laps))
-        orbit = self._closed_laps(laps)
+            return self._averaged(x0, crossings, self.poincare.repeats(crossings))
+        orbit = self._closed_crossings(crossings)
         if complete and course.fate == UNDECIDED and orbit is not None and orbit.stable is False:
             orbit = None  # one of many that an irregular motion passes: rounding tells which
-        if orbit is None and complete and course.fate == UNDECIDED and len(laps) >= SWINGS:
-            return self._averaged(x0, laps, False)
+        if orbit is None and complete and course.fate == UNDECIDED and len(crossings) >= CROSSINGS:
+            return self._averaged(x0, crossings, False)
         return orbit
 
-    def _closed_laps(self, laps):
-        """Close the orbit that a course's passages come nearest to repeating, after one lap or a few."""
-        recent = laps[-RECENT_CLOSED:]
-        least = REPEATS_LEAST * self.swings.units
-        size = np.maximum(np.max(np.abs([lap.state for lap in recent]), axis=0), least)
+    def _closed_crossings(self, crossings):
+        """Close the orbit that a course's passages come nearest to repeating, after one period or a few."""
+        recent = crossings[-RECENT_CLOSED:]
+        least = REPEATS_LEAST * self.poincare.units
+        size = np.maximum(np.max(np.abs([crossing.state for crossing in recent]), axis=0), least)
         for laps_per_period in range(1, 5):
             apart = [
                 float(np.max(np.abs(recent[k].state - recent[k - laps_per_period].state) / size))
@@ -350,7 +350,7 @@ class OrbitFinder:
 
     def _simulated(self, x0, name, search_time=None):
         """Follow the loop from a start; close what it comes to. Returns (orbit or None, course)."""
-        course = self.swings.follow(x0, SWINGS, search_time)
+        course = self.poincare.iterate(x0, CROSSINGS, search_time)
         orbit = self._closed_from(x0, course)
         words = {RESTS: "comes to rest", DIVERGES: "diverges", CYCLES: "repeats"}.get(
             course.fate, "no period"
@@ -378,15 +378,15 @@ class OrbitFinder:
 
     # --- averages -----------------------------------------------------------------------------------------
 
-    def _averaged(self, x0, laps, settled, swings=SWINGS_AVERAGED) -> Orbit | None:
-        """Average over the swings after a transient, for motions that are followed only.
+    def _averaged(self, x0, crossings, settled, swings=CROSSINGS_AVERAGED) -> Orbit | None:
+        """Average over the periods after a transient, for motions that can only be simulated.
 
         The amplitude is that of the signal the block sees. A block that acts in continuous time sees the held
         steps of a sampled controller; a law without time sees their values alone, the sequence that the
         prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
         """
-        begin = self.engine.run(self.swings.start(x0), laps[-1].time, rtol=COURSE_RTOL, log=1).state
-        later = self.swings.follow(begin, min(swings, len(laps)), until_repeated=False).laps
+        begin = self.engine.run(self.poincare.start(x0), crossings[-1].time, rtol=COURSE_RTOL, log=1).state
+        later = self.poincare.iterate(begin, min(swings, len(crossings)), until_repeated=False).crossings
         count = len(later) - 1
         if count < 4:
             return None
@@ -407,7 +407,7 @@ class OrbitFinder:
         if not run.status.ok:
             return None
         amplitudes = 2 * np.abs(spectrum[:, 1]) / span
-        if self.swings.held and answers_at_once(self.parts.block):
+        if self.poincare.held and answers_at_once(self.parts.block):
             amplitudes = amplitudes / np.sinc(omega * self.parts.dt / (2 * np.pi))
         exact = settled and self.engine.delayed and not self.sampled
         return Orbit(

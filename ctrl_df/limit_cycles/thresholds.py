@@ -28,11 +28,11 @@ RANK = 1e-12
 # --- exact orbits -----------------------------------------------------------------------------------
 
 CLOSED, ACCEPTED = 3e-10, 1e-7
-"""Mismatch after a lap, relative to the size of each state: what runs at `LAP_RTOL` allow, and where events
-limit what can be reached."""
+"""Mismatch after a period, relative to the size of each state: what runs at `PERIOD_RTOL` allow, and where
+events limit what can be reached."""
 
-LAP_RTOL, COURSE_RTOL, LOOK_RTOL = 1e-11, 1e-8, 1e-6
-"""Tolerance of laps that are differentiated; of courses that are followed; of a first look at sizes."""
+PERIOD_RTOL, COURSE_RTOL, LOOK_RTOL = 1e-11, 1e-8, 1e-6
+"""Tolerance of periods that are differentiated; of courses that are followed; of a first look at sizes."""
 
 RETURN_RTOL = 1e-9
 """The same of a course whose returns are sought."""
@@ -49,8 +49,8 @@ STILL = 1e-6
 REPEATED = 100
 """Times `ACCEPTED`: mismatch of a part of an orbit that went round several times."""
 
-MOST_LAPS = 32
-"""An orbit closed after so many laps or fewer is told from the one of a single lap."""
+MOST_ROUNDS = 32
+"""An orbit closed after so many rounds or fewer is told from the one of a single round."""
 
 ON_CIRCLE = 1e-6
 """Distance from the unit circle below which a multiplier says nothing of stability: differences are that
@@ -67,14 +67,14 @@ SAME_ORBIT, SAME_ROUGHLY, SAME_SIZES = 1e-4, 2e-2, 10
 
 # --- monodromy --------------------------------------------------------------------------------------
 
-LAP_EVENTS, LAP_STEPS = 5000, 200_000
-"""Events of a lap, and steps between two of them."""
+PERIOD_EVENTS, PERIOD_STEPS = 5000, 200_000
+"""Events of a period, and steps between two of them."""
 
-LAP_REACH, REACH_AT_FIRST = 1e-6, 1e-9
-"""Of a lap: the time over which rates of inputs are taken; in seconds, until one is known."""
+PERIOD_REACH, REACH_AT_FIRST = 1e-6, 1e-9
+"""Of a period: the time over which rates of inputs are taken; in seconds, until one is known."""
 
 TOLD = 1e-7
-"""Of what the other states move a state by in a lap: a size below that is rounding."""
+"""Of what the other states move a state by in a period: a size below that is rounding."""
 
 SLOPE_NUDGE, FLOW_NUDGE, EVENT_NUDGE = 1e-4, 1e-5, 1e-6
 """Differences by a state, over its size: of rates whose magnitude alone counts; of flows, whose second order
@@ -161,9 +161,9 @@ WORK, SAMPLED_WORK, LOOK_WORK = 300_000, 400_000, 50_000
 """Integration steps of one course, of one stride between samples, of a first look."""
 
 FEW = 12
-"""Swings within that work, below which it is no use."""
+"""Crossings within that work, below which it is no use."""
 
-SWINGS, SWINGS_AVERAGED, SWINGS_VERIFIED = 1000, 40, 200
+CROSSINGS, CROSSINGS_AVERAGED, CROSSINGS_VERIFIED = 1000, 40, 200
 """Of one course; that an average takes; of the simulation beside a verified orbit."""
 
 STRIDE, LOOK, LOOK_POINTS = 20, 0.1, 129
@@ -227,8 +227,8 @@ AVERAGE_POINTS, EVENTS_KEPT = 2049, 200
 
 THERE, BESIDE, ON, PASSAGES = 1e-3, 0.03, 1e-5, 3
 """Of an orbit's size: a passage so near a stable one, and coming nearer, ends on it; the same for one that
-lingers beside an unstable one; difference of a lap's time from the period, relative, within which it is that
-near; passages in a row that come nearer."""
+lingers beside an unstable one; relative difference of the time between crossings from the period within which
+it is that near; passages in a row that come nearer."""
 
 ORBIT_SIZE = 1e-9
 """Size of a state of an orbit at least, over what it is measured in."""
@@ -243,7 +243,7 @@ AT_ITS_END = 1e-3
 """Distance of an orbit from the end of its path that harmonics left out may explain."""
 
 NEAR_MISS = 0.3
-"""Mismatch of a lap, relative to the orbit, from which it is worth following."""
+"""Mismatch after a period, relative to the orbit, from which it is worth following."""
 
 CONFIRMED_WITHIN = 0.05
 """In frequency and amplitude: within, a prediction is called confirmed; beyond, it is the same cycle,

@@ -14,7 +14,7 @@ from .exact.known import KnownOrbits
 from .exact.orbit import NoOrbit, Orbit
 from .finder import OrbitFinder
 from .predicted.grade import LimitCycle
-from .thresholds import CONFIRMED_WITHIN, COURSE_RTOL, LEFT_ALONE, SAME_CYCLE, SWINGS_VERIFIED
+from .thresholds import CONFIRMED_WITHIN, COURSE_RTOL, CROSSINGS_VERIFIED, LEFT_ALONE, SAME_CYCLE
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
@@ -46,8 +46,8 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     Check
         ``.rows``, ``.table()``, ``.orbits``, ``.fate``. Where the loop cannot be simulated (H is measured
         points, or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure
-        delay, whose state is a whole history, no exact orbit is computed: the simulation judges, ``.why``
-        tells how. An unstable cycle cannot be seen that way and stays ``not tested``.
+        delay, whose state is a history, no exact orbit is computed: the simulation judges, and ``.why`` says
+        how. An unstable cycle cannot be seen that way and stays ``not tested``.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
         finder = OrbitFinder(loop)
 
     orbits: list[Orbit] = []
-    known = KnownOrbits(finder.swings, orbits)
+    known = KnownOrbits(finder.poincare, orbits)
     led: dict[int, Orbit] = {}
     sought: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
@@ -88,7 +88,7 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
             led[id(cycle)] = orbit
     fate = Fate()
     if search:
-        beside = KnownOrbits(finder.swings, list(orbits))
+        beside = KnownOrbits(finder.poincare, list(orbits))
         fate = finder.explorer.explore(search_time, edges=not finder.by_simulation, known=beside)
         for orbit in fate.orbits:
             if orbit.status.ok or not orbits:
@@ -176,17 +176,17 @@ def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
 
 
 def simulated(
-    finder: OrbitFinder, orbit: Orbit, laps: int = SWINGS_VERIFIED, kick: float = 0.01
+    finder: OrbitFinder, orbit: Orbit, crossings: int = CROSSINGS_VERIFIED, kick: float = 0.01
 ) -> tuple[float, float] | None:
     """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves."""
     if orbit.stable is False:
         return None
     if orbit.stable is None:
         return orbit.omega, orbit.output_amplitude
-    swings = finder.swings.follow(finder.feasible(orbit.states[:, 0] * (1 + kick)), laps).laps
-    if len(swings) < 8:
+    met = finder.poincare.iterate(finder.feasible(orbit.states[:, 0] * (1 + kick)), crossings).crossings
+    if len(met) < 8:
         return None
-    t = np.array([s[0] for s in swings])
+    t = np.array([s[0] for s in met])
     span = t[-1] - t[len(t) // 2]
     turns = round(span * orbit.omega / (2 * np.pi))
     if turns < 1:
@@ -196,7 +196,7 @@ def simulated(
     spectrum = np.zeros((engine.noutputs, 2), complex)
     period = 2 * np.pi / omega
     run = engine.run(
-        engine.start(swings[-1][1]),
+        engine.start(met[-1][1]),
         period,
         rtol=COURSE_RTOL,
         max_step=period / 8,

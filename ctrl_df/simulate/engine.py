@@ -139,8 +139,8 @@ class Engine:
         What to run; see `ctrl_df.simulate.program.flatten`.
     values : mapping
         Parameters that differ from those of its blocks, checked already. With columns of numbers in it (see
-        `ctrl_df.column`) the engine runs the first of these systems, and ``par`` has the packed parameters of
-        all, for `ctrl_df.simulate.runs`.
+        `ctrl_df.values.column`) the engine runs the first of these systems, and ``par`` has the packed
+        parameters of all, for `ctrl_df.simulate.runs`.
     """
 
     def __init__(self, system, values: Mapping[str, Any] | None = None):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..column import Column, Differs
+from ..values.column import Column, Differs
 from .engine import Engine
 from .thresholds import SPLITS
 
@@ -89,8 +89,8 @@ def assigned(groups: Iterable[Group], system) -> list[Group]:
 def groups_of(owner: str, system, values: Mapping[str, np.ndarray], runs: int) -> list[Group]:
     """Pack a system for many runs whose parameters differ.
 
-    All runs are packed at once, numbers as columns (`ctrl_df.column`); where the packing asks something of
-    them that has two answers (a delay of zero or not), they are packed in two parts. The first and the last
+    All runs are packed at once, numbers as columns (`ctrl_df.values.column`); where a condition has two
+    answers among them (a delay of zero or not), they are packed in two parts. The first and the last
     system of every part is packed by itself as well and has to agree to the last bit; where it does not, or
     where the code of a block takes no columns, every run is packed by itself.
 

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..blocks.element import Element
+from ..blocks.elements.element import Element
 from ..blocks.linearization import warn_of_mechanism
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter

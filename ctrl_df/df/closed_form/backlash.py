@@ -13,7 +13,7 @@ so that one dimensionless function gives all: with Y_k the harmonics of y and q 
 The walls alone move the load, hence X_k/a = C_k/(k^2 A (M1 + M2) omega^2) with C_k the harmonics of what the
 walls do to y: no flight is ever integrated. What impacts lose a period is pi a^2 (M1/M2) Im N.
 
-Flights are closed forms: `wall_map`. What they lead to is found in `wall_orbits`.
+Flights are closed forms: `impact_map`. What they lead to is found in `wall_orbits`.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ import numpy as np
 from ...simulate.compiler.compiled import njit
 from ..thresholds import FIRST_PHASE, IMPACT_STARTS, MOST_PERIODS, VAGUE
 from .friction import _require, checked_orders, positive_axis
-from .wall_map import two_impact as _two_impact
-from .wall_map import two_impact_harmonics as _two_impact_harmonics
+from .impact_map import two_impact as _two_impact
+from .impact_map import two_impact_harmonics as _two_impact_harmonics
 from .wall_orbits import RELEASE as _RELEASE
 from .wall_orbits import average as _average
 from .wall_orbits import measure as _measure

@@ -4,7 +4,7 @@ All is dimensionless as there: N = n(A)/((M1 + M2) omega^2) with A = a/(M2 h ome
 curve over A alone.
 
 *The symmetric motion with two impacts a period.* With r = (1 + eps)/(1 - eps) and the phase tau of the impact
-on the upper wall, pi A r sin(tau) - 2 A cos(tau) = 1 (`ctrl_df.df.closed_form.wall_map.two_impact`), that is
+on the upper wall, pi A r sin(tau) - 2 A cos(tau) = 1 (`two_impact` of `impact_map`), that is
 A sin(tau - lead) = A0 with A0 = 1/sqrt(4 + pi^2 r^2) and tan(lead) = 2/(pi r). Both solutions are one curve,
 
     A = A0 cosh(s),    tau = lead + 2 atan(exp(s)),
@@ -42,8 +42,8 @@ from ..thresholds import (
     SAME_CURVE,
 )
 from .backlash import BACKLASH_REGIMES, _name
-from .wall_map import flight, stays, wrap
-from .wall_map import two_impact_harmonics as _two_impact_harmonics
+from .impact_map import flight, stays, wrap
+from .impact_map import two_impact_harmonics as _two_impact_harmonics
 from .wall_orbits import measure, polish, settle, shortest
 
 SYMMETRIC = "symmetric motion with two impacts a period"

@@ -27,7 +27,7 @@ def element_harmonics(element, amplitudes, omega=None, orders: int = 9):
     Parameters
     ----------
     element : Element
-        A block of `ctrl_df.blocks.memoryless` or `ctrl_df.blocks.hysteresis`.
+        A block of `ctrl_df.blocks.elements.memoryless` or `ctrl_df.blocks.elements.hysteresis`.
     amplitudes : ndarray, shape (na,)
         Peak values of the input, > 0.
     omega : float, optional

@@ -1,6 +1,6 @@
 """What the map between the walls leads to: attractors closed by Newton's method, their harmonics, averages.
 
-Times are phases tau = omega t, lengths gaps; see `wall_map` for the coordinates (phi, w).
+Times are phases tau = omega t, lengths gaps; see `impact_map` for the coordinates (phi, w).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..thresholds import (
     ROUGH,
     SETTLED_IMPACTS,
 )
-from .wall_map import flight, lag, place, stays, wrap
+from .impact_map import flight, lag, place, stays, wrap
 
 RELEASE = -0.5 * math.pi  # phi at which a pressing acceleration changes sign
 

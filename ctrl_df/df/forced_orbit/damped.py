@@ -66,7 +66,7 @@ def close_damped(
         radius = spectral_radius_of(search.shot.at, SQUARINGS_FINE)
         if not repelling and not radius < 1.0 + NEUTRAL:
             return None
-        orbit = search._state(y, state.mode)
+        orbit = search.state_at(y, state.mode)
         if search.mirrored and search.symmetries.shifts:
             _center(search, orbit)
         search.measure(orbit, periods, orders, FINE)
@@ -132,7 +132,7 @@ def _shortened(shots, y, step, size, least):
 def _center(search, orbit):
     """Move free positions, in place, to where half a period mirrors them onto themselves."""
     end = orbit.copy()
-    search._shoot(end, FINE)
+    search.shoot(end, FINE)
     for direction in search.symmetries.shifts:
         at = np.flatnonzero(direction)[0]
         orbit.x[direction] += 0.5 * (end.x[at] - orbit.x[at])
@@ -156,10 +156,10 @@ class _Shots:
     def missed(self, y):
         """Return end less start of one shot from y, in all coordinates; takes note of sizes."""
         search, transform = self.search, self.search.symmetries.transform
-        state = search._state(y, self.mode)
+        state = search.state_at(y, self.mode)
         begin = transform @ state.x
         try:
-            search._shoot(state, self.rtol, self.periods)
+            search.shoot(state, self.rtol, self.periods)
         except OutOfWork as stop:
             if search.budget <= 0:
                 raise
@@ -172,7 +172,7 @@ class _Shots:
 
     def differentiate(self, y, f):
         """Take the Jacobian at y, whose shot misses by f; False where a shot fails."""
-        search, state = self.search, self.search._state(y, self.mode)
+        search, state = self.search, self.search.state_at(y, self.mode)
         return search.differentiated(state, f, self.rtol, self.periods, CENTRAL)
 
     def step(self, f):

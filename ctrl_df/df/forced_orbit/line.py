@@ -7,8 +7,8 @@ import numpy as np
 from ...simulate.engine import State, harmonic_drive
 from ..threads import go_on
 from ..thresholds import AT_ONCE, FIRST_STEP, RTOL
+from .continuation import continuation
 from .shooting import address
-from .sweep import sweep
 
 
 class Line:
@@ -16,31 +16,31 @@ class Line:
 
     Parameters
     ----------
-    solver : OrbitSolver
+    search : OrbitSearch
         Acquainted with motions of their size.
     A, omega : (n,) arrays
     orders : int
         Highest harmonic.
     """
 
-    def __init__(self, solver, A, omega, orders: int):
-        n, rows = len(A), solver.row + 1
-        self.solver, self.A, self.omega, self.orders = solver, A, omega, orders
+    def __init__(self, search, A, omega, orders: int):
+        n, rows = len(A), search.row + 1
+        self.search, self.A, self.omega, self.orders = search, A, omega, orders
         self.integrals = np.zeros((n, rows, orders + 1), complex)
         self.ends, self.miss = np.zeros((n, 2, rows)), np.zeros(n)
         self.kinds, self.still = np.zeros(n, np.int64), np.zeros(n, np.int64)
         self._drive, self._scratch = harmonic_drive([[0.0, 0.0]], 1.0), np.zeros((1, 2), complex)
-        self._power = solver.symmetries.power
+        self._power = search.symmetries.power
         self._past = np.zeros((4, max(len(self._power), 1)))
         self._mode, self._known = np.zeros(0, np.int64), 0
         self.symmetrical = False  # the last orbit closed turned out to be, though sought without symmetry
 
-    def close(self, first: int) -> int:
-        """Close the orbits from point `first` on, whose predecessor the solver has; return how many.
+    def close(self, first: int, state: State) -> int:
+        """Close the orbits from point `first` on, started from the orbit of the one before; return how many.
 
         Where laws are odd and an orbit sought without half-wave symmetry has it, it is the last of them.
         """
-        s, state = self.solver, self.solver.previous
+        s = self.search
         self._past[0, : len(state.x)] = state.x / self._units(first - 1)
         self._past[3, 0] = FIRST_STEP
         self._mode, self._known = state.mode.copy(), 1
@@ -48,14 +48,14 @@ class Line:
         self.symmetrical = False
         while p < len(self.A):  # compiled code hears no Ctrl-C: some points at a time
             end = min(p + AT_ONCE, len(self.A))
-            done, self._known, self.symmetrical = sweep(
+            done, self._known, self.symmetrical = continuation(
                 address(), s.shot.at, self._drive, self._scratch, self.A[p:end], self.omega[p:end],
                 self._power, self._past, self._mode, self._known, s.mirrored, broken, RTOL,
-                s._hmax(self.orders), s.max_steps, self.integrals[p:end], self.ends[p:end],
+                s.longest_step(self.orders), s.max_steps, self.integrals[p:end], self.ends[p:end],
                 self.miss[p:end], self.kinds[p:end], self.still[p:end],
             )  # fmt: skip
             go_on()
-            s._raise_if_raised()
+            s.raise_if_raised()
             p += done
             if p < end or self.symmetrical:
                 break

@@ -1,8 +1,8 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""Newton's method on the shots of `shot`: the Jacobian, the step it gives, and the multipliers of an orbit.
+"""Newton's method on the period map: the Jacobian, the step it gives, and the multipliers of an orbit.
 
-The unknowns are the free coordinates y of a state, the equation is P(y) - y = 0 with the map P of a shot.
+The unknowns are the free coordinates y of a state, the equation is P(y) - y = 0 with the period map P.
 Both ways to an orbit are made of this: secant steps from nearby (`shooting`), damped steps from far off
 (`damped`).
 """
@@ -18,7 +18,7 @@ from ...simulate.dynamics.matrices import multiply
 from ...simulate.kernel import driver
 from ...simulate.kernel.driver import copy
 from ..thresholds import ASIDE, PIVOT, STILL
-from .shot import coordinates, mismatch, place, shot_at
+from .period_map import coordinates, mismatch, period_map_at, place
 
 
 @part
@@ -222,20 +222,20 @@ def spectral_radius(shot, jacobian, squarings):
 @njit(error_model="numpy")
 def newton_step_of(at, missed, change):
     """`newton_step` with the Jacobian differenced last, from the coordinates missed; `change`: (nf,)."""
-    return newton_step(shot_at(at), shot_at(at).jacobian, lean(missed), lean(change))
+    return newton_step(period_map_at(at), period_map_at(at).jacobian, lean(missed), lean(change))
 
 
 @njit(error_model="numpy")
 def mismatch_of(at, begin, end):
     """`mismatch` of a shot."""
-    return mismatch(shot_at(at), lean(begin), lean(end))
+    return mismatch(period_map_at(at), lean(begin), lean(end))
 
 
 @njit(error_model="numpy", nogil=True)
 def differentiate_of(at, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, budget, first, relative):
     """`differentiate` to both sides."""
     return differentiate(
-        shot_at(at), at, lean(drive), time, lean(x0), lean(m0), lean(step), mirrored, rtol, atol, hmax,
+        period_map_at(at), at, lean(drive), time, lean(x0), lean(m0), lean(step), mirrored, rtol, atol, hmax,
         budget, first, relative, True,
     )  # fmt: skip
 
@@ -243,4 +243,4 @@ def differentiate_of(at, drive, time, x0, m0, step, mirrored, rtol, atol, hmax, 
 @njit(error_model="numpy")
 def spectral_radius_of(at, squarings):
     """`spectral_radius` of the Jacobian differenced last."""
-    return spectral_radius(shot_at(at), shot_at(at).jacobian, squarings)
+    return spectral_radius(period_map_at(at), period_map_at(at).jacobian, squarings)

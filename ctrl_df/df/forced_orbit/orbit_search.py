@@ -45,8 +45,8 @@ from ..thresholds import (
 from . import shooting
 from .linear_orbit import linear_orbit
 from .newton import differentiate_of
-from .shooting import CLOSED, SPENT, UNSTABLE, close_orbit
-from .shot import follow, make_shot, set_state, shoot
+from .period_map import apply, iterate, make_period_map, set_state
+from .shooting import CLOSED, SPENT, UNSTABLE, solve_periodic
 from .symmetries import Probe, Sizes, find_symmetries
 
 BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
@@ -104,8 +104,7 @@ class OrbitSearch:
             prog.ints[n[layout.AUX] + layout.A_STOP] == 1 for n in self.mechanisms
         )
         self.atol = 0.0
-        self.previous: State | None = None
-        self._given: State | None = None
+        self.mirrored = self.repels = False
         self._about: tuple | None = None
         self._answers: dict[tuple, tuple] = {}
         self.sizes = Sizes.ones(self.engine.nstates)
@@ -117,20 +116,21 @@ class OrbitSearch:
         self.symmetries = s = find_symmetries(self.engine, self.block, sizes)
         self._check(s)
         self.symmetric = s.odd
-        self.shot = make_shot(self.engine, s, self.row + 1)
+        self.shot = make_period_map(self.engine, s, self.row + 1)
         self.free_row = self._row_is_free(s, sizes)
         self.linear = linear_orbit(self.engine, s, self.row, self.free_row)
 
-    def _acquaint(self, A, omega, whatever_before=False):
+    def acquaint(self, A, omega, whatever_before=False) -> bool:
         """Ask the laws about motions of this size, unless they were asked about ones not far from it.
 
         With `whatever_before` what they were asked before makes no difference: answers do not depend on it.
+        Returns whether they were asked: what is known of orbits is then forgotten.
         """
         if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), FAMILIAR):
-            return
+            return False
         about = tuple(BINS * round(math.log10(max(size, NOTHING)) / BINS) for size in (A, omega))
         if about == self._about:
-            return
+            return False
         self._about = about
         if about not in self._answers:
             force, rate = (float(10.0**x) for x in about)
@@ -153,6 +153,7 @@ class OrbitSearch:
             about
         ]
         self.forget()
+        return True
 
     def _motion(self, A, omega):
         """Return the size of each state in the motion of a free inertia under the force."""
@@ -180,45 +181,43 @@ class OrbitSearch:
         return any(probe.at(x + SHIFTS["output"] * size * d, 0.0)[2][self.row] != at_zero for d in s.shifts)
 
     def forget(self):
-        """Start the next point from rest."""
-        self.previous = self.first = None
-        self.broken = self.repels = False
+        """Forget orbits found before: their Jacobian, their size, their step."""
+        self.repels = False
         self.shot.jacobian[:] = np.nan
         self.shot.size[:] = 0.0
         self.shot.clock[:] = 0.0  # the step of the last run: a line must not depend on the one before
 
     # --- the search -----------------------------------------------------------------------------------------
 
-    def _aim(self, A, omega):
-        self.aim([0.0, A], omega)
-
-    def aim(self, U, omega):
-        """Set the force ``Re sum U_k exp(j k omega t)`` that orbits are sought under."""
+    def aim(self, U, omega) -> bool:
+        """Set the force ``Re sum U_k exp(j k omega t)`` that orbits are sought under; as `acquaint`."""
         A = float(abs(U[1]))
-        self._acquaint(A, omega)
+        asked = self.acquaint(A, omega)
         self.A, self.omega, self.period, self.budget = A, omega, 2 * np.pi / omega, self.max_steps
         self.drive = harmonic_drive([U], omega)
-        self._unit = self._motion(A, omega)
+        self.unit = self._motion(A, omega)
+        return asked
 
-    def _hmax(self, orders):
+    def longest_step(self, orders):
         """Longest step in periods: ten quadrature nodes a step must hold the highest harmonic.
 
         Impacts are located on the interpolant of a step, which is less exact than its end.
         """
         return min(1 / 16 if self.contacts else 1 / 8, 9 / 8 / orders)
 
-    def _start(self, A):
+    def at_rest(self, A):
         """At rest, a joint off its faces; the sizes of the states from the motion of a free inertia."""
         n = self.engine.nstates
         y = np.zeros(n)
         for node in self.mechanisms:
             if self.engine.program.ints[node[layout.AUX]] == 2:
                 y[node[layout.X] + 2] = WITHIN * self.engine.program.par[node[layout.PAR] + layout.P_GAP]
-        state = self._state(y)
-        self._resize(A)
+        state = self.state_at(y)
+        self.resize(A)
         return state
 
-    def _resize(self, A):
+    def resize(self, A):
+        """Take the sizes of a free inertia under the force for those of the motion."""
         n = self.engine.nstates
         self.shot.space.size[:] = (
             SIZE_AT_FIRST * A / self.inertia / self.omega**self.symmetries.power if self.mechanisms else 0.0
@@ -227,30 +226,30 @@ class OrbitSearch:
         self.shot.scale[:] = 0.0
         self.shot.jacobian[:] = np.nan
 
-    def _forget_flight(self):
+    def forget_flight(self):
         """Forget what states that Newton's method tried have grown to, where the last one ran away."""
         if self.shot.tally[4] != driver.DONE:
-            self._resize(self.A)
+            self.resize(self.A)
 
-    def _state(self, y, mode=None):
+    def state_at(self, y, mode=None):
         """State at coordinates y."""
         x, mode = np.zeros(len(y)), self.engine.modes.copy() if mode is None else mode.copy()
         set_state(self.shot.at, np.array(y, float), x, mode)
         return State(0.0, x, mode)
 
-    def _nudged(self, state):
+    def nudged(self, state):
         """Return the state a little off: no motion stays on a repelling orbit by the grace of rounding."""
         y = self.symmetries.transform @ state.x
         y[self.symmetries.free] += NUDGE * self.shot.size[self.symmetries.free]
-        return self._state(y, state.mode)
+        return self.state_at(y, state.mode)
 
-    def _follow(self, state, periods, rtol=COARSE):
+    def iterate(self, state, periods, rtol=COARSE):
         """Return the state after some periods (twice as many shots where mirrored)."""
         state = state.copy()
-        self._trail(state, periods * 2 if self.mirrored else periods, rtol)
+        self.trail(state, periods * 2 if self.mirrored else periods, rtol)
         return state
 
-    def _trail(self, state, shots, rtol=RTOL):
+    def trail(self, state, shots, rtol=RTOL):
         """Coordinates before each of some shots of the state, in place."""
         trail = np.empty((shots, len(state.x)))
         for first in range(0, shots, AT_ONCE):
@@ -262,15 +261,15 @@ class OrbitSearch:
 
         Zero: it does not yet. `settled`: within what it has to, after one shot and after two.
         """
-        reason, spent, done, repeats = follow(
+        reason, spent, done, repeats = iterate(
             self.shot.at, self.drive, self._span(1), state.x, state.mode, self.mirrored, rtol, self.atol,
-            self._hmax(1) * self.period, FIRST_STEP * self.period, self.budget, trail, *settled,
+            self.longest_step(1) * self.period, FIRST_STEP * self.period, self.budget, trail, *settled,
         )  # fmt: skip
         self.budget -= spent
         self._checked(reason, state)
         return done, repeats
 
-    def _followed(self, state, periods, orders):
+    def followed(self, state, periods, orders):
         """Follow the state, in place, for some periods, and close its orbit where it seems to have settled.
 
         It is tried as well each time the motion has been followed twice as long as before, unless the last
@@ -296,7 +295,7 @@ class OrbitSearch:
                 if self.repels and repeats == 0 and left > 0:
                     continue  # there is an orbit here that the motion leaves: it has to settle first
             self.mirrored = self.mirrored and not alternates
-            orbit = self._periodic(state, orders=orders)
+            orbit = self.periodic(state, orders=orders)
             if orbit is not None:
                 return orbit
             self.mirrored = self.mirrored or alternates
@@ -304,19 +303,20 @@ class OrbitSearch:
 
     def _checked(self, reason, state):
         go_on()
-        self._raise_if_raised()
+        self.raise_if_raised()
         if reason != driver.DONE or self.budget <= 0 or not np.all(np.isfinite(state.x)):
             raise self._stopped(reason, state)
 
-    def _shoot(self, state, rtol=RTOL, periods=1, spectrum=None):
+    def shoot(self, state, rtol=RTOL, periods=1, spectrum=None):
         """One shot of the state, in place."""
         shot = self.shot
         orders = 1 if spectrum is None else spectrum.shape[1] - 1
         if not 0.0 < shot.clock[2] <= 5 * FIRST_STEP * self.period:
             shot.clock[2] = FIRST_STEP * self.period
-        reason = shoot(
+        reason = apply(
             shot.at, self.drive, self._span(periods), state.x, state.mode, self.mirrored, rtol, self.atol,
-            self._hmax(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum, self.budget,
+            self.longest_step(orders) * self.period, shot.no_spectrum if spectrum is None else spectrum,
+            self.budget,
         )  # fmt: skip
         self.budget -= int(shot.clock[3])
         self._checked(reason, state)
@@ -327,13 +327,13 @@ class OrbitSearch:
         shot, before = self.shot, self.shot.tally[1]
         done = differentiate_of(
             shot.at, self.drive, self._span(periods), state.x, state.mode, missed, self.mirrored, rtol,
-            self.atol, self._hmax(1) * self.period, self.budget, FIRST_STEP * self.period, relative,
+            self.atol, self.longest_step(1) * self.period, self.budget, FIRST_STEP * self.period, relative,
         )  # fmt: skip
         self.budget -= int(shot.tally[1] - before)
         go_on()
         raised = bool(pointers.raised)
         if raised and not isinstance(pointers.raised[0], Exception):
-            self._raise_if_raised()
+            self.raise_if_raised()
         pointers.raised.clear()
         if self.budget <= 0:
             raise OutOfWork(Status.WORK_LIMIT)
@@ -342,7 +342,7 @@ class OrbitSearch:
     def _span(self, periods):
         return self.period / 2 if self.mirrored else periods * self.period
 
-    def _periodic(self, state, periods=1, orders=9, *, repelling=False, near=False):
+    def periodic(self, state, periods=1, orders=9, *, repelling=False, near=False):
         """Newton on the shot; (state, mismatch) of an attracting orbit, or None; its integrals are kept.
 
         With `repelling` any orbit will do; one that is `near` the last one begins with its Jacobian.
@@ -352,24 +352,24 @@ class OrbitSearch:
         if not near:
             shot.jacobian[:] = np.nan
         shot.clock[2] = FIRST_STEP * self.period
-        outcome, miss = close_orbit(
+        outcome, miss = solve_periodic(
             shooting.address(), shot.at, self.drive, self._span(periods), state.x, state.mode,
-            self.mirrored, RTOL, self.atol, self._hmax(orders) * self.period, spectrum,
+            self.mirrored, RTOL, self.atol, self.longest_step(orders) * self.period, spectrum,
             self.budget, SHOTS_ALONE, False,
         )  # fmt: skip
         self.repels = outcome == UNSTABLE
         self.budget -= int(shot.clock[3]) * 4
         go_on()
-        self._raise_if_raised()
+        self.raise_if_raised()
         if outcome == SPENT:
             raise self._stopped(driver.STEPS, state)
-        self._forget_flight()
+        self.forget_flight()
         if outcome != CLOSED and not (repelling and outcome == UNSTABLE):
             return None
         if not self.mirrored:
             self._check_free_speed(shot.trial[1])
         if self.quantized:  # the harmonics of the centred motion
-            self._shoot(state.copy(), RTOL, periods, spectrum)
+            self.shoot(state.copy(), RTOL, periods, spectrum)
         self._keep(spectrum)
         return state, miss
 
@@ -377,7 +377,7 @@ class OrbitSearch:
         """One shot of a closed orbit, for its integrals, ends and event kinds."""
         spectrum = np.zeros((self.row + 1, orders + 1), complex)
         end = state.copy()
-        self._shoot(end, rtol, periods, spectrum)
+        self.shoot(end, rtol, periods, spectrum)
         self._check_free_speed(self.symmetries.transform @ (end.x - state.x))
         self._keep(spectrum)
 
@@ -396,7 +396,7 @@ class OrbitSearch:
         if np.max(gained, initial=0.0) > PUSHED * self.A / (self.inertia * self.omega):
             raise OutOfWork(Status.DIVERGED)
 
-    def _touching(self, orders):
+    def touching(self, orders):
         """Look for an orbit whose bodies touch, for a block found swinging freely within its gap.
 
         A motion without contact coexists with others at moderate force and is what a centred start leads
@@ -410,26 +410,26 @@ class OrbitSearch:
             self.mirrored = self.symmetric
             y = np.zeros(self.engine.nstates)
             y[at + 2], y[at + 3] = face * gap, leaving * speed
-            self._resize(self.A)
-            state = self._follow(self._state(y), KNOCKED)
+            self.resize(self.A)
+            state = self.iterate(self.state_at(y), KNOCKED)
             if not self.shot.tally[2] & TOUCH:
                 continue
-            orbit = self._periodic(state, orders=orders)
+            orbit = self.periodic(state, orders=orders)
             if orbit is None and self.symmetric:
                 self.mirrored = False
-                state = self._follow(self._nudged(state), NUDGED)
+                state = self.iterate(self.nudged(state), NUDGED)
                 if not self.shot.tally[2] & TOUCH:
                     continue
-                orbit = self._periodic(state, orders=orders)
+                orbit = self.periodic(state, orders=orders)
             if orbit is not None and self.kinds & TOUCH:
                 return orbit, state
             if orbit is None:
                 keeps = state if keeps is None else keeps
         return None, keeps
 
-    def _stop_if_running_away(self, y):
+    def stop_if_running_away(self, y):
         """Raise where a state grows out of all bounds, or a free body steadily gains speed."""
-        half, y = len(y) // 2, y / self._unit
+        half, y = len(y) // 2, y / self.unit
         late, early = RUNS_AWAY
         if np.max(np.abs(y[-1])) > late * np.max(np.abs(y[half])) > early * np.max(np.abs(y[0])):
             raise OutOfWork(Status.DIVERGED)
@@ -446,9 +446,9 @@ class OrbitSearch:
 
     def coefficients(self):
         """Return the Fourier coefficients Y_k of the orbit of one period that was found last."""
-        return self._turned(self._coefficients(self.integrals, self.ends, 1, self.mirrored))
+        return self.turned(self.fourier(self.integrals, self.ends, 1, self.mirrored))
 
-    def _coefficients(self, integrals, ends, periods, mirrored, omega=None):
+    def fourier(self, integrals, ends, periods, mirrored, omega=None):
         """Fourier coefficients from the integrals of a shot, free of a steady drift and of a free mean.
 
         The last axis of `integrals` are the harmonics, that of `ends` the start and the end; `omega`, the one
@@ -472,7 +472,7 @@ class OrbitSearch:
             y[..., 0] = 0.0
         return y
 
-    def _turned(self, y, omega=None):
+    def turned(self, y, omega=None):
         """Delays turn the phase of every harmonic."""
         omega = np.asarray(self.omega if omega is None else omega)[..., None]
         y = y * np.exp(-1j * np.arange(y.shape[-1]) * omega * self.delay) if self.delay else y.copy()
@@ -481,7 +481,8 @@ class OrbitSearch:
 
     # --- how a search can fail ------------------------------------------------------------------------
 
-    def _raise_if_raised(self):
+    def raise_if_raised(self):
+        """Raise what a law has raised within compiled code."""
         if pointers.raised:
             error = pointers.raised[0]
             pointers.raised.clear()

@@ -153,21 +153,50 @@ def solver_for(block, output=None, transient=4, averages=64, max_steps=1_000_000
         known = last[0][0]
         if known is block or (isinstance(block, Mechanism) and known == block):
             return last[1]
-    solver = OrbitSolver(block, output, transient=transient, averages=averages, max_steps=max_steps)
+    search = OrbitSearch(block, output, transient=transient, averages=averages, max_steps=max_steps)
+    solver = OrbitSolver(search)
     _kept.last = (key, solver)
     return _kept.last[1]
 
 
-class OrbitSolver(OrbitSearch):
-    """Solves points and lines of a family, each started from the one before, and names what it finds."""
+class OrbitSolver:
+    """Solves points and lines of a family, each started from the one before, and names what it finds.
+
+    Parameters
+    ----------
+    search : OrbitSearch
+        Finds the orbits of the block.
+
+    Attributes
+    ----------
+    previous : State or None
+        The orbit of the point before.
+    simple : bool
+        Whether that point closed as an orbit of one period.
+    """
+
+    def __init__(self, search: OrbitSearch):
+        self.search = search
+        self._forget_points()
+
+    def forget(self):
+        """Start the next point from rest."""
+        self.search.forget()
+        self._forget_points()
+
+    def _forget_points(self):
+        self.previous: State | None = None
+        self.first: tuple | None = None
+        self.broken = self.simple = False
 
     # --- lines and points -----------------------------------------------------------------------------------
 
     def line(self, A, omega, harmonics, regime, residual, row, column):
         """Solve consecutive points, compiled as long as they close, one by one where they do not."""
         orders, n = harmonics.shape[-1] - 1, len(A)
-        self._acquaint(A[n // 2], omega[n // 2], whatever_before=True)
-        line, power = Line(self, A, omega, orders), self.symmetries.power
+        if self.search.acquaint(A[n // 2], omega[n // 2], whatever_before=True):
+            self._forget_points()
+        line, power = Line(self.search, A, omega, orders), self.search.symmetries.power
         p = 0
         if self.previous is not None and self.first is not None:  # the line before starts where this one does
             x, mode, units, self.broken = self.first
@@ -195,19 +224,19 @@ class OrbitSolver(OrbitSearch):
 
     def _take_over(self, line, p, harmonics, regime, residual, row, column):
         """Close points of a line from `p` on by compiled code; return how many need no second look."""
-        self.mirrored = self.symmetric and not self.broken
-        done = line.close(p)
-        self._forget_flight()
+        self.search.mirrored = self.search.symmetric and not self.broken
+        done = line.close(p, self.previous)
+        self.search.forget_flight()
         if line.symmetrical:
-            self.shot.jacobian[:] = np.nan  # it is of shots twice as long
+            self.search.shot.jacobian[:] = np.nan  # it is of shots twice as long
         some, A, omega = slice(p, p + done), line.A, line.omega
-        y = self._coefficients(
-            line.integrals[some, self.row], line.ends[some, :, self.row], 1, self.mirrored, omega[some]
-        )
-        finished, even = self._turned(y, omega[some]) / A[some, None], _even(y)
+        row_of, mirrored = self.search.row, self.search.mirrored
+        integrals, ends = line.integrals[some, row_of], line.ends[some, :, row_of]
+        y = self.search.fourier(integrals, ends, 1, mirrored, omega[some])
+        finished, even = self.search.turned(y, omega[some]) / A[some, None], _even(y)
         for q in range(p, p + done):
-            self.kinds, self.still = int(line.kinds[q]), bool(line.still[q])
-            name = self._name(y[q - p, 1], even[q - p], line.ends[q, :, self.row], line.miss[q])
+            self.search.kinds, self.search.still = int(line.kinds[q]), bool(line.still[q])
+            name = self._name(y[q - p, 1], even[q - p], line.ends[q, :, row_of], line.miss[q])
             if name in ("stuck", "free"):  # these need a second look
                 line.symmetrical = False
                 return q - p
@@ -217,23 +246,14 @@ class OrbitSolver(OrbitSearch):
             self.broken = False
         return done
 
-    def solve_from(self, state, A: float, omega: float, orders: int):
-        """`solve`, from a state of the caller's, or from rest (None), whatever was solved before."""
-        self.previous = None
-        self._acquaint(A, omega, whatever_before=True)
-        self._given = state
-        try:
-            return self.solve(A, omega, orders)
-        finally:
-            self._given = None
-
     def solve(self, A: float, omega: float, orders: int):
         """Return (Y_k/A for k = 0..orders, regime name, residual)."""
-        self._aim(A, omega)
-        if self.linear is not None:
+        if self.search.aim([0.0, A], omega):
+            self._forget_points()
+        if self.search.linear is not None:
             self.simple = False
-            y, name, x = self.linear.answer(A, omega, orders)
-            self.previous = None if x is None else State(0.0, x, self.engine.modes.copy())
+            y, name, x = self.search.linear.answer(A, omega, orders)
+            self.previous = None if x is None else State(0.0, x, self.search.engine.modes.copy())
             return self._finished(y, name), name, np.nan if np.isnan(y[1]) else 0.0
         try:
             y, name, residual = self._answer(orders)
@@ -246,73 +266,72 @@ class OrbitSolver(OrbitSearch):
 
     def _answer(self, orders):
         """Coefficients Y_k, regime and residual at the present aim."""
-        broken, self.repels = self.broken and self.previous is not None, False
-        self.mirrored, self.simple, self.broken = self.symmetric and not broken, True, False
-        state = self._given or self.previous or self._start(self.A)
-        if self._given is not None:
-            self._resize(self.A)
+        broken, self.search.repels = self.broken and self.previous is not None, False
+        self.search.mirrored, self.simple, self.broken = self.search.symmetric and not broken, True, False
+        state = self.previous or self.search.at_rest(self.search.A)
         state = state.copy()
-        orbit = self._periodic(state, orders=orders) if self.previous is not None else None
+        orbit = self.search.periodic(state, orders=orders) if self.previous is not None else None
         if orbit is None:
-            state = self._follow(state, self.transient)
-            orbit = None if self.repels else self._periodic(state, orders=orders)
+            state = self.search.iterate(state, self.search.transient)
+            orbit = None if self.search.repels else self.search.periodic(state, orders=orders)
         if orbit is None:
-            orbit = self._followed(state, max(LATER - self.transient, 1), orders)
+            orbit = self.search.followed(state, max(LATER - self.search.transient, 1), orders)
         if orbit is None:
-            trail = self._trail(state, 5)
-            orbit = self._periodic(state, orders=orders)
-            if orbit is None and self.mirrored and self._alternates(trail):
-                self.mirrored = False
-                orbit = self._periodic(state, orders=orders)
-                self.mirrored = orbit is None
+            trail = self.search.trail(state, 5)
+            orbit = self.search.periodic(state, orders=orders)
+            if orbit is None and self.search.mirrored and self._alternates(trail):
+                self.search.mirrored = False
+                orbit = self.search.periodic(state, orders=orders)
+                self.search.mirrored = orbit is None
             if orbit is None:
-                orbit = close_damped(self, state, orders=orders, patient=self._slow(trail))
-        if orbit is None and self.symmetric:
-            self.mirrored = self.repels = False
-            state = self._nudged(state)
-            orbit = self._followed(state, LATEST, orders)
-        if self.gap and orbit is not None and not self.kinds & TOUCH and self._given is None:
-            mirrored, within = self.mirrored, orbit[0]
-            touching, state = self._touching(orders)
+                orbit = close_damped(self.search, state, orders=orders, patient=self._slow(trail))
+        if orbit is None and self.search.symmetric:
+            self.search.mirrored = self.search.repels = False
+            state = self.search.nudged(state)
+            orbit = self.search.followed(state, LATEST, orders)
+        if self.search.gap and orbit is not None and not self.search.kinds & TOUCH:
+            mirrored, within = self.search.mirrored, orbit[0]
+            touching, state = self.search.touching(orders)
             if touching is not None or state is not None:
                 orbit = touching
             else:
-                self.mirrored, state = mirrored, within
-                orbit = self._periodic(within, orders=orders)
+                self.search.mirrored, state = mirrored, within
+                orbit = self.search.periodic(within, orders=orders)
         if orbit is None:
             return self._unperiodic(state, orders)
         self.previous = orbit[0]
-        y = self._coefficients(self.integrals, self.ends, 1, self.mirrored)
+        y = self.search.fourier(self.search.integrals, self.search.ends, 1, self.search.mirrored)
         self._remember_symmetry(y)
-        return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
+        return y, self._name(y[1], _even(y), self.search.ends, orbit[1]), orbit[1]
 
     def _remember_symmetry(self, y):
         """Keep whether the orbit has lost the symmetry of half periods: the next one begins as it does.
 
         Without even harmonics asked for that is not known.
         """
-        if self.symmetric and not self.mirrored:
+        if self.search.symmetric and not self.search.mirrored:
             self.broken = len(y) < 3 or bool(_even(y) > EVEN_LEAST)
             if not self.broken:
-                self.shot.jacobian[:] = np.nan  # it is of shots twice as long
+                self.search.shot.jacobian[:] = np.nan  # it is of shots twice as long
 
     def _unperiodic(self, state, orders):
         """Look for a longer period; else follow the motion until it is steady, and average."""
-        self.mirrored, self.simple = False, False
-        state = self._follow(state, LATEST, RTOL)
-        y = self._trail(state, 2 * LONGEST_PERIOD + 1)
-        self._stop_if_running_away(y)
+        self.search.mirrored, self.simple = False, False
+        state = self.search.iterate(state, LATEST, RTOL)
+        y = self.search.trail(state, 2 * LONGEST_PERIOD + 1)
+        self.search.stop_if_running_away(y)
         found = self._longer_period(state, y, orders)
         if found is not None:
             return found
-        orbit = close_damped(self, state, orders=orders, patient=self._slow(y))
+        orbit = close_damped(self.search, state, orders=orders, patient=self._slow(y))
         if orbit is None:
             for periods in WAITS:
                 means, sizes = self._averages(state, orders)
-                if (self.gap and not self.touched) or _steady(means[:, 1], sizes):
+                if (self.search.gap and not self.touched) or _steady(means[:, 1], sizes):
                     break
-                state = self._follow(state, periods)
-                orbit = self._periodic(state, orders=orders) or close_damped(self, state, orders=orders)
+                state = self.search.iterate(state, periods)
+                orbit = self.search.periodic(state, orders=orders)
+                orbit = orbit or close_damped(self.search, state, orders=orders)
                 if orbit is not None:
                     break
             else:  # still on its way
@@ -320,12 +339,12 @@ class OrbitSolver(OrbitSearch):
                 raise OutOfWork(Status.DIVERGED if grows else Status.WORK_LIMIT)
         if orbit is not None:
             self.previous, self.simple = orbit[0], True
-            y = self._coefficients(self.integrals, self.ends, 1, False)
+            y = self.search.fourier(self.search.integrals, self.search.ends, 1, False)
             self._remember_symmetry(y)
-            return y, self._name(y[1], _even(y), self.ends, orbit[1]), orbit[1]
+            return y, self._name(y[1], _even(y), self.search.ends, orbit[1]), orbit[1]
         self.previous = state
         mean = means.mean(axis=0)
-        if self.gap and not self.touched:
+        if self.search.gap and not self.touched:
             return mean, "free", 0.0
         error = np.std(means[:, 1], ddof=1) / np.sqrt(BLOCKS)
         return mean, "aperiodic", float(2 * error / max(abs(mean[1]), NOTHING))
@@ -337,7 +356,7 @@ class OrbitSolver(OrbitSearch):
 
     def _apart(self, y, shots):
         """Return changes over so many shots of the coordinates that have to repeat, in their sizes."""
-        s, steps = self.symmetries, y[shots:] - y[:-shots]
+        s, steps = self.search.symmetries, y[shots:] - y[:-shots]
         wrap = np.where(s.wrap > 0, s.wrap, 1.0)
         steps -= np.where(s.wrap > 0, np.round(steps / wrap) * wrap, 0.0)
         return (steps / np.maximum(np.max(np.abs(y), axis=0), NOTHING))[:, s.free]
@@ -349,8 +368,8 @@ class OrbitSolver(OrbitSearch):
 
     def _longer_period(self, state, y, orders):
         """Coefficients, regime and residual of a motion that repeats after several periods, or None."""
-        s = self.symmetries
-        size = np.where(self.shot.size > 0, self.shot.size, 1.0)
+        s = self.search.symmetries
+        size = np.where(self.search.shot.size > 0, self.search.shot.size, 1.0)
         least = LONGER_LEAST
         for periods in range(1, LONGEST_PERIOD + 1):
             gap = (y[-1] - y[-1 - periods]) / size
@@ -360,33 +379,33 @@ class OrbitSolver(OrbitSearch):
             apart = np.max(np.abs(gap[s.free]), initial=0.0)
             if apart < LONGER_BETTER * least:
                 least = apart
-                orbit = self._periodic(state, periods, orders)
+                orbit = self.search.periodic(state, periods, orders)
                 if orbit is not None:
                     self.previous, self.simple = orbit[0], periods == 1
-                    c = self._coefficients(self.integrals, self.ends, periods, False)
+                    c = self.search.fourier(self.search.integrals, self.search.ends, periods, False)
                     if self.simple:
                         self._remember_symmetry(c)
                     name = (
                         f"subharmonic {periods}"
                         if periods > 1
-                        else self._name(c[1], _even(c), self.ends, orbit[1])
+                        else self._name(c[1], _even(c), self.search.ends, orbit[1])
                     )
                     return c, name, orbit[1]
         return None
 
     def _averages(self, state, orders):
         """Follow the state, in place, over `averages` periods; coefficients and size of every block."""
-        length, parts, sizes, self.touched = self.averages // BLOCKS, [], [], False
+        length, parts, sizes, self.touched = self.search.averages // BLOCKS, [], [], False
         for _ in range(BLOCKS):
             mean, size = np.zeros(orders + 1, complex), 0.0
             for _ in range(length):
-                part = np.zeros((self.row + 1, orders + 1), complex)
-                self.touched |= bool(self._shoot(state, RTOL, 1, part) & TOUCH)
-                ends = self.shot.ends[:, self.row]
-                mean += self._coefficients(part[self.row], ends, 1, False) / length
+                part = np.zeros((self.search.row + 1, orders + 1), complex)
+                self.touched |= bool(self.search.shoot(state, RTOL, 1, part) & TOUCH)
+                ends = self.search.shot.ends[:, self.search.row]
+                mean += self.search.fourier(part[self.search.row], ends, 1, False) / length
                 with np.errstate(over="ignore"):  # a motion that runs away is seen by its size
-                    y = np.abs(self.symmetries.transform @ state.x) / self._unit
-                size += np.max(y[self.symmetries.free], initial=0.0) / length
+                    y = np.abs(self.search.symmetries.transform @ state.x) / self.search.unit
+                size += np.max(y[self.search.symmetries.free], initial=0.0) / length
             parts.append(mean)
             sizes.append(size)
         return np.array(parts), np.array(sizes)
@@ -394,19 +413,19 @@ class OrbitSolver(OrbitSearch):
     # --- what was found -------------------------------------------------------------------------------
 
     def _finished(self, y, name):
-        return np.full(len(y), np.nan + 0j) if name == "stuck" else self._turned(y) / self.A
+        return np.full(len(y), np.nan + 0j) if name == "stuck" else self.search.turned(y) / self.search.A
 
     def _name(self, fundamental, even, ends, miss):
         """Regime of a motion of one period."""
-        s, kinds = self.symmetries, self.kinds
-        if self.still and not kinds & ~(BIT["corner"] | BIT["switch"]):
+        s, kinds = self.search.symmetries, self.search.kinds
+        if self.search.still and not kinds & ~(BIT["corner"] | BIT["switch"]):
             return "stuck"
-        if self.gap and not kinds & TOUCH:
+        if self.search.gap and not kinds & TOUCH:
             return "free"
-        drift = abs(ends[1] - ends[0]) if not self.mirrored else 0.0
+        drift = abs(ends[1] - ends[0]) if not self.search.mirrored else 0.0
         if drift > TRAVEL * abs(fundamental) and (s.wrap.any() or (s.shifts and not s.inertial.any())):
             return "drifting"
-        if self.symmetric and even > max(EVEN_LEAST, EVEN_MISS * miss):
+        if self.search.symmetric and even > max(EVEN_LEAST, EVEN_MISS * miss):
             return "asymmetric"
         rigid = kinds & (BIT["impact"] | BIT["stop"])
         if kinds & BIT["stop contact"] or (kinds & BIT["contact"] and not self._elastic()):
@@ -418,5 +437,5 @@ class OrbitSolver(OrbitSearch):
         return "slip" if kinds & BIT["reversal"] else "smooth"
 
     def _elastic(self):
-        prog = self.engine.program
-        return any(prog.ints[n[layout.AUX] + layout.A_JOINT] == layout.J_ELASTIC for n in self.mechanisms)
+        prog, mechanisms = self.search.engine.program, self.search.mechanisms
+        return any(prog.ints[n[layout.AUX] + layout.A_JOINT] == layout.J_ELASTIC for n in mechanisms)

@@ -1,8 +1,8 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""Forced periodic orbits by Newton's method on the shots of `shot`, all in compiled code.
+"""Forced periodic orbits by Newton's method on the shots of `period_map`, all in compiled code.
 
-The Jacobian of the shot is kept from point to point of a sweep and corrected by what each step shows, the
+The Jacobian of the shot is kept from point to point of a line and corrected by what each step shows, the
 start is extrapolated from the points before, and the last shot integrates the harmonics along the way: most
 points cost three or four shots, the first of them coarse.
 """
@@ -39,7 +39,7 @@ from ..thresholds import (
     TOO_FAR,
 )
 from .newton import correct, differentiate, newton_step, spectral_radius
-from .shot import coordinates, mismatch, place, shot_at
+from .period_map import coordinates, mismatch, period_map_at, place
 
 CLOSED, OPEN, UNSTABLE, SPENT, FAILED = range(5)
 """Outcome: closed and attracting, not closed, closed but repelling, out of work, the run failed."""
@@ -55,7 +55,7 @@ def address() -> int:
 
 
 @njit(error_model="numpy", nogil=True)
-def close_orbit(
+def solve_periodic(
     close, shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager
 ):
     """`close` at its address, from Python; returns outcome and error."""
@@ -66,7 +66,7 @@ def close_orbit(
             shots, eager,
         ),
     )  # fmt: skip
-    return outcome, shot_at(shot).error[0]
+    return outcome, period_map_at(shot).error[0]
 
 
 @apart
@@ -77,8 +77,21 @@ def close(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
     steps; with `eager` the first shot takes integrals already. Returns the outcome, and leaves the error of
     the state in ``shot.error``.
     """
-    outcome, shot_at(shot).error[0] = _close(
-        shot_at(shot), shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget, shots, eager
+    outcome, period_map_at(shot).error[0] = _close(
+        period_map_at(shot),
+        shot,
+        drive,
+        time,
+        x,
+        mode,
+        mirrored,
+        rtol,
+        atol,
+        hmax,
+        spectrum,
+        budget,
+        shots,
+        eager,
     )
     return outcome
 

@@ -6,7 +6,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from ...record_name import RecordName, digest
+from ...values.record_name import RecordName, digest
 from .frequency_measurement import FrequencyMeasurement
 from .measurement import Measurement
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...calls import keywords_of, unknown_keywords
 from ...checks import choice, count, mapping, number, shown
-from ...record_name import RecordName, digest
 from ...units import si_unit, to_si
+from ...values.record_name import RecordName, digest
 from ..thresholds import ON_SAMPLE
 from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
@@ -50,7 +50,7 @@ class Measurement:
     time_unit : str
         Of `t`, such as ``ms``.
     input_hold : {'zoh', 'linear'}
-        What the input did between samples: held its value, or ran straight to the next.
+        What the input did between samples: held its value, or varied linearly.
     velocity : array_like or None, shape (n,)
         Measured velocity, if there was a sensor for it.
     velocity_unit : str or None
@@ -64,12 +64,12 @@ class Measurement:
         words.
     outputs : mapping or None
         All that was measured, by quantity, where that is more than one: ``{"x": x, "v": (v, "mm/s")}``, each
-        an array in SI or a pair (array, unit). A model is judged by each over its own noise; `y` is then the
-        position, or the first. A `velocity` judges nothing: drives compute it from the position.
+        an array in SI or a pair (array, unit). Each is weighted by its own noise; `y` is then the position,
+        or the first. `velocity` is not fitted: drives compute it from the position.
     units : mapping
         SI unit of each output, by quantity.
     note : str
-        How the record was read where that is not as it was given; empty: as it was.
+        How the record was read if it was changed on reading; otherwise empty.
 
     Raises
     ------

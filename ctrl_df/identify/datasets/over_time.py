@@ -31,9 +31,9 @@ class TimeDataset(Dataset):
 
     def with_prior(self, prior):
         """Return the same data, of a machine of which that is known."""
-        self = copy(self)
-        self.prior = prior
-        return self
+        other = copy(self)
+        other.prior = prior
+        return other
 
     def check_segments(self, mode, window):
         """Check the mode, and a length of segment that holds samples enough."""

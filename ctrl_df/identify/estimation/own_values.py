@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...per_record import PerRecord
+from ...values.per_record import PerRecord
 from ..prediction.values import in_record
 from ..shooting.problem import Problem
 from ..thresholds import TAKES_PART

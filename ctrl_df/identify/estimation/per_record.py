@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from ...per_record import PerRecord
+from ...values.per_record import PerRecord
 from ..prediction.values import block_of, in_record, is_own, knows, with_values
 from .fit import FitResult
 from .thresholds import ANGLE_WORTH, ANGLES, EFFORT_OWN

@@ -15,8 +15,8 @@ import control as ct
 from ...blocks.core import is_kinetic, kinetic_level
 from ...blocks.mechanism import Mechanism
 from ...blocks.parameter import Parameter
-from ...per_record import PerRecord
 from ...simulate.loop import closed_loop
+from ...values.per_record import PerRecord
 
 
 def block_of(model) -> Any:

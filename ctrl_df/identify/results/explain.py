@@ -28,11 +28,11 @@ def places(where) -> str:
 
 
 def unconfirmed(first) -> str:
-    """Return that the data held out say nothing of an effect that those fitted speak for."""
+    """Return that the held-out data do not confirm an effect that the fitted data favour."""
     return (
-        f"The data fitted speak for {named(first.effect)} (log-likelihood higher by "
-        f"{first.evidence_fitted:.0f}), those held out say nothing of it (by {first.evidence_holdout:.1f}): "
-        "it may not act there. A record held out in which it acts would tell."
+        f"The fitted data favour {named(first.effect)} (log-likelihood higher by "
+        f"{first.evidence_fitted:.0f}), the held-out data do not confirm it ({first.evidence_holdout:.1f}): "
+        "it may not act there. Hold out a record in which it acts."
     )
 
 
@@ -97,17 +97,17 @@ def sensed_side(d, first) -> str:
 
 
 def falls_behind(first, long) -> str:
-    """Return how the first of a ranking does over long stretches (`Lasting`)."""
+    """Return how the first of a ranking predicts over long horizons (`Lasting`)."""
     if long.horizon == 0:
         return (
-            f"Predicting freely, hidden states going on, neither {named(first.effect)} nor any other follows "
-            f"the motion for long: over the shortest stretch it errs by {long.errors[first.id]:.0%}."
+            f"In free prediction, internal states continued, neither {named(first.effect)} nor any other "
+            f"follows the motion for long: it errs by {long.errors[first.id]:.0%} over the shortest horizon."
         )
     who = [(n.replace("_", " ") or "the model without it", long.errors[n]) for n in long.better]
-    others = " and ".join(f"{name} by {percent(error)}" for name, error in who)
+    others = " and ".join(f"that of {name} {percent(error)}" for name, error in who)
     return (
-        f"Predicting {long.horizon:.3g} s freely, hidden states going on, {named(first.effect)} errs by "
-        f"{percent(long.errors[first.id])}, but {others}: that it follows short segments is no proof."
+        f"In free prediction over {long.horizon:.3g} s, internal states continued, the error with "
+        f"{named(first.effect)} is {percent(long.errors[first.id])}, {others}: short segments are no proof."
     )
 
 
@@ -131,7 +131,7 @@ def grows(short: float, error: float, seconds: float, effect=None) -> str:
 
 def explains_nothing() -> str:
     """Return that a model makes nothing of the motion, whatever its parameters."""
-    return f"It explains nothing of this motion. {_UNITS}"
+    return f"The model explains nothing of this motion. {_UNITS}"
 
 
 def far_off(judged, names, stated) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...checks import known_name
 from ...numerals import digits
-from ...record_name import RecordName, among
+from ...values.record_name import RecordName, among
 from ..prediction.values import for_record
 from ..residuals.comparison_base import ComparisonBase
 

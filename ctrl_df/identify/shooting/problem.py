@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...per_record import PerRecord
+from ...values.per_record import PerRecord
 from ..prediction.initial_states import FREE
 from ..prediction.segments import facts_of
 from ..prediction.values import block_of, feasible, for_record, in_record, is_own, with_values

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...per_record import PerRecord
+from ...values.per_record import PerRecord
 from ..prediction.segments import facts
 from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING
 from .thresholds import (

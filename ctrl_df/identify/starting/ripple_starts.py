@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ...per_record import PerRecord
+from ...values.per_record import PerRecord
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import RippleSpectrum, Wave, apart

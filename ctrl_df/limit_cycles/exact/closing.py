@@ -14,12 +14,12 @@ from ..thresholds import (
     CLOSED,
     COURSE_RTOL,
     FREE_POINTS,
-    LAP_RTOL,
-    MOST_LAPS,
+    MOST_ROUNDS,
     NEWTON_LONGEST,
     NOTHING,
     ON_CIRCLE,
     ORBIT_POINTS,
+    PERIOD_RTOL,
     RANK,
     REPEATED,
     STALLED,
@@ -28,7 +28,7 @@ from ..thresholds import (
     STRETCH,
 )
 from .monodromy import Tracer
-from .multiple_shooting import shoot
+from .multiple_shooting import close_pieces
 from .orbit import Orbit
 from .symmetry import shift_directions, transverse
 
@@ -69,16 +69,16 @@ class Closing:
         """
         start, size = self.free_state(np.array(x0, float), period, stay)
         status, best, grown, first = Status.NOT_CONVERGED, np.inf, 0, period
-        lap = beside = None
+        traced = beside = None
         for _ in range(self.max_iterations):
-            lap = self.tracer.lap(start, period, size=size)
-            if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
-                raise NoClosure(f"no lap could be followed ({lap.status.name.lower().replace('_', ' ')})")
+            traced = self.tracer.trace(start, period, size=size)
+            if not traced.status.ok or not np.all(np.isfinite(traced.monodromy)):
+                raise NoClosure(_not_traced(traced))
             if beside is None:
                 # shifts that the loop does not notice: an orbit closes up to them
-                free = shift_directions(self.tracer, lap.segments, size)
+                free = shift_directions(self.tracer, traced.segments, size)
                 beside = np.eye(self.tracer.n) - free @ free.T
-            residual = beside @ ((lap.end.x - start.x) / size)
+            residual = beside @ ((traced.end.x - start.x) / size)
             mismatch = float(np.max(np.abs(residual)))
             if mismatch < CLOSED:
                 status, best = Status.CONVERGED, mismatch
@@ -88,36 +88,36 @@ class Closing:
                 if grown > STALLS:
                     break
             best = min(best, mismatch)
-            step = self._newton(start, lap, period, size, beside, residual)
+            step = self._newton(start, traced, period, size, beside, residual)
             period += step[-1]
             if not first / STRETCH < period < first * STRETCH:
                 raise NoClosure("Newton left for another period", best)
             start = self.rebuilt(start.x + step[:-1])
-        if lap is None or self._at_rest(start, lap, period, size):
+        if traced is None or self._at_rest(start, traced, period, size):
             raise NoClosure("Newton ended at rest")
         if status is not Status.CONVERGED and best > ACCEPTED:
             raise NoClosure(f"Newton came no nearer than {best:.1g} of the orbit's size", best)
-        lap, period = self._single(start, period, lap, size, beside)
-        return self._finished(start, period, lap, size)
+        traced, period = self._single(start, period, traced, size, beside)
+        return self._finished(start, period, traced, size)
 
     def close_along(self, states, period: float) -> Orbit:
         """Close an orbit from states at equal steps of time along it, by multiple shooting."""
         largest = np.abs(states).max(axis=0)
         size = self.tracer.sizes(self.rebuilt(states[0]), period, largest)
-        met = shoot(self.tracer, self.rebuilt, np.asarray(states, float), period, size)
+        met = close_pieces(self.tracer, self.rebuilt, np.asarray(states, float), period, size)
         if met is None:
             raise NoClosure("the pieces of multiple shooting do not meet")
         return self.close(*met)
 
-    def _newton(self, start, lap, period, size, beside, residual):
+    def _newton(self, start, traced, period, size, beside, residual):
         """Step of state and period, bounded to three tenths of the orbit's size."""
         n = self.tracer.n
-        f_end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
+        f_end = self.tracer.rate(traced.end.time, traced.end.x, traced.end.mode)
         f_start = self.tracer.rate(start.time, start.x, start.mode)
         system = np.zeros((n + 1, n + 1))
         scale = np.append(size, period)
         # in units of the orbit: states by their sizes, time by the period
-        system[:n, :n] = lap.monodromy * size / size[:, None] - np.eye(n)
+        system[:n, :n] = traced.monodromy * size / size[:, None] - np.eye(n)
         system[:n, n] = f_end * period / size
         system[n, :n] = f_start * period / size
         system[:n] = beside @ system[:n]
@@ -125,38 +125,39 @@ class Closing:
         shorten = min(1.0, NEWTON_LONGEST / max(float(np.max(np.abs(change))), NOTHING))
         return shorten * change * scale
 
-    def _single(self, start, period, lap, size, beside):
-        """Return the lap and period of an orbit that may have been closed after going round several times."""
-        parts = np.arange(MOST_LAPS, 1, -1)
-        run = self.engine.run(start, period, times=np.sort(period / parts), rtol=LAP_RTOL, log=1)
+    def _single(self, start, period, traced, size, beside):
+        """Return trace and period of an orbit that may have been closed after going round several times."""
+        parts = np.arange(MOST_ROUNDS, 1, -1)
+        run = self.engine.run(start, period, times=np.sort(period / parts), rtol=PERIOD_RTOL, log=1)
         mismatch = np.max(np.abs(((run.states - start.x) / size) @ beside.T), axis=1)
         for k in np.argsort(period / parts):  # the shortest first
             part = int(parts[k])
             if mismatch[k] < REPEATED * ACCEPTED:
-                short = self.tracer.lap(start, period / part, size=size)
+                short = self.tracer.trace(start, period / part, size=size)
                 if np.max(np.abs(beside @ ((short.end.x - start.x) / size))) < REPEATED * ACCEPTED:
                     return short, period / part
-        return lap, period
+        return traced, period
 
     def free_state(self, x0, period, stay=False) -> tuple[Any, Any]:
         """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
         state = self.engine.start(x0)
-        lap = self.tracer.lap(state, period, differentiate=False)
-        if not lap.status.ok or not lap.segments:
-            raise NoClosure(f"no lap could be followed ({lap.status.name.lower().replace('_', ' ')})")
+        traced = self.tracer.trace(state, period, differentiate=False)
+        if not traced.status.ok or not traced.segments:
+            raise NoClosure(_not_traced(traced))
         times = np.linspace(0, period, FREE_POINTS)[1:]
         run = self.engine.run(self.engine.start(x0), period, times=times, rtol=COURSE_RTOL, log=1)
-        largest = np.max(np.abs([s.start.x for s in lap.segments] + [lap.end.x]), axis=0)
+        largest = np.max(np.abs([s.start.x for s in traced.segments] + [traced.end.x]), axis=0)
         largest = np.maximum(largest, np.nanmax(np.abs(run.states), axis=0))
         if stay:
-            begin = lap.segments[0].start
+            begin = traced.segments[0].start
             return begin, self.tracer.sizes(begin, period, largest)
-        constraints = [self._constraints(s.start.mode) for s in lap.segments]
+        constraints = [self._constraints(s.start.mode) for s in traced.segments]
         least = min(constraints)
-        length, k = max((s.length, i) for i, s in enumerate(lap.segments) if constraints[i] == least)
-        begin = lap.segments[k].start
+        length, k = max((s.length, i) for i, s in enumerate(traced.segments) if constraints[i] == least)
+        begin = traced.segments[k].start
         size = self.tracer.sizes(begin, period, largest)
-        middle = self.engine.run(begin, begin.time + 0.5 * length, rtol=LAP_RTOL, locate=False, log=1).state
+        until = begin.time + 0.5 * length
+        middle = self.engine.run(begin, until, rtol=PERIOD_RTOL, locate=False, log=1).state
         middle.time, middle.mode = 0.0, begin.mode.copy()
         middle.fresh = True
         return self.tracer.settle(middle), size
@@ -174,10 +175,10 @@ class Closing:
                 )
         return count
 
-    def _at_rest(self, start, lap, period, size):
+    def _at_rest(self, start, traced, period, size):
         """Whether Newton ended on an equilibrium, which is periodic with any period."""
         speed = np.abs(self.tracer.rate(start.time, start.x, start.mode)) * period
-        moved = np.max([np.abs(s.start.x - start.x) for s in lap.segments], axis=0)
+        moved = np.max([np.abs(s.start.x - start.x) for s in traced.segments], axis=0)
         return bool(np.max(speed / size) < STILL) and bool(np.max(moved / size) < STILL)
 
     def rebuilt(self, x):
@@ -203,18 +204,18 @@ class Closing:
             x[o + 2] = x[o] + np.clip(x[o + 2] - x[o], 0.0, core.gap)
         return x
 
-    def _finished(self, start, period, lap, size) -> Orbit:
+    def _finished(self, start, period, traced, size) -> Orbit:
         times = np.linspace(0.0, period, ORBIT_POINTS)
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         run = self.engine.run(
-            start, period, times=times, rtol=LAP_RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
+            start, period, times=times, rtol=PERIOD_RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
         )
         if np.max(np.ptp(run.states, axis=0) / size) < STILL:
             raise NoClosure("Newton ended at rest")  # an equilibrium, periodic with any period
         # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
-        across = transverse(shift_directions(self.tracer, lap.segments, size))
-        carried = across.T @ (lap.monodromy * size / size[:, None]) @ across
+        across = transverse(shift_directions(self.tracer, traced.segments, size))
+        carried = across.T @ (traced.monodromy * size / size[:, None]) @ across
         values = np.linalg.eigvals(carried)
         trivial = int(np.argmin(np.abs(values - 1.0)))
         floquet = np.delete(values, trivial)
@@ -223,15 +224,19 @@ class Closing:
             raise Centre("motions of every size repeat (a centre)")
         outside = np.abs(floquet) - 1.0
         stable = None if np.any(np.abs(outside) < ON_CIRCLE) else bool(np.all(outside < 0.0))
-        residual = float(np.max(np.abs(across.T @ ((lap.end.x - start.x) / size)), initial=0.0))
+        residual = float(np.max(np.abs(across.T @ ((traced.end.x - start.x) / size)), initial=0.0))
         events, t = [], 0.0
-        for s in lap.segments:
+        for s in traced.segments:
             t += s.length
             if s.event:
                 events.append(Event(t, s.node, s.event))
         amplitudes = 2 * np.abs(spectrum[:, 1]) / period
         return Orbit(
             float(omega), float(period), float(amplitudes[-1]), float(amplitudes[0]), floquet, stable,
-            residual, tuple(events), Status.CONVERGED, lap.grazing, times, run.outputs.T, run.states.T,
+            residual, tuple(events), Status.CONVERGED, traced.grazing, times, run.outputs.T, run.states.T,
             self.loop,
         )  # fmt: skip
+
+
+def _not_traced(traced) -> str:
+    return f"no period could be followed ({traced.status.name.lower().replace('_', ' ')})"

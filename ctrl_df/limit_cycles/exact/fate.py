@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..thresholds import ASKED, FACTORS, HALVINGS, LINGERS, NOTHING, SWINGS, WIDTH, WOUND
+from ..thresholds import ASKED, CROSSINGS, FACTORS, HALVINGS, LINGERS, NOTHING, WIDTH, WOUND
 from .known import KnownOrbits
 from .orbit import Orbit
-from .swings import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, Swings
+from .poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, PoincareSearch
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,12 @@ class Start:
     size : float
         Displacement at rest [m], or amplitude at the input of an element.
     fate : str
-        ``rests`` (or slows down without end, each swing longer than the last by a steady ratio), ``cycles``,
+        ``rests`` (or slows down without end, each period longer than the last by a steady ratio), ``cycles``,
         ``diverges``, or ``undecided`` within the bound on work.
     orbit : Orbit or None
         The one it cycles on.
     growth : float
-        Change of the swings at the end, a ratio a quarter of the course.
+        Ratio of the amplitudes in the last quarter of the course to those in the quarter before.
     wind_up : float
         Factor by which the controller's integral outgrew the block's output, where it did; else 1.
     """
@@ -142,13 +142,13 @@ class Explorer:
 
     Parameters
     ----------
-    swings : Swings
+    search : PoincareSearch
     close : callable
         ``close(x0, course, complete) -> Orbit or None``: the orbit that a course comes near.
     """
 
-    def __init__(self, swings: Swings, close: Callable):
-        self.swings, self.close = swings, close
+    def __init__(self, search: PoincareSearch, close: Callable):
+        self.search, self.close = search, close
 
     def explore(self, longest=None, edges=True, known: KnownOrbits | None = None, factors=FACTORS) -> Fate:
         """Simulate every start; with `edges` close in on the borders between starts of different fate.
@@ -157,11 +157,11 @@ class Explorer:
 
         Starts whose course ends on an orbit of `known` are not followed to its end, nor closed again.
         """
-        kicks, met = self.swings.kicks, []
-        known = KnownOrbits(self.swings, []) if known is None else known
+        kicks, met = self.search.kicks, []
+        known = KnownOrbits(self.search, []) if known is None else known
         rows = []
         for size, x0 in kicks.all(factors):
-            course = self.swings.follow(x0, SWINGS, longest, decided=known.ending)
+            course = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
             orbit = known.reached(course) or known.kept(self.close(x0, course, True))
             rows.append(self._row(size, course, orbit, x0))
             _once(met, orbit)
@@ -185,13 +185,13 @@ class Explorer:
 
     def _wound(self, course, x0) -> float:
         """Factor by which controller states outgrew the block's during a divergence; 1 where they did not."""
-        nc = self.swings.loop.syslist[0].nstates or 0 if self.swings.parts is not None else 0
-        core = self.swings.kicks.core
-        if not nc or core is None or not course.laps:
+        nc = self.search.loop.syslist[0].nstates or 0 if self.search.parts is not None else 0
+        core = self.search.kicks.core
+        if not nc or core is None or not course.crossings:
             return 1.0
         if not any(getattr(e, "corners", ()) for e, _ in core.input_channel):
             return 1.0
-        gains = np.abs(course.end) / self.swings.units
+        gains = np.abs(course.end) / self.search.units
         return float(max(gains[:nc].max() / max(gains[nc:].max(), NOTHING), 1.0 + WOUND))
 
     def _border(self, low: Start, high: Start, longest, known) -> Border:
@@ -202,8 +202,8 @@ class Explorer:
             middle = float(np.sqrt(below * above))
             if not below < middle < above:
                 break
-            x0 = self.swings.kicks.state(middle)
-            course = self.swings.follow(x0, SWINGS, longest, decided=known.ending)
+            x0 = self.search.kicks.state(middle)
+            course = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
             if course.fate == fates[0]:
                 below = middle
             elif course.fate == fates[1]:
@@ -216,18 +216,18 @@ class Explorer:
 
     def _slowest(self, x0, course: Course, known) -> Orbit | None:
         """Unstable orbit near which a course lingers: its passages change least there."""
-        laps = course.laps
-        if len(laps) < 4:
+        crossings = course.crossings
+        if len(crossings) < 4:
             return None
         change = [
-            float(np.max(np.abs(b.state - a.state) / self.swings.units) / max(b.peak, NOTHING))
-            for a, b in zip(laps[:-1], laps[1:], strict=True)
+            float(np.max(np.abs(b.state - a.state) / self.search.units) / max(b.peak, NOTHING))
+            for a, b in zip(crossings[:-1], crossings[1:], strict=True)
         ]
         k = int(np.argmin(change))
-        orbit = known.beside(laps[k])
+        orbit = known.beside(crossings[k])
         if orbit is not None or change[k] > LINGERS:
             return orbit
-        near = laps[max(k - 4, 0) : k + 2]
+        near = crossings[max(k - 4, 0) : k + 2]
         padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near
         orbit = self.close(x0, Course(padded, UNDECIDED, 1.0, course.end), False)
         return known.kept(orbit) if orbit is not None and orbit.stable is False else None

@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ...blocks.core import level
-from ...blocks.element import Element
+from ...blocks.elements.element import Element
 from ...simulate.sampled import Sampled
 from ..thresholds import (
     BEND_HALVINGS,

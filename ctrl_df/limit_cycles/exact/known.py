@@ -6,7 +6,7 @@ import numpy as np
 
 from ..thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
 from .orbit import Orbit
-from .swings import CYCLES, Course, Lap, Swings
+from .poincare import CYCLES, Course, Crossing, PoincareSearch
 
 
 class KnownOrbits:
@@ -14,16 +14,16 @@ class KnownOrbits:
 
     Parameters
     ----------
-    swings : Swings
+    search : PoincareSearch
         Whose passages are compared with those of the orbits: the upward crossings of the signal it watches.
     orbits : list of Orbit
         Known from the start; further ones are appended to it.
     """
 
-    def __init__(self, swings: Swings, orbits: list[Orbit]):
-        self.swings, self.orbits = swings, orbits
+    def __init__(self, search: PoincareSearch, orbits: list[Orbit]):
+        self.search, self.orbits = search, orbits
         # a passage tells nothing where the state is a history, or passages are looked for among samples
-        self._telling = not swings.tight and not getattr(swings.parts, "dt", 0)
+        self._telling = not search.tight and not getattr(search.parts, "dt", 0)
         self._passages: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def kept(self, orbit: Orbit | None) -> Orbit | None:
@@ -36,63 +36,63 @@ class KnownOrbits:
         self.orbits.append(orbit)
         return orbit
 
-    def approached(self, laps: list[Lap]) -> Orbit | None:
+    def approached(self, crossings: list[Crossing]) -> Orbit | None:
         """Return the stable orbit that the last passages come nearer and nearer to, almost there; or None."""
-        if len(laps) <= PASSAGES:
+        if len(crossings) <= PASSAGES:
             return None
         for orbit in self.orbits:
             if orbit.stable:
-                apart = [self._distance(orbit, lap) for lap in laps[-PASSAGES:]]
+                apart = [self._distance(orbit, crossing) for crossing in crossings[-PASSAGES:]]
                 if apart[-1] < THERE and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
                     return orbit
         return None
 
-    def repeated(self, laps: list[Lap]) -> Orbit | None:
+    def repeated(self, crossings: list[Crossing]) -> Orbit | None:
         """Return the orbit that repeating passages are on; None if it is not known."""
-        if len(laps) < 2:
+        if len(crossings) < 2:
             return None
         for orbit in self.orbits:
             if not orbit.status.ok:
                 continue
             passages = len(self._of(orbit)[0])
-            if not passages or len(laps) <= passages:
+            if not passages or len(crossings) <= passages:
                 continue
-            lap = laps[-1].time - laps[-1 - passages].time
-            if abs(lap / orbit.period - 1) < ON and self._distance(orbit, laps[-1]) < THERE:
+            spent = crossings[-1].time - crossings[-1 - passages].time
+            if abs(spent / orbit.period - 1) < ON and self._distance(orbit, crossings[-1]) < THERE:
                 return orbit
         return None
 
-    def beside(self, lap: Lap) -> Orbit | None:
+    def beside(self, crossing: Crossing) -> Orbit | None:
         """Return the unstable orbit that a passage is beside; or None."""
         for orbit in self.orbits:
-            if orbit.stable is False and self._distance(orbit, lap) < BESIDE:
+            if orbit.stable is False and self._distance(orbit, crossing) < BESIDE:
                 return orbit
         return None
 
-    def ending(self, laps: list[Lap]) -> str:
-        """Return the fate of laps that end on a known orbit, empty for others; see `Swings.follow`."""
-        return CYCLES if self.approached(laps) is not None else ""
+    def ending(self, crossings: list[Crossing]) -> str:
+        """Fate of crossings that end on a known orbit, empty for others; `decided` of a search asks it."""
+        return CYCLES if self.approached(crossings) is not None else ""
 
     def reached(self, course: Course) -> Orbit | None:
         """Return the known orbit that a course has ended on; None for any other."""
         if course.fate != CYCLES:
             return None
-        return self.approached(course.laps) or self.repeated(course.laps)
+        return self.approached(course.crossings) or self.repeated(course.crossings)
 
-    def _distance(self, orbit: Orbit, lap: Lap) -> float:
+    def _distance(self, orbit: Orbit, crossing: Crossing) -> float:
         """Largest difference of a state from those of the orbit at its nearest passage, in its sizes."""
         states, size = self._of(orbit)
         if not len(states) or not self._telling:
             return np.inf
-        return float(np.max(np.abs(states - lap.state) / size, axis=1).min())
+        return float(np.max(np.abs(states - crossing.state) / size, axis=1).min())
 
     def _of(self, orbit: Orbit):
         """States of an orbit where the signal watched passes zero upwards, and the size of each state."""
         found = self._passages.get(id(orbit))
         if found is None:
             states = np.asarray(orbit.states)
-            size = np.maximum(np.abs(states).max(axis=1), ORBIT_SIZE * self.swings.units)
-            y = np.asarray(orbit.outputs)[self.swings.row]
+            size = np.maximum(np.abs(states).max(axis=1), ORBIT_SIZE * self.search.units)
+            y = np.asarray(orbit.outputs)[self.search.row]
             ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
             share = y[ups] / (y[ups] - y[ups + 1])
             met = states[:, ups] + share * (states[:, ups + 1] - states[:, ups])

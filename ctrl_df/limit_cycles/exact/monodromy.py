@@ -23,11 +23,11 @@ from ...status import Status
 from ..thresholds import (
     EVENT_NUDGE,
     FLOW_NUDGE,
-    LAP_EVENTS,
-    LAP_REACH,
-    LAP_RTOL,
-    LAP_STEPS,
     NOTHING,
+    PERIOD_EVENTS,
+    PERIOD_REACH,
+    PERIOD_RTOL,
+    PERIOD_STEPS,
     REACH_AT_FIRST,
     SLOPE_NUDGE,
     TOLD,
@@ -46,8 +46,8 @@ class Segment:
 
 
 @dataclass(frozen=True)
-class Period:
-    """One lap: end state, linearization (n, n), the segments, total time."""
+class PeriodTrace:
+    """An orbit followed over one period: end state, linearization (n, n), the segments, total time."""
 
     end: State
     monodromy: np.ndarray
@@ -59,19 +59,19 @@ class Period:
 class Tracer:
     """Follows orbits of one engine and differentiates them."""
 
-    def __init__(self, engine: Engine, drive: Drive | None = None, max_events: int = LAP_EVENTS):
+    def __init__(self, engine: Engine, drive: Drive | None = None, max_events: int = PERIOD_EVENTS):
         self.engine = engine
         self.drive = drive if drive is not None else constant_drive(np.zeros(engine.ninputs))
         self.max_events = max_events
         self.n = engine.nstates
         self._work, *_ = driver.workspace(engine.program)
         self._g = np.zeros(int(engine.program.ints[layout.H_NG]) + 1)
-        self._reach = REACH_AT_FIRST  # [s], set by every lap
+        self._reach = REACH_AT_FIRST  # [s], set by every trace
         self._none = np.zeros(0)
 
     def settle(self, state: State) -> State:
         """Return the state with its modes in line (no time passes)."""
-        return self.engine.run(state, state.time, self.drive, rtol=LAP_RTOL).state
+        return self.engine.run(state, state.time, self.drive, rtol=PERIOD_RTOL).state
 
     def rate(self, t, x, mode, margins=False) -> Any:
         """Rates of a state in a mode; with `margins` the event margins too."""
@@ -82,10 +82,10 @@ class Tracer:
         )  # fmt: skip
         return (dx, self._g.copy()) if margins else dx
 
-    def lap(self, state: State, length: float, differentiate: bool = True, size=None) -> Period:
+    def trace(self, state: State, length: float, differentiate: bool = True, size=None) -> PeriodTrace:
         """Follow the orbit for `length` seconds from `state`."""
         t_end = state.time + length
-        self._reach = LAP_REACH * length
+        self._reach = PERIOD_REACH * length
         now = self.settle(state) if state.fresh else state.copy()
         phi = np.eye(self.n)
         segments, grazing = [], 1.0
@@ -96,7 +96,7 @@ class Tracer:
                 status = Status.WORK_LIMIT
                 break
             run = self.engine.run(
-                now, t_end, self.drive, rtol=LAP_RTOL, stop_at_event=True, log=2, max_steps=LAP_STEPS
+                now, t_end, self.drive, rtol=PERIOD_RTOL, stop_at_event=True, log=2, max_steps=PERIOD_STEPS
             )
             if not run.status.ok:
                 status = run.status
@@ -115,19 +115,19 @@ class Tracer:
                     phi = saltation @ phi
             segments.append(Segment(now, span, kind, node, saltation))
             now = run.state
-        return Period(now, phi, tuple(segments), status, grazing)
+        return PeriodTrace(now, phi, tuple(segments), status, grazing)
 
     def sizes(self, state: State, length: float, largest) -> np.ndarray:
         """Sizes of the states on an orbit, none smaller than what the others could tell apart.
 
-        A state that ought to be zero is rounding; its scale is what the other states move it by in a lap.
+        A state that ought to be zero is rounding; its scale is what the other states move it by in a period.
 
         Parameters
         ----------
         state : State
             A point of the orbit.
         length : float
-            Of a lap [s].
+            Period [s].
         largest : (n,) array
             Largest absolute values met.
         """
@@ -151,7 +151,7 @@ class Tracer:
 
     def _flow_derivative(self, state, span, size):
         h = np.diag(FLOW_NUDGE * size)
-        ends = flow(self.engine, state, np.vstack([state.x + h, state.x - h]), span, self.drive, LAP_RTOL)
+        ends = flow(self.engine, state, np.vstack([state.x + h, state.x - h]), span, self.drive, PERIOD_RTOL)
         return ((ends[: self.n] - ends[self.n :]) / (2 * FLOW_NUDGE * size)[:, None]).T
 
     def _saltation(self, run, mode, size):

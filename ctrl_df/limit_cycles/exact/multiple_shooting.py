@@ -1,7 +1,7 @@
-"""Multiple shooting: an orbit from states all along it, where one lap would lose a guess that is not exact.
+"""Multiple shooting: an orbit from states all along it, where single shooting would lose the guess.
 
-Over a lap errors grow by the largest multiplier, over an eighth of it by that to the power of an eighth. So
-orbits that repel strongly are closed from what harmonic balance knows of them.
+Over a period errors grow by the largest multiplier, over an eighth of it only by its eighth root. Orbits that
+repel strongly are therefore closed from the states along the predicted motion.
 
 References
 ----------
@@ -15,7 +15,7 @@ import numpy as np
 from ..thresholds import NOTHING, PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
 
 
-def shoot(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:
+def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:
     """Make the pieces of an orbit meet.
 
     Parameters
@@ -71,18 +71,18 @@ def _pieces(tracer, rebuilt, z, m, n, period, size, differentiate=True):
     J = np.zeros((m * n + 1, m * n + 1))
     for i in range(m):
         start = rebuilt(z[i * n : (i + 1) * n] * size)
-        lap = tracer.lap(start, span, differentiate=differentiate, size=size)
-        if not lap.status.ok or not np.all(np.isfinite(lap.end.x)):
+        traced = tracer.trace(start, span, differentiate=differentiate, size=size)
+        if not traced.status.ok or not np.all(np.isfinite(traced.end.x)):
             return None
         after = (i + 1) % m
         rows = slice(i * n, (i + 1) * n)
-        residual[rows] = lap.end.x / size - z[after * n : (after + 1) * n]
+        residual[rows] = traced.end.x / size - z[after * n : (after + 1) * n]
         if differentiate:
-            if not np.all(np.isfinite(lap.monodromy)):
+            if not np.all(np.isfinite(traced.monodromy)):
                 return None
-            J[rows, rows] += lap.monodromy * size / size[:, None]
+            J[rows, rows] += traced.monodromy * size / size[:, None]
             J[rows, after * n : (after + 1) * n] -= np.eye(n)
-            J[rows, -1] = tracer.rate(lap.end.time, lap.end.x, lap.end.mode) * span / size
+            J[rows, -1] = tracer.rate(traced.end.time, traced.end.x, traced.end.mode) * span / size
             if i == 0:
                 rate = tracer.rate(start.time, start.x, start.mode) * period / size
                 J[-1, :n] = rate / max(np.linalg.norm(rate), NOTHING)

@@ -1,9 +1,9 @@
-"""An orbit traced from a state near it by letting the mismatch after a lap shrink little by little.
+"""An orbit found by continuation: the mismatch after a period is scaled down to zero.
 
-``R(z) = share R(z0)`` with R the mismatch of state z after a lap, followed by arclength from share 1. At
-share 0 stands the orbit, found where Newton's own steps do not lead to it. Where the share turns back to 1
-first, the orbit and its neighbour have merged (a fold); where the lap grows out of all bounds on the way, it
-ends at rest: either way there is none near.
+``R(z) = share R(z0)``, with R the mismatch of state z after a period, is followed by arclength from share 1.
+At share 0 lies the orbit, also where Newton's own steps do not lead to it. If the share turns back to 1
+before, the orbit and its neighbour have merged (a fold); if the period grows out of all bounds on the way,
+the curve ends at rest. Either way there is no orbit near.
 
 References
 ----------
@@ -34,7 +34,7 @@ from .symmetry import shift_directions
 
 
 class Merged(NoClosure):
-    """What is missing to a closed lap cannot be made to vanish: merged with a neighbour, or with rest."""
+    """The mismatch cannot be brought to zero: the orbit has merged with a neighbour, or with rest."""
 
 
 def trace(closing: Closing, x0, period: float) -> Orbit:
@@ -60,7 +60,7 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
         ahead = y + step * border
         met = curve.onto(ahead, border)
         if met is not None and np.linalg.norm(met[0] - ahead) > step:
-            met = None  # farther across the curve than along it: another one, as that of laps without length
+            met = None  # farther across the curve than along it: another curve, such as that of period zero
         turned = None if met is None else tangent(met[1], border)
         if met is not None and turned is not None and turned @ border >= SHRINK_BEND:
             y, border = met[0], turned
@@ -77,20 +77,20 @@ def trace(closing: Closing, x0, period: float) -> Orbit:
             return closing.close(curve.state(y), period * float(np.exp(y[n])))
         if y[-1] >= 1.0:
             raise Merged(
-                f"what is missing to a closed lap falls to {least:.0%} of {scale:.1g} and grows again: "
+                f"the mismatch after a period falls to {least:.0%} of {scale:.1g} and grows again: "
                 "the orbit and its neighbour have merged",
                 least * scale,
             )
         if y[n] > SHRINK_FAR:
             raise Merged(
-                f"what is missing to a closed lap falls to {least:.1%} of {scale:.1g} only as the lap grows "
-                f"to {np.exp(y[n]):.0f} times its period: the orbit has merged with rest",
+                f"the mismatch after a period falls to {least:.1%} of {scale:.1g} only as the period grows "
+                f"to {np.exp(y[n]):.0f} times the estimate: the orbit has merged with rest",
                 least * scale,
             )
         if np.max(np.abs(y[: n + 1])) > SHRINK_FAR:
             break
         step = min(SHRINK_LONGER * step, SHRINK_LONGEST)
-    raise NoClosure("what is missing to a closed lap could not be followed to zero", least * scale)
+    raise NoClosure("the mismatch after a period could not be followed to zero", least * scale)
 
 
 class _Curve:
@@ -103,8 +103,8 @@ class _Curve:
         phase = self.tracer.rate(start.time, start.x, start.mode) * period / self.size
         self.phase = phase / max(np.linalg.norm(phase), NOTHING)
         self.beside = np.eye(self.n)
-        lap = self.tracer.lap(start, period, size=self.size)
-        free = shift_directions(self.tracer, lap.segments, self.size)
+        traced = self.tracer.trace(start, period, size=self.size)
+        free = shift_directions(self.tracer, traced.segments, self.size)
         self.beside = np.eye(self.n) - free @ free.T
         self.first, _ = self._mismatch(np.zeros(self.n + 1))
         self.scale = float(np.max(np.abs(self.first)))
@@ -116,13 +116,13 @@ class _Curve:
     def _mismatch(self, y):
         n, span = self.n, self.period * np.exp(y[self.n])
         here = self.closing.rebuilt(self.state(y))
-        lap = self.tracer.lap(here, span, size=self.size)
-        if not lap.status.ok or not np.all(np.isfinite(lap.monodromy)):
-            raise NoClosure("no lap could be followed")
-        gap = self.beside @ ((lap.end.x - here.x) / self.size)
+        traced = self.tracer.trace(here, span, size=self.size)
+        if not traced.status.ok or not np.all(np.isfinite(traced.monodromy)):
+            raise NoClosure("no period could be followed")
+        gap = self.beside @ ((traced.end.x - here.x) / self.size)
         slope = np.zeros((n, n + 1))
-        slope[:, :n] = self.beside @ (lap.monodromy * self.size / self.size[:, None] - np.eye(n))
-        end = self.tracer.rate(lap.end.time, lap.end.x, lap.end.mode)
+        slope[:, :n] = self.beside @ (traced.monodromy * self.size / self.size[:, None] - np.eye(n))
+        end = self.tracer.rate(traced.end.time, traced.end.x, traced.end.mode)
         slope[:, n] = self.beside @ (end * span / self.size)
         return gap, slope
 

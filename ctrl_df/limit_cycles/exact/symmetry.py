@@ -20,7 +20,7 @@ def shift_directions(tracer, segments, size) -> np.ndarray:
     tracer : Tracer
         Of the loop.
     segments : sequence of Segment
-        One lap.
+        One period.
     size : (n,) array
         Scale of each state.
 
@@ -34,7 +34,7 @@ def shift_directions(tracer, segments, size) -> np.ndarray:
         return np.zeros((tracer.n, 0))
     here = [_answer(tracer, p, p.x) for p in points]
     scale = np.max([np.where(np.isfinite(a), np.abs(a), 0.0) for a in here], axis=0)
-    # rates may all vanish where segments begin (a reversal): no smaller than once through the size in a lap
+    # rates may all vanish where segments begin (a reversal): no smaller than the size over a period
     scale[: tracer.n] = np.maximum(scale[: tracer.n], size / sum(s.length for s in segments))
     scale[scale == 0.0] = 1.0
     slopes = []
@@ -66,8 +66,8 @@ def _points(segments):
     for s in segments:
         if s.length > 0:
             taken.setdefault(s.start.mode.tobytes(), []).append(s.start)
-    thinned = (starts[:: max(1, len(starts) // MODE_SAMPLES)] for starts in taken.values())
-    return [p for starts in thinned for p in starts[:MODE_SAMPLES]]
+    few = (starts[:: max(1, len(starts) // MODE_SAMPLES)] for starts in taken.values())
+    return [p for starts in few for p in starts[:MODE_SAMPLES]]
 
 
 def _answer(tracer, point, x) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The steady answer of a block to a periodic waveform: harmonics out for harmonics in."""
+"""The steady-state response of a block to a periodic waveform: harmonics out for harmonics in."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable
 import control as ct
 import numpy as np
 
-from ...blocks.element import Element
+from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
-from ...df.forced_orbit.waveform import WaveformOrbit
+from ...df.forced_orbit.periodic_response import PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
 from ..thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
 
@@ -17,18 +17,18 @@ from ..thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE
 def responder(F, method: Method) -> tuple[Callable, int] | None:
     """Return how the block answers a waveform, and the harmonics to keep; None where that is not known.
 
-    The answer is a function ``respond(U, omega) -> Y``: coefficients k = 0, 1, ... of the steady output for
-    those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic answer. A block
-    with dynamics may have several: it goes on from the one before (see `WaveformOrbit`).
+    The steady-state response is a function ``steady_state(U, omega) -> Y``: coefficients k = 0, 1, ... of the
+    output for those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic
+    response. A block with dynamics may have several: it goes on from the one before (see `PeriodicResponse`).
     """
     if isinstance(method, ElementIntegrals):
-        cells = _element_cells(method.subject)
+        cells = _element_cells(method.block)
         return None if cells is None else (_sampled(cells), STATIC_HARMONICS)
     law = method.law()
     if law is not None:
         return _sampled(_cell_means(_pointwise(law))), STATIC_HARMONICS
     if method.dynamic and isinstance(F, ct.NonlinearIOSystem):
-        return WaveformOrbit(F, method.output), DYNAMIC_HARMONICS
+        return PeriodicResponse(F, method.output), DYNAMIC_HARMONICS
     return None
 
 
@@ -38,7 +38,7 @@ def _sampled(cells):
     Means, not samples: a jump then moves the answer smoothly with its place instead of from sample to sample.
     """
 
-    def respond(U, omega):
+    def steady_state(U, omega):
         full = np.zeros(WAVE_SAMPLES // 2 + 1, dtype=complex)
         full[: U.size] = U * WAVE_SAMPLES / 2
         full[0] *= 2
@@ -48,12 +48,12 @@ def _sampled(cells):
         Y[0] /= 2
         return Y
 
-    return respond
+    return steady_state
 
 
 def jumps(method: Method, amplitude: float) -> bool:
     """Whether a law without time jumps under a sine of that amplitude; a hysteresis switches, so it does."""
-    primitive = getattr(method.subject, "primitive", None)
+    primitive = getattr(method.block, "primitive", None)
     if getattr(primitive, "hysteretic", False):
         return True
     law = getattr(primitive, "value", None)

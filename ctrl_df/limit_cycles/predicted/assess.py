@@ -183,8 +183,8 @@ class Assessor:
         spread = tuple(s * estimate + FLOOR for s in sense)
         if self.answer is None or not named or regime.startswith(("aperiodic", "subharmonic")):
             return spread, None, []
-        respond, count = self.answer
-        path = follow_path(respond, count, self.linear, a, w)
+        steady_state, count = self.answer
+        path = follow_path(steady_state, count, self.linear, a, w)
         if path.end is End.MERGED:
             other = "{:.4g} @ {:.4g} rad/s".format(*path.solution)
             note = (

@@ -62,7 +62,7 @@ def mees_bergen(method, linear, crossing, others):
 
 def slope_bounds(method) -> tuple[float, float] | None:
     """Least and greatest slope of an odd, continuous, memoryless broken line; None for anything else."""
-    line = getattr(method.subject, "primitive", None)
+    line = getattr(method.block, "primitive", None)
     if not isinstance(method, ElementIntegrals) or not isinstance(line, PiecewiseAffine) or line.hysteretic:
         return None
     corners = np.array(line.corners)

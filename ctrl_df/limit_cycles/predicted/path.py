@@ -88,12 +88,12 @@ class Path:
         return float(self.waveform[1].real), self.omega
 
 
-def follow_path(respond: Callable, harmonics: int, linear, amplitude, omega) -> Path:
+def follow_path(steady_state: Callable, harmonics: int, linear, amplitude, omega) -> Path:
     """Follow the curve from a prediction until all harmonics are fed back, or it comes back.
 
     Parameters
     ----------
-    respond : callable
+    steady_state : callable
         As `ctrl_df.limit_cycles.predicted.answer.responder` returns it.
     harmonics : int
         Highest harmonic kept.
@@ -101,13 +101,13 @@ def follow_path(respond: Callable, harmonics: int, linear, amplitude, omega) -> 
     amplitude, omega : float
         The prediction.
     """
-    curve = _Curve(respond, harmonics, linear, amplitude, omega)
+    curve = _Curve(steady_state, harmonics, linear, amplitude, omega)
     return curve.follow()
 
 
-def corrected_near(respond: Callable, harmonics: int, linear, amplitude, omega) -> Path | None:
+def corrected_near(steady_state: Callable, harmonics: int, linear, amplitude, omega) -> Path | None:
     """Balance all harmonics at once, from a guess at which no prediction need stand; None if that fails."""
-    curve = _Curve(respond, harmonics, linear, amplitude, omega)
+    curve = _Curve(steady_state, harmonics, linear, amplitude, omega)
     z = curve.begin()
     for share in (0.0, 0.5, 1.0):
         z[-1] = share
@@ -123,8 +123,8 @@ def corrected_near(respond: Callable, harmonics: int, linear, amplitude, omega) 
 class _Curve:
     """Unknowns z = (ln a, ln omega, U_k / a for k other than 1, share) and their equations."""
 
-    def __init__(self, respond, harmonics, linear, amplitude, omega):
-        self.respond, self.harmonics, self.linear = respond, harmonics, linear
+    def __init__(self, steady_state, harmonics, linear, amplitude, omega):
+        self.steady_state, self.harmonics, self.linear = steady_state, harmonics, linear
         self.first = np.log([amplitude, omega])
         self.motion = None
         self.kept = np.array([0, *range(2, harmonics + 1)])
@@ -137,13 +137,13 @@ class _Curve:
         """Find the motion that the describing function names, and whether it answers odd waveforms oddly."""
         U = np.zeros(self.harmonics + 1, complex)
         U[1] = amplitude
-        nearest = getattr(self.respond, "nearest", None)
+        nearest = getattr(self.steady_state, "nearest", None)
         if nearest is not None:  # of several, the one whose N balances H there
             H = self.linear.clamped(np.array([omega]))[0][0]
             nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), NAMED)
         motion = self.motion
         U[3] = PROBE * amplitude
-        Y = self.respond(U, omega)
+        Y = self.steady_state(U, omega)
         if Y is not None and np.abs(Y[0::2]).max() < ODD * np.abs(Y).max():
             self.kept = np.arange(3, self.harmonics + 1, 2)
         self.motion = motion
@@ -151,12 +151,12 @@ class _Curve:
     @property
     def motion(self):
         """The block's motion last answered with, from which it goes on where it has several."""
-        return getattr(self.respond, "motion", None)
+        return getattr(self.steady_state, "motion", None)
 
     @motion.setter
     def motion(self, motion):
-        if hasattr(self.respond, "motion"):
-            self.respond.motion = motion
+        if hasattr(self.steady_state, "motion"):
+            self.steady_state.motion = motion
 
     def waveform(self, z):
         """Return U_k, a and omega of the unknowns."""
@@ -174,7 +174,7 @@ class _Curve:
     def defect(self, z):
         """Return what is missing to the balance of each harmonic, and the block's answer or None."""
         U, a, omega = self.waveform(z)
-        Y = self.respond(U, omega)
+        Y = self.steady_state(U, omega)
         if Y is None or not np.isfinite(Y).all() or Y[1] == 0:  # it stands still: nothing goes around
             return None, None
         return self._defect(z, U / a, Y / a, omega), Y

@@ -49,7 +49,7 @@ def scan_grid(method: Method, linear: LinearPart, family: Family):
         coarse = family.amplitudes
         a = _refined(coarse, method.amplitudes)
         if isinstance(method, ElementIntegrals):
-            a = with_corners(a, method.subject.primitive)
+            a = with_corners(a, method.block.primitive)
         if method.needs_omega and a.size * w.size > SCAN_QUICK:
             a = coarse
         N = _fundamental(method, a, w, family)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...column import spread
+from ...values.column import spread
 from ..thresholds import WIDEST_AFFINE, WIDEST_CURVED
 from . import layout as L
 from .layout import Program

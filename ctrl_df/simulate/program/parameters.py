@@ -10,7 +10,7 @@ import numpy as np
 
 from ...blocks.parameter import Parameter
 from ...checks import known_name, mapping, number, real_array
-from ...column import Column
+from ...values.column import Column
 
 
 def own_parameters(system) -> dict[str, Parameter | None]:

@@ -1,4 +1,4 @@
-"""A loop simulated from a start, swing by swing, to see what becomes of it."""
+"""What becomes of a start: the loop simulated from crossing to crossing of a Poincaré section."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...blocks.element import Element
+from ...blocks.elements.element import Element
 from ...simulate.engine import Engine, State
 from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
@@ -49,8 +49,8 @@ from .kicks import Kicks
 RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"
 
 
-class Lap(NamedTuple):
-    """An upward passage of the signal watched: when, in which state, and its peak in the lap before."""
+class Crossing(NamedTuple):
+    """A crossing of the section, where the signal watched passes zero upwards; its peak since the last."""
 
     time: float
     state: np.ndarray
@@ -63,7 +63,7 @@ class Course:
 
     Attributes
     ----------
-    laps : list of Lap
+    crossings : list of Crossing
     fate : str
         ``rests``, ``cycles`` (the passages repeat), ``diverges``, or ``undecided`` within the bound on work.
     growth : float
@@ -72,24 +72,24 @@ class Course:
         State in which it ended.
     """
 
-    laps: list[Lap]
+    crossings: list[Crossing]
     fate: str
     growth: float
     end: np.ndarray
 
 
 class _Stretch(NamedTuple):
-    """A piece of a course: its end, its work, how it ended, the laps in it."""
+    """A piece of a course: its end, its work, how it ended, the crossings in it."""
 
     time: float
     x: np.ndarray
     steps: int
     status: Status
-    found: list[Lap]
+    found: list[Crossing]
 
 
-class Swings:
-    """Simulations of one loop.
+class PoincareSearch:
+    """Simulations of one loop as iterations of its Poincaré map.
 
     The signal watched is the loop's first output; where the block is an element, whose output may jump or
     rest, it is the block's input.
@@ -145,15 +145,15 @@ class Swings:
         """Largest state in units of the loop."""
         return float(np.max(np.abs(x) / self.units, initial=0.0))
 
-    def follow(
+    def iterate(
         self,
         start,
         count: int,
         longest: float | None = None,
         until_repeated: bool = True,
-        decided: Callable[[list[Lap]], str] | None = None,
+        decided: Callable[[list[Crossing]], str] | None = None,
     ) -> Course:
-        """Upward passages from a start on, until they repeat, the loop rests, or the bound on work is hit.
+        """Crossings from a start on, until they repeat, the loop rests, or the bound on work is hit.
 
         Parameters
         ----------
@@ -166,35 +166,35 @@ class Swings:
         until_repeated : bool
             End as soon as the passages repeat.
         decided : callable, optional
-            Asked after every passage for the fate of the laps so far; empty: not yet known.
+            Asked after every passage for the fate of the crossings so far; empty: not yet known.
 
         Returns
         -------
         Course
-            Without laps if all work is spent within a few swings.
+            Without crossings if all work is spent within a few swings.
         """
         state = start if isinstance(start, State) else self.start(start)
-        laps: list[Lap] = []
+        crossings: list[Crossing] = []
         quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
         bound = GONE * max(1.0, largest)
         stretches = self._by_samples(state, limit) if self.held else self._by_passage(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
-        while len(laps) < count and time < limit and quiet <= PATIENCE and work <= WORK:
+        while len(crossings) < count and time < limit and quiet <= PATIENCE and work <= WORK:
             stretch = next(stretches)
             if quiet > QUIET and self.size(stretch.x - end) < DEAD * largest:
                 break
             time, end, work = stretch.time, stretch.x, work + stretch.steps
             if stretch.status is Status.DIVERGED or not self.size(end) < bound:
-                return Course(laps, DIVERGES, np.inf, end)
+                return Course(crossings, DIVERGES, np.inf, end)
             if not stretch.status.ok:
                 stopped = True  # by its bound on work, or a motion that no step resolves: no fate
                 break
             found = stretch.found
-            laps += found
+            crossings += found
             quiet = 0 if found else quiet + 1
-            highest = max([highest, *(lap.peak for lap in found)])
-            if found and laps[-1].peak < FAINT * highest:
+            highest = max([highest, *(c.peak for c in found)])
+            if found and crossings[-1].peak < FAINT * highest:
                 fate = RESTS
                 break
             size = self.size(end)
@@ -202,24 +202,24 @@ class Swings:
             if quiet and size < DEAD * largest:
                 fate = RESTS
                 break
-            if found and laps[-1].peak > BEYOND and _explodes(laps):
-                return Course(laps, DIVERGES, np.inf, end)
-            if found and (_creeps(laps) or self._fades(laps)):
+            if found and crossings[-1].peak > BEYOND and _explodes(crossings):
+                return Course(crossings, DIVERGES, np.inf, end)
+            if found and (_creeps(crossings) or self._fades(crossings)):
                 fate = RESTS
                 break
             if found and decided is not None:
-                fate = decided(laps)
+                fate = decided(crossings)
                 if fate:
                     break
-            if until_repeated and len(laps) > FEW and self.repeats(laps):
-                fate = CYCLES if laps[-1].peak > FAINT * max(lap.peak for lap in laps) else RESTS
+            if until_repeated and len(crossings) > FEW and self.repeats(crossings):
+                fate = CYCLES if crossings[-1].peak > FAINT * max(c.peak for c in crossings) else RESTS
                 break
-        growth = _growth(laps)
+        growth = _growth(crossings)
         if not fate:
-            fate = RESTS if quiet > QUIET else UNDECIDED if stopped else _tendency(laps)
-        if (stopped or work > WORK) and len(laps) < FEW:
-            laps = []  # it creeps or chatters, thousands of steps a swing: no orbit that could be refined
-        return Course(laps, fate, growth, end)
+            fate = RESTS if quiet > QUIET else UNDECIDED if stopped else _tendency(crossings)
+        if (stopped or work > WORK) and len(crossings) < FEW:
+            crossings = []  # it creeps or chatters, thousands of steps a crossing: no orbit to refine
+        return Course(crossings, fate, growth, end)
 
     def start(self, x0) -> State:
         """Return a fresh state; what the engine does not move (lags that stand for delays elsewhere) is 0."""
@@ -229,28 +229,28 @@ class Swings:
                 state.x[node[X]] = 0.0
         return state
 
-    def _fades(self, laps) -> bool:
+    def _fades(self, crossings) -> bool:
         """Whether the swings shrink by a steady ratio where the block is a straight line: so they go on."""
-        recent = laps[-RECENT:]
-        if not max(lap.peak for lap in recent[-STEPS:]) * self._unit < WITHIN * self.kicks.straight:
+        recent = crossings[-RECENT:]
+        if not max(c.peak for c in recent[-STEPS:]) * self._unit < WITHIN * self.kicks.straight:
             return False
-        return _endless([1 / max(lap.peak, NOTHING) for lap in recent], 1 / FAINT) > 0
+        return _endless([1 / max(crossing.peak, NOTHING) for crossing in recent], 1 / FAINT) > 0
 
-    def repeats(self, laps) -> bool:
+    def repeats(self, crossings) -> bool:
         """Whether the last two passages met the same state; closer if no Newton follows."""
-        sizes = np.max(np.abs([lap.state for lap in laps[-6:]]), axis=0)
+        sizes = np.max(np.abs([c.state for c in crossings[-6:]]), axis=0)
         largest = max(float(np.max(sizes / self.units)), NOTHING)
         bound = (
             REPEATS_EXACTLY * np.maximum(sizes, REPEATS_LEAST * largest * self.units)
             if self.tight
             else REPEATS * largest * self.units
         )
-        return bool(np.all(np.abs(laps[-1].state - laps[-2].state) < bound))
+        return bool(np.all(np.abs(crossings[-1].state - crossings[-2].state) < bound))
 
     def _by_passage(self, state, limit):
         # ahead in bounded strides: a loop at rest never crosses again
         for s in strides(self.engine, state, self._signal, self.row, self.stride, limit, COURSE_RTOL):
-            found = [Lap(s.time, s.x, s.peak / self._unit)] if s.passed else []
+            found = [Crossing(s.time, s.x, s.peak / self._unit)] if s.passed else []
             yield _Stretch(s.time, s.x, s.steps, s.status, found)
 
     def _by_samples(self, state, limit):
@@ -270,17 +270,17 @@ class Swings:
             found = []
             for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
                 swing = np.abs(y[ups[k - 1] if k else 0 : ups[k] + 1])
-                found.append(Lap(float(t), np.array(x), float(np.max(swing, initial=0.0)) / self._unit))
+                found.append(Crossing(float(t), np.array(x), float(np.max(swing, initial=0.0)) / self._unit))
             state = run.state
             yield _Stretch(state.time, state.x, run.steps, run.status, found)
 
 
-def _growth(laps, ago: int = 0) -> float:
+def _growth(crossings, ago: int = 0) -> float:
     """Mean size of the swings in the last quarter over that in the quarter before; or earlier by `ago`."""
-    quarter = len(laps) // 4
+    quarter = len(crossings) // 4
     if quarter < 2:
         return float("nan")
-    peaks = np.array([lap.peak for lap in laps])[: len(laps) - ago * quarter]
+    peaks = np.array([c.peak for c in crossings])[: len(crossings) - ago * quarter]
     before = np.mean(peaks[-2 * quarter : -quarter])
     return float(np.mean(peaks[-quarter:]) / before) if before > 0 else float("nan")
 
@@ -304,19 +304,19 @@ def _endless(values, factor: float) -> int:
     return int(count[enough][0]) + 1 if enough.any() else 0
 
 
-def _explodes(laps) -> bool:
+def _explodes(crossings) -> bool:
     """Whether the swings grow at a steady ratio and without bound."""
-    return _endless([lap.peak for lap in laps[-RECENT:]], GONE) > 0
+    return _endless([c.peak for c in crossings[-RECENT:]], GONE) > 0
 
 
-def _creeps(laps) -> bool:
+def _creeps(crossings) -> bool:
     """Whether every swing takes longer than the one before by a steady ratio, while none is larger.
 
     So a motion ends whose speed falls by a ratio each time it crosses a gap: its position never settles, its
     speed does.
     """
-    recent = laps[-RECENT:]
-    durations = np.diff([lap.time for lap in recent])
+    recent = crossings[-RECENT:]
+    durations = np.diff([c.time for c in recent])
     count = _endless(durations, 1 / FAINT)
     if not count:
         return False
@@ -325,9 +325,9 @@ def _creeps(laps) -> bool:
     return bool(growth < EVEN * slowing)
 
 
-def _tendency(laps) -> str:
+def _tendency(crossings) -> str:
     """Fate of swings that grow or shrink without end: by a steady ratio, not towards some size."""
-    now, earlier = _growth(laps), _growth(laps, 1)
+    now, earlier = _growth(crossings), _growth(crossings, 1)
     if not now > 0 or not earlier > 0 or max(now, 1 / now) < STEADY:
         return UNDECIDED
     lasting = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0

@@ -3,7 +3,7 @@
 Each is an immutable ``ct.NonlinearIOSystem`` (one input ``u``, one output ``y``, any unit) that also serves
 wherever python-control takes a ``DescribingFunctionNonlinearity``: it is callable, ``y = f(u)``, and has
 ``describing_function(A)``. Its `primitive` is the plain data the event engine runs. Elements with memory
-(`ctrl_df.blocks.hysteresis`) share the class.
+(`ctrl_df.blocks.elements.hysteresis`) share the class.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import warnings
 
 import numpy as np
 
-from ..checks import real_array, shown
+from ...checks import real_array, shown
+from ..parameter import checked
+from ..primitives import PiecewiseAffine, Quantizer, Smooth
 from .element import DescribingFunctionNonlinearity, Element, builder, finite
-from .parameter import checked
-from .primitives import PiecewiseAffine, Quantizer, Smooth
 
 __all__ = ["DescribingFunctionNonlinearity", "Element"]
 

@@ -13,12 +13,12 @@ from ...simulate.kernel.driver import copy
 from ...simulate.program import layout as L
 from ...simulate.program.layout import Drive
 from ..thresholds import EVEN_LEAST, FIRST_LONGEST, SHOTS
+from .period_map import coordinates, period_map_at, place
 from .shooting import CLOSED
-from .shot import coordinates, place, shot_at
 
 
 @njit(error_model="numpy", nogil=True)
-def sweep(
+def continuation(
     close, shot, samples, coefficients, amplitudes, omegas, power, past, past_mode, known, mirrored,
     broken, rtol, hmax, budget, out, ends, miss, kinds, still,
 ):  # fmt: skip
@@ -29,7 +29,7 @@ def sweep(
     of the drive; `close`: address of `shooting.close`. With `broken` an orbit without even harmonics is the
     last. Returns points done, points known, whether the last one is such an orbit.
     """
-    at, shot = shot, shot_at(shot)
+    at, shot = shot, period_map_at(shot)
     samples, coefficients, amplitudes, omegas = (
         lean(samples), lean(coefficients), lean(amplitudes), lean(omegas),
     )  # fmt: skip
@@ -100,7 +100,7 @@ def evenless(integrals):
 
 @part
 def unit(power, A, omega):
-    """Return what a state is measured in on a sweep: the motion of a free inertia under the force."""
+    """Return what a state is measured in on a line: the motion of a free inertia under the force."""
     return A / omega**power
 
 

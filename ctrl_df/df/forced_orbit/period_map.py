@@ -1,9 +1,9 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""One shot of the event engine: half a period, mirrored afterwards, or whole periods.
+"""The period map of the event engine: over half a period, mirrored afterwards, or over whole periods.
 
-A `Shot` holds what stays the same from shot to shot, so that compiled code allocates nothing. Coordinates y
-= T x are those of `ctrl_df.df.forced_orbit.symmetries`.
+One evaluation of it is called a shot. A `PeriodMap` holds what stays the same from shot to shot, so that
+compiled code allocates nothing. Coordinates y = T x are those of `ctrl_df.df.forced_orbit.symmetries`.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from ..thresholds import (
 )
 
 
-class Shot(NamedTuple):
-    """Everything a shot needs that stays the same from shot to shot; see `make_shot`."""
+class PeriodMap(NamedTuple):
+    """Everything a shot needs that stays the same from shot to shot; see `make_period_map`."""
 
     run: int  # addresses of the engine and of `take`
     take: int
@@ -79,11 +79,11 @@ class Shot(NamedTuple):
 
 _NONE = np.zeros(0, np.int64)
 LAYOUT = Layout()
-shot_at = LAYOUT.opener()
-"""A `Shot` from its address, in compiled code."""
+period_map_at = LAYOUT.opener()
+"""A `PeriodMap` from its address, in compiled code."""
 
 
-def make_shot(engine, symmetries, rows: int) -> Shot:
+def make_period_map(engine, symmetries, rows: int) -> PeriodMap:
     """Allocate the arrays of shots on an engine; harmonics are taken of its first `rows` outputs."""
     n, nf = engine.nstates, len(symmetries.free)
     ng = int(engine.program.ints[L.H_NG]) + 1
@@ -92,7 +92,7 @@ def make_shot(engine, symmetries, rows: int) -> Shot:
     none, rows_x, rows_y = np.zeros(0), np.zeros((0, n)), np.zeros((0, engine.noutputs))
     no_spectrum = np.zeros((rows, 0), complex)
     log_t, log_n, log_k = (np.zeros(SHOT_EVENTS, kind) for kind in (float, np.int64, np.int64))
-    shot = Shot(
+    shot = PeriodMap(
         driver.address(), 0, engine.program, engine.space, np.zeros((4, ng)), np.zeros(10),
         np.zeros(n), log_t, log_n, log_k, none, rows_x, rows_y, no_spectrum, modes, s.transform, s.inverse,
         s.offset, s.free.astype(np.int64), s.wrap, s.lower, s.upper, s.low, s.high, np.zeros(n),
@@ -118,10 +118,10 @@ def _address() -> int:
 
 
 @njit(error_model="numpy", nogil=True)
-def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
+def apply(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budget):
     """`take` one shot, from Python."""
     return call_native(
-        shot_at(shot).take,
+        period_map_at(shot).take,
         (
             shot, lean(drive), time, lean(x), lean(mode), mirrored, rtol, atol, hmax, lean(spectrum),
             budget,
@@ -130,7 +130,7 @@ def shoot(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budg
 
 
 @njit(error_model="numpy", nogil=True)
-def follow(
+def iterate(
     shot, drive, time, x, mode, mirrored, rtol, atol, hmax, step, budget, trail, settled, twice_settled
 ):
     """`take` one shot after another, as many as `trail` has rows, which receive the coordinates before each.
@@ -140,7 +140,7 @@ def follow(
     why the last shot ended, how many integration steps all took, how many shots there were, and after how
     many the motion repeats (0: it does not yet).
     """
-    at, shot = shot, shot_at(shot)
+    at, shot = shot, period_map_at(shot)
     drive, x, mode, trail = lean(drive), lean(x), lean(mode), lean(trail)
     reason, spent = driver.DONE, 0
     for k in range(trail.shape[0]):
@@ -181,7 +181,7 @@ def take(shot, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum, budge
     With columns in `spectrum` the integrals of the outputs against exp(-j k omega t) are written to it, and
     the outputs at both ends to ``shot.ends``.
     """
-    shot = shot_at(shot)
+    shot = period_map_at(shot)
     prog, clock = shot.prog, shot.clock
     work = shot.space.work
     clock[0] = clock[1] = clock[3] = clock[4] = clock[5] = clock[6] = clock[7] = 0.0
@@ -282,7 +282,7 @@ def coordinates(shot, x, y):
 @njit(error_model="numpy")
 def set_state(shot, y, x, mode):
     """`place`, from Python."""
-    place(shot_at(shot), lean(y), lean(x), lean(mode))
+    place(period_map_at(shot), lean(y), lean(x), lean(mode))
 
 
 @part

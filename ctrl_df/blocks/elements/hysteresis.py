@@ -13,9 +13,9 @@ import math
 import control as ct
 import numpy as np
 
+from ..parameter import checked
+from ..primitives import PiecewiseAffine, Play, RateLimiter
 from .element import Element, builder, finite
-from .parameter import checked
-from .primitives import PiecewiseAffine, Play, RateLimiter
 
 ct.config.defaults.setdefault("ctrl_df.follow_time", 1e-3)
 

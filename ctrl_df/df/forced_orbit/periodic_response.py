@@ -1,4 +1,4 @@
-"""The steady answer of a block with dynamics to a periodic waveform that holds more than its fundamental."""
+"""The steady-state response of a block with dynamics to a waveform of more than its fundamental."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .orbit_search import OrbitSearch, OutOfWork
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)
 
 
-class WaveformOrbit:
+class PeriodicResponse:
     """Forced periodic motions of one block, each started from the one before.
 
     Under one force there may be several. Who follows one of them keeps `motion` and sets it again before
@@ -101,9 +101,9 @@ class WaveformOrbit:
         search = self.search
         try:
             if periods:
-                search._resize(search.A)
-                state = search._follow(state, periods)
-            orbit = search._periodic(state, orders=orders, repelling=True, near=near)
+                search.resize(search.A)
+                state = search.iterate(state, periods)
+            orbit = search.periodic(state, orders=orders, repelling=True, near=near)
             if orbit is None and far:
                 orbit = close_damped(search, state, orders=orders, patient=False, repelling=True)
         except OutOfWork:

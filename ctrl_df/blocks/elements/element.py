@@ -11,10 +11,10 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonlinearity
 
-from ..checks import known_name, mapping, shown, system_name
-from ..drawing import go_on
-from .linearization import warn_of_element
-from .parameter import Parameter
+from ...checks import known_name, mapping, shown, system_name
+from ...drawing import go_on
+from ..linearization import warn_of_element
+from ..parameter import Parameter
 
 
 class DescribingFunctionNonlinearity(_PythonControlNonlinearity):

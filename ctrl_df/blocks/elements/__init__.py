@@ -1,0 +1,1 @@
+"""Blocks of one signal element: memoryless laws, and those with hysteresis."""
