@@ -47,7 +47,7 @@ def test_short_waves(seed):
 
 
 def moves(ripple, dt=4e-3):
-    """Return a run of a servo: three moves to speeds of 30 rad/s, held in between by torques below friction."""
+    """Return a run of a servo: three moves of 30 rad/s, held in between by torques below friction."""
     rng = np.random.default_rng(2)
     t = np.arange(0, 4.5, dt)
     u = 0.012 * np.sin(9.0 * t) + 2e-4 * rng.standard_normal(t.size)
