@@ -32,7 +32,7 @@ def model(id, *errors):
             (0.07, 0.4, 0.6),
             (0.2, 0.4, 0.7),
             True,
-        ),  # worse than nothing: a joint for a weight
+        ),  # worse than nothing
         ((0.04, 0.15, 0.7), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), True),  # explains nothing in the end
         ((0.04, 0.15, 0.4), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), False),  # behind, and still in question
         ((0.04, 0.05, 0.06), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), False),

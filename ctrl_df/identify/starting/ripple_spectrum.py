@@ -8,7 +8,8 @@ equation of motion is integrated twice,
 
 which is linear in all but k. Of several records each has a and b of its own. Second differences take x0 and
 v0 out. What is left over has noise of two kinds, of the sensor and of forces; each frequency weighs by what
-is left at and around it (Whittle's likelihood), so that either may prevail. Then k is scanned, from the
+is left at and around it (Whittle's likelihood), so that either may prevail. Pauses do not count: friction is
+whatever the drive is there, and would pass for noise of forces. Then k is scanned, from the
 stroke down to what the smoothed position resolves.
 """
 
@@ -23,7 +24,7 @@ import numpy as np
 
 from ...values.per_record import PerRecord
 from ..prediction.segments import facts
-from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING
+from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING, SLOWLY
 from .thresholds import (
     RIPPLE_COARSEST,
     RIPPLE_LONGEST,
@@ -69,10 +70,13 @@ class RippleSpectrum:
         self.span = max(float(np.ptp(x)) for x in self.places)
         # the band of the motion and some of the noise above it
         band = min(facts(r).half for r in records) // 4
-        longest = max(j - i for w in segments for i, j in _runs(w, 1))
+        moving = [_moving(r) for r in records]
+        if not any(_runs(w, 1, m) for w, m in zip(segments, moving, strict=True)):
+            moving = [np.ones(len(r), bool) for r in records]
+        longest = max(j - i for w, m in zip(segments, moving, strict=True) for i, j in _runs(w, 1, m))
         self._size = max(band, math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
         self._size = max(min(self._size, longest // 32), 1)
-        self._runs = [_runs(w, self._size) for w in segments]
+        self._runs = [_runs(w, self._size, m) for w, m in zip(segments, moving, strict=True)]
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
         for k in known:
@@ -223,15 +227,29 @@ def _blur(record) -> float:
     return max(known.noise / math.sqrt(2 * known.half), NOISE_FREE * known.position)
 
 
-def _runs(segments, size) -> list[tuple[int, int]]:
-    """Return first and last sample of parts without holes, whole numbers of `size` samples long."""
-    runs: list[list[int]] = []
+def _moving(record) -> np.ndarray:
+    """Return which samples are of no pause: there dry friction is whatever the drive is, and no regressor.
+
+    A passage through zero speed lasts no longer than the speed is smoothed over.
+    """
+    known = facts(record)
+    slow = np.abs(known.velocity) < SLOWLY * known.speed
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], slow, [False])).astype(int))).reshape(-1, 2)
+    moving = np.ones(len(slow), bool)
+    for i, j in edges:
+        if j - i > 2 * known.half:
+            moving[max(i - known.half, 0) : j + known.half] = False
+    return moving
+
+
+def _runs(segments, size, moving) -> list[tuple[int, int]]:
+    """Return first and last sample of parts without holes or pauses, of whole numbers of `size` samples."""
+    there = np.zeros(len(moving), bool)
     for i, j in zip(segments.begins, segments.ends, strict=True):
-        if runs and runs[-1][1] == i:
-            runs[-1][1] = int(j)
-        else:
-            runs.append([int(i), int(j)])
-    return [(i, i + (j - i) // size * size) for i, j in runs if (j - i) // size > RUN_LEAST]
+        there[i:j] = True
+    there &= moving
+    runs = np.flatnonzero(np.diff(np.concatenate(([False], there, [False])).astype(int))).reshape(-1, 2)
+    return [(int(i), int(i + (j - i) // size * size)) for i, j in runs if (j - i) // size > RUN_LEAST]
 
 
 def _length(signal) -> int:
