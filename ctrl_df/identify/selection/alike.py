@@ -36,8 +36,8 @@ def alike_along(data: SegmentedData, block) -> Callable:
 def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
     """Begin candidates whose law can do what that of a better one does where that one ended.
 
-    A spring is a pendulum over a small angle; what breaks away is the limit of a narrow bump over speed, as no
-    force along the motion tells.
+    A spring is a pendulum over a small angle; what breaks away is the limit of a narrow bump over speed: no
+    force along the motion tells that.
 
     Parameters
     ----------
