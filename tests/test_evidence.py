@@ -1,6 +1,7 @@
 """What speaks for an effect: no single segment held out, whatever it says."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
 from ctrl_df.identify.selection.evidence import ranked
+from ctrl_df.identify.selection.verdict import worth
 from ctrl_df.identify.shooting.variables import Variable
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
@@ -97,3 +99,26 @@ def test_a_fit_has_the_sigma_points_of_its_covariance(fitted):
     spread = np.sqrt(np.einsum("ij,ij->j", steps, steps) / 2)
     # its standard errors are of the noise's own colour
     assert spread == pytest.approx(np.sqrt(np.diag(fit.covariance)), rel=0.3)
+
+
+def test_whole_steps_of_a_sensor_are_no_growing_error():
+    """A model right to a part of a step errs by whole ones: the probability of the lines has judged it."""
+    search = SimpleNamespace(
+        base=None, errors=lambda judged: (1.0, 1.0), significant=20, significant_validation=5
+    )
+    told = dict(nrmse_holdout=1.1, evidence_fitted=100.0, evidence_holdout=50.0)
+    assert worth(SimpleNamespace(effect=cdf.SensorQuantization(1e-3), **told), search)  # type: ignore[arg-type]
+    assert not worth(SimpleNamespace(effect=cdf.LinearSpring(1.0), **told), search)  # type: ignore[arg-type]
+
+
+def test_an_encoder_fitted_to_small_motions_is_found_in_large_ones():
+    """Parameters of small motions err by whole lines in large ones, over segments that are long enough."""
+    t, step = 2e-3 * np.arange(1200), 5e-4
+    records = []
+    for size, seed in ((1.0, 0), (8.0, 1)):
+        force = size * (np.sin(9 * t + seed) + 0.7 * np.sin(31 * t))
+        rng, blank = np.random.default_rng(seed), cdf.Measurement(t, force, np.sin(t))
+        x = step * np.round(free_run(PLAIN, blank) / step) + 0.02 * step * rng.normal(size=t.size)
+        records.append(cdf.Measurement(t, force, x))
+    found = cdf.diagnose(PLAIN, records[0], holdout=records[1], candidates=["sensor_quantization"])
+    assert found.verdict == "effect" and found.ranking[0].parameters["step"] == pytest.approx(step, rel=1e-3)

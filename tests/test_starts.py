@@ -10,6 +10,7 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
+from ctrl_df.identify.selection.alike import begun_like_better
 from ctrl_df.identify.selection.rounding import rounding_evidence
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.variables import default_free
@@ -158,3 +159,18 @@ def test_a_law_in_the_place_of_another():
     assert spring is not None and spring.values[0] == pytest.approx(2.0, rel=0.02)
     # motion alone does not tell what friction does, or what has states
     assert like_another(cdf.Coulomb(1.0), ripple, x, v) is None
+
+
+def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
+    """The limit of a Stribeck bump is a law of its own, whose fit may end far off: it lost the first look."""
+    truth, t = PLAIN.with_effect(cdf.Stiction(0.9)), 4e-3 * np.arange(1500)
+    force = 1.2 * np.sin(2 * t) + 0.4 * np.sin(5.3 * t)
+    x = free_run(truth, cdf.Measurement(t, force, np.sin(t)))
+    record = cdf.Measurement(t, force, x + 1e-5 * np.random.default_rng(1).normal(size=t.size))
+    data = prepare(PLAIN, [record]).segmentations[1]
+    # the bump as it was found, and a fit that was lost
+    bump, lost = PLAIN.with_effect(cdf.Stribeck(0.9, 1e-3)), PLAIN.with_effect(cdf.Stiction(0.5))
+    found = [CandidateFit(b.newest, data.fit(b, tuple(b.parameters), iterations=0)) for b in (bump, lost)]
+    again = {t.key: t.train for t in begun_like_better(found, data, PLAIN)}
+    # 26 times the noise as it was lost, 0.95 begun again
+    assert again["stiction"].rmse < 1.1 * data.noise < found[1].train.rmse / 10

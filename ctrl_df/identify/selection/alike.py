@@ -36,7 +36,8 @@ def alike_along(data: SegmentedData, block) -> Callable:
 def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
     """Begin candidates whose law can do what that of a better one does where that one ended.
 
-    A spring is a pendulum over a small angle.
+    A spring is a pendulum over a small angle; what breaks away is the limit of a narrow bump over speed: no
+    force along the motion tells that.
 
     Parameters
     ----------
@@ -55,13 +56,23 @@ def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block)
     alike = alike_along(data, block)
     pairs = [(t, best) for i, best in enumerate(found[:CONFIRMED]) for t in found[i + 1 :]]
     likes = side_by_side(lambda pair: alike(*pair), pairs)
-    able = [(*pair, like) for pair, like in zip(pairs, likes, strict=True) if like is not None]
+    able = [
+        (*pair, like)
+        for pair, like in zip(pairs, likes, strict=True)
+        if like is not None or all(_breaks_away(t) for t in pair)
+    ]
     fits = side_by_side(lambda a: cross_started(a[0], a[1], data, a[2]), able)
     nearest = {t.key: t for t in found}
     for (tried, *_), fit in zip(able, fits, strict=True):
         if fit is not None and fit.rmse < BETTER * nearest[tried.key].train.rmse:
             nearest[tried.key] = replace(tried, train=fit)
     return list(nearest.values())
+
+
+def _breaks_away(tried: CandidateFit) -> bool:
+    """Whether the newest effect of a candidate is friction with a static level."""
+    effect = tried.block.effects[-1]
+    return effect.role == "friction" and bool(static_levels(type(effect)))
 
 
 def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_APART) -> bool:
@@ -86,9 +97,9 @@ def breaks_away_only(tried: CandidateFit, speed: float) -> bool:
 
     `speed`: typical of the records [m/s].
     """
-    effect = tried.block.effects[-1]
-    if effect.role != "friction" or not static_levels(type(effect)):
+    if not _breaks_away(tried):
         return False
+    effect = tried.block.effects[-1]
     beside = [e for e in tried.block.effects if e.role == "friction" and e.side == effect.side]
     beside.sort(key=lambda e: e.rank)
     without, passed = [e for e in beside if e is not effect], PASSED * speed

@@ -28,7 +28,7 @@ from ..prediction.values import feasible
 from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
 from .attempts import itself
-from .evidence import ranked, rounds
+from .evidence import misses_lines, ranked, rounds
 from .standing import Standing
 from .thresholds import (
     CONFIRMED,
@@ -115,6 +115,10 @@ def _judged(
     if averaged:
         best = len(stages) - 1
     judged = _validated(levels[best], tried, stages[best])
+    # Over long ones parameters fitted to small motions may err by steps in large ones.
+    while averaged and best and judged[1] is not None and misses_lines(judged[1]):
+        best -= 1
+        judged = _validated(levels[best], tried, stages[best])
     while best and not averaged and not _shows_less(*_least(stages), best - 1, best):
         if not _held_out_by_luck(judged, levels[best], levels[best - 1], stages[best - 1]):
             break

@@ -19,7 +19,7 @@ from ..prediction.sensed import POSITION, sensed
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..thresholds import NOTHING
 from .rounding import rounding_evidence
-from .thresholds import FINE, REFUTED, SAME_STEP
+from .thresholds import COARSE, FINE, REFUTED, SAME_STEP
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
@@ -59,6 +59,11 @@ def step_as_recorded(tried: CandidateFit, records: Sequence[Measurement]) -> flo
             if column == POSITION and not fine:
                 return 0.0
     return step
+
+
+def misses_lines(tried: CandidateFit) -> bool:
+    """Whether a sensor that rounds has a model that errs by too much, held out, to tell the lines apart."""
+    return rounds(tried) and tried.validation_rmse > COARSE * _step(tried)
 
 
 def rounding_error(tried: CandidateFit) -> float:

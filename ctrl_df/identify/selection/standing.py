@@ -11,12 +11,13 @@ import numpy as np
 from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
+from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.values import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import UNMOVED
 from .evidence import ranked
-from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
+from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, FLOOR, GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +131,22 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:
         begins.append(block.with_parameters(feasible(block, guess)))
-    fits = [
-        data.moved(shortest.fit(begin, free, iterations=BASE_STEPS), BASE_LONGER_STEPS) for begin in begins
-    ]
+    short = [shortest.fit(begin, free, iterations=BASE_STEPS) for begin in begins]
+    fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
+    if block.nonsmooth and free:
+        fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
     return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])
+
+
+def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:
+    """Return a model refitted past events; none where short segments leave noise alone.
+
+    Where impacts come and go, parameters bend to make up for segments that begin in a wrong minimum, and
+    those of the model are what every effect is tried beside: where segments begin is sought with care, here
+    once for all of them.
+    """
+    if found.rmse <= FLOOR * data.noise:
+        return []
+    near = shortest.fit(found.model, found.names, iterations=BASE_STEPS, followed=RESTARTS_KEPT)
+    return [data.fit(near.model, near.names, iterations=BASE_LONGER_STEPS, followed=RESTARTS_KEPT)]

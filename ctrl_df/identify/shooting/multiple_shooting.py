@@ -22,9 +22,10 @@ import numpy as np
 from ..thresholds import NEARLY_NOTHING, NOTHING, QUARTILE
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
+from .past_events import step_past_events
 from .restarts import restarted_segments, scanned_gap_states
 from .states import descend, find_states
-from .thresholds import DAMPING, DAMPING_LEAST, DAMPING_MOST, EFFORT_FOLLOWED, GOOD, ON_BOUND
+from .thresholds import DAMPING, DAMPING_LEAST, DAMPING_MOST, EFFORT_FOLLOWED, GOOD, ON_BOUND, TURNS_PAST
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,19 @@ class Stage(SegmentOutputs):
             and not problem.outlook
             and self._worth_restarting(found)
             and problem.nfev < problem.budget
-            and any(t.min() < 0.5 for t in self._trusts(found))
+            and any(t.min() < 0.5 for t in self.trusts(found))
         ):
             found = self._without_outliers(found, again, tolerance, robust)
+        return self._past_events(found, again, tolerance, robust)
+
+    def _past_events(self, found: Solution, iterations, tolerance, robust) -> Solution:
+        """Let a fit whose begins are followed go on past events, while that leads to better minima."""
+        problem = self.problem
+        for _ in range(TURNS_PAST if problem.followed and problem.nonsmooth and not problem.outlook else 0):
+            beyond = step_past_events(self, found) if problem.nfev < problem.budget else None
+            if beyond is None:
+                break
+            found = self._descend(beyond.theta, beyond.states, iterations, tolerance, robust)
         return found
 
     def over(self, segments, starts) -> Stage:
@@ -100,7 +111,7 @@ class Stage(SegmentOutputs):
             self.problem.alone(theta, which), self.segments[which], self.thin, starts, self.rtol
         )  # fmt: skip
 
-    def _followed_states(self, theta, states) -> tuple[States, Signals]:
+    def followed_states(self, theta, states) -> tuple[States, Signals]:
         """Return the initial states after a few steps, and what is left of the outputs."""
         alone = self.alone(theta, states.values)
         found = alone.solve(np.zeros(0), *EFFORT_FOLLOWED, False, restarts=False)
@@ -114,7 +125,7 @@ class Stage(SegmentOutputs):
         minimum. What is better is kept.
         """
         trial = self._descend(
-            found.theta, found.states, iterations, tolerance, robust, self._trusts(found), found.slopes
+            found.theta, found.states, iterations, tolerance, robust, self.trusts(found), found.slopes
         )
         states, _ = restarted_segments(self, trial)
         trial = self._descend(trial.theta, states, iterations, tolerance, robust, slopes=trial.slopes)
@@ -127,7 +138,7 @@ class Stage(SegmentOutputs):
         rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
         return float(np.quantile(np.concatenate(rms), GOOD)) < self.problem.hopeless
 
-    def _trusts(self, found: Solution) -> Signals:
+    def trusts(self, found: Solution) -> Signals:
         """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""
         trusts = []
         for segments, e in zip(self.segments, found.residual, strict=True):
@@ -161,7 +172,7 @@ class Stage(SegmentOutputs):
                 h, g, back = self.normal(jp, js, start.residual, weights, start.states, damping)
                 pull = known * (start.theta - problem.about)
                 trial, trial_cost = self._tried(
-                    start.theta + self._step(h + np.diag(known), g - pull, start.theta, damping),
+                    start.theta + self.step(h + np.diag(known), g - pull, start.theta, damping),
                     start, back, weights, known, cost,
                 )  # fmt: skip
                 if trial_cost < cost:
@@ -189,7 +200,7 @@ class Stage(SegmentOutputs):
         reached = away + self.cost(residual, states, weights)
         if reached >= cost and problem.followed and problem.nonsmooth:
             # of some segments the begin may have to follow past an event
-            states, residual = self._followed_states(theta, states)
+            states, residual = self.followed_states(theta, states)
             reached = away + self.cost(residual, states, weights)
         return Solution(theta, states, residual), reached
 
@@ -207,7 +218,7 @@ class Stage(SegmentOutputs):
         sigma = max(float(np.median(np.abs(everything))) / QUARTILE, self.problem.noise)
         return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), NOTHING)) for r in residual]
 
-    def _step(self, h, g, theta, damping):
+    def step(self, h, g, theta, damping):
         """Solve the damped equations; parameters held by a bound stay there."""
         p, variables = len(g), self.problem.variables
         if p == 0:

@@ -62,6 +62,9 @@ one step of the parameters."""
 DAMPED = 4
 """Times that a refused step of an initial state is damped tenfold: from 1e-3 to 1, a step half as long."""
 
+TURNS_PAST, SHARES_PAST = 6, (1.0, 0.5)
+"""Steps past events at most, and the shares of each that are tried."""
+
 UNFOLLOWED = 0.7
 """Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
 

@@ -1,0 +1,69 @@
+"""Steps of parameters that lead past events.
+
+Where impacts come and go, a step that is right for most segments leaves a few of them on the other side of an
+event, in a wrong minimum over where they begin, and is refused for their sake: a descent ends far from where
+its own steps point. Here the segments that are followed tell the step; those that it makes worse begin anew,
+and what all of them then come to decides.
+
+`stage` is a `multiple_shooting.Stage`, `found` the `Solution` that it has come to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .noise_model import power
+from .states import find_states
+from .thresholds import BETTER, DAMPING, GOOD, OUTLYING_SEGMENT, SHARES_PAST
+
+
+def step_past_events(stage, found):
+    """Return what a step past events leads to; None where it does not lead to a better minimum."""
+    problem = stage.problem
+    base = [m - e for m, e in zip(stage.measured, found.residual, strict=True)]
+    jp, js = stage.jacobian(found.theta, found.states, base)
+    h, g, back = stage.normal(jp, js, found.residual, stage.trusts(found), found.states, DAMPING)
+    known = problem.precision * power(found.residual) / sum(map(len, found.residual))
+    pull = known * (found.theta - problem.about)
+    step = stage.step(h + np.diag(known), g - pull, found.theta, DAMPING)
+    for share in SHARES_PAST:
+        moved = zip(problem.variables, found.theta + share * step, strict=True)
+        theta = np.array([v.clip(q) for v, q in moved])
+        trial = _begun_anew(stage, theta, back(theta - found.theta), found)
+        if power(trial.residual) < BETTER**2 * power(found.residual):
+            return trial
+    return None
+
+
+def _begun_anew(stage, theta, states, found):
+    """Return the stage at other parameters; segments that err more than before, or than most, begin anew.
+
+    `states`: where the segments begin if no event is passed.
+    """
+    states, residual = stage.followed_states(theta, states)
+    values, reach = [a.copy() for a in states.values], [p.copy() for p in states.reach]
+    for k, segments in enumerate(stage.segments):
+        errors, before = segments.means(residual[k] ** 2), segments.means(found.residual[k] ** 2)
+        worse = (errors > before) | (errors > OUTLYING_SEGMENT**2 * np.quantile(errors, GOOD))
+        if not worse.any() or not values[k].size:
+            continue
+        some, seen = segments.only(worse), segments.spread(worse)
+        alone = stage.alone(theta, None, slice(k, k + 1)).over([some], None)
+        starts = find_states(alone)[0]
+        anew = alone.residual(np.zeros(0), [starts])[0]
+        stage.problem.count(alone.problem.nfev * len(some) / len(segments))
+        better = some.means(anew**2) < errors[worse]
+        rows = np.flatnonzero(worse)[better]
+        values[k][rows] = starts[better]
+        kept = residual[k][seen]
+        residual[k][seen] = np.where(some.spread(better), anew, kept)
+    return replace(
+        found,
+        theta=theta,
+        states=replace(states, values=values, reach=reach).widened,
+        residual=residual,
+        slopes=None,
+        converged=False,
+    )
