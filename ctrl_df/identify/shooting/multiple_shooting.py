@@ -25,7 +25,16 @@ from .outputs import SegmentOutputs, Signals, States
 from .past_events import step_past_events
 from .restarts import restarted_segments, scanned_gap_states
 from .states import descend, find_states
-from .thresholds import DAMPING, DAMPING_LEAST, DAMPING_MOST, EFFORT_FOLLOWED, GOOD, ON_BOUND, TURNS_PAST
+from .thresholds import (
+    AT_NOISE,
+    DAMPING,
+    DAMPING_LEAST,
+    DAMPING_MOST,
+    EFFORT_FOLLOWED,
+    GOOD,
+    ON_BOUND,
+    TURNS_PAST,
+)
 
 
 @dataclass(frozen=True)
@@ -95,7 +104,9 @@ class Stage(SegmentOutputs):
         """Let a fit whose begins are followed go on past events, while that leads to better minima."""
         problem = self.problem
         for _ in range(TURNS_PAST if problem.followed and problem.nonsmooth and not problem.outlook else 0):
-            beyond = step_past_events(self, found) if problem.nfev < problem.budget else None
+            squares, count = power(found.residual), sum(map(len, found.residual))
+            at_noise = squares <= (AT_NOISE * problem.noise) ** 2 * count
+            beyond = None if at_noise or problem.nfev >= problem.budget else step_past_events(self, found)
             if beyond is None:
                 break
             found = self._descend(beyond.theta, beyond.states, iterations, tolerance, robust)
