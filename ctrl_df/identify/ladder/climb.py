@@ -62,9 +62,11 @@ class Rung:
     def next(self) -> CandidateEffect | None:
         """The effect to be added; None where there is none."""
         ranking = self.found.ranking
-        if self.refused or not ranking or self.found.verdict == NONE or not worth(ranking[0], self.search):
+        if self.refused or not ranking or self.found.verdict == NONE:
             return None
-        return self._lasts_longest or plainest(ranking)
+        if self._lasts_longest is not None:
+            return self._lasts_longest
+        return plainest(ranking) if worth(ranking[0], self.search) else None
 
     @cached_property
     def _lasts_longest(self) -> CandidateEffect | None:
@@ -72,10 +74,11 @@ class Rung:
 
         While several effects are missing, one whose hidden states are fitted anew in every segment may stand
         in for all of them there, and follow nothing beyond. What is ahead in free prediction of data held out
-        need not be so in short segments.
+        need not be so in short segments: where something remains unexplained it needs no evidence there.
         """
         found = self.found
-        long = lasting(found.ranking, found.baseline, self.search.significant)
+        least = -math.inf if found.verdict == UNKNOWN else self.search.significant
+        long = lasting(found.ranking, found.baseline, least)
         ahead = long.better[:1] if long is not None else ()
         return next((c for c in found.ranking if c.id in ahead), None)
 
