@@ -195,12 +195,12 @@ class Climb:
             rung = ahead
         return rung
 
-    def _rung(self, structure: Structure, before: Rung | None, how: dict, known: Step | None = None) -> Rung:
-        """Ask of a structure what it misses; `known`: what is told of it until that is known."""
+    def _rung(self, structure: Structure, before: Rung | None, how: dict, step: Step | None = None) -> Rung:
+        """Ask of a structure what it misses; `step`: what is told of it until that is known."""
         steps = before.steps if before else ()
         self.course.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
-        last = known or (steps[-1] if steps else None)
+        last = step or (steps[-1] if steps else None)
 
         def told(found: Diagnosis) -> Step:
             errors = found.nrmse, found.nrmse_holdout
