@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
+from ctrl_df.identify.estimation.multistart import no_worse_than
 from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
@@ -35,6 +36,17 @@ def fitted():
     sprung = PLAIN.with_effect(cdf.LinearSpring(10.0))
     spring = CandidateFit("linear_spring", data.fit(sprung, tuple(sprung.parameters)), extra=1)
     return data, base, data.validate(spring)
+
+
+@pytest.mark.parametrize("lost", [cdf.QuadraticDrag(0.3), cdf.Compliance(400.0, 2.0, 0.3)])
+def test_a_candidate_that_has_lost_its_minimum_begins_again_from_the_model_without_it(fitted, lost):
+    # a spring is missing: neither explains it; with masses far off both err more than the model without them
+    data, base, _ = fitted
+    block = base.block.with_parameters({"mass": 6.0}).with_effect(lost)
+    tried = data.fit(block, tuple(block.parameters), iterations=0)
+    assert tried.rmse > 1.5 * base.train.rmse
+    again, none = no_worse_than(base.train, [tried, None], data)
+    assert again.rmse < 1.01 * base.train.rmse and none is None
 
 
 def with_error(tried, segment, times):
