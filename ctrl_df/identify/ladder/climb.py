@@ -256,7 +256,7 @@ class Climb:
         self._known(end.steps, end.search)
         self.course.stage("every effect left out in turn")
         around = Around(end.structure, end.search, self.free)
-        around.add(end.found.ranking, end.refused)
+        around.add(end.found, end.refused)
         around.drop_each()
         if end.found.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
             around.add_again(self._seen(end))

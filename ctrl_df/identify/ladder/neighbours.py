@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..results.diagnosis import NONE, Diagnosis
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..selection.search import Search
 from ..selection.verdict import worth
@@ -118,10 +119,14 @@ class Around:
 
     # --- one more -------------------------------------------------------------------------------------
 
-    def add(self, ranking, refused: str = "") -> None:
-        """Take what the diagnosis of the model says of every effect besides; one may have been `refused`."""
-        for c in ranking:
-            better = c.confirmed and c.id != refused and worth(c, self.search)
+    def add(self, found: Diagnosis, refused: str = "") -> None:
+        """Take what the diagnosis of the model says of every effect besides; one may have been `refused`.
+
+        Where nothing is missing none is better: what it takes away is noise, such as the rounding of a record.
+        """
+        for c in found.ranking:
+            missing = found.verdict != NONE and c.confirmed and c.id != refused
+            better = missing and worth(c, self.search)
             verdict = BETTER if better else WORSE if c.evidence < -RULED_OUT else EQUAL
             errors = c.nrmse, c.nrmse_holdout
             self.far.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
