@@ -16,6 +16,7 @@ from ctrl_df.identify.residuals.missing_forces import missing_forces
 from ctrl_df.identify.results import explain
 from ctrl_df.identify.shooting.noise_model import prediction_error_filter
 from ctrl_df.identify.shooting.variables import default_free
+from ctrl_df.per_record import PerRecord
 
 FEW = ("constant_force", "asymmetric_coulomb", "linear_spring", "input_delay", "sensor_delay")
 
@@ -243,6 +244,13 @@ def test_a_joint_that_is_found_says_which_side_the_sensor_sees():
         text = explain.sensed_side(SimpleNamespace(model=model), first)
         assert f"to see the {side}" in text and f'measured="{other}"' in text
         assert explain.sensed_side(SimpleNamespace(model=model), SimpleNamespace(model=model)) == ""
+
+
+def test_what_every_record_has_for_itself_is_not_told_as_one_number():
+    phases = PerRecord.angles(["a", "b"], [0.3, 2.1])
+    model = cdf.Mass(1.0).with_effect(cdf.PositionRipple(2.0, 0.1, phases))
+    text = explain.values_of(SimpleNamespace(model=model, parameters=model.effects[-1].parameters))
+    assert text == "amplitude 2 N, wavelength 0.1 m, phase of each record its own"
 
 
 def test_one_record_alone():

@@ -25,22 +25,30 @@ def model(id, *errors):
 
 
 @pytest.mark.parametrize(
-    "first, rival, base, refuted",
+    "first, rival, base, ahead, refuted",
     [
+        ((1.4, 2.6, 1.1), (0.07, 0.4, 0.6), (0.2, 0.4, 0.7), False, True),  # worse than nothing
+        ((0.04, 0.15, 0.7), (0.03, 0.1, 0.18), (1.0, 1.0, 1.0), False, True),  # explains nothing in the end
         (
-            (1.4, 2.6, 1.1),
-            (0.07, 0.4, 0.6),
-            (0.2, 0.4, 0.7),
+            (0.04, 0.15, 0.4),
+            (0.03, 0.1, 0.18),
+            (1.0, 1.0, 1.0),
+            False,
+            False,
+        ),  # behind, and still in question
+        (
+            (0.005, 0.015, 0.32),
+            (0.01, 0.03, 0.3),
+            (0.04, 0.09, 0.11),
             True,
-        ),  # worse than nothing
-        ((0.04, 0.15, 0.7), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), True),  # explains nothing in the end
-        ((0.04, 0.15, 0.4), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), False),  # behind, and still in question
-        ((0.04, 0.05, 0.06), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), False),
+            False,
+        ),  # off by a tooth at the end
+        ((0.04, 0.05, 0.06), (0.05, 0.12, 0.18), (1.0, 1.0, 1.0), True, False),
     ],
 )
-def test_who_is_refuted(first, rival, base, refuted):
+def test_who_is_refuted(first, rival, base, ahead, refuted):
     found = lasting([model("compliance", *first), model("gravity", *rival)], model("", *base), 20.0)
-    assert found is not None and found.refuted == refuted and found.ahead == (first[2] == 0.06)
+    assert found is not None and found.refuted == refuted and found.ahead == ahead
 
 
 def refuting(*ids):

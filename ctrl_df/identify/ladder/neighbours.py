@@ -122,7 +122,7 @@ class Around:
     def add(self, found: Diagnosis, refused: str = "") -> None:
         """Take what the diagnosis of the model says of every effect besides; one may have been `refused`.
 
-        Where nothing is missing none is better: what it takes away is noise, such as the rounding of a record.
+        Where nothing is missing none is better: it takes away noise, such as the rounding of a record.
         """
         for c in found.ranking:
             missing = found.verdict != NONE and c.confirmed and c.id != refused

@@ -6,6 +6,7 @@ from typing import Any
 
 from ...numerals import certainty as sure
 from ...numerals import digits, percent
+from ...per_record import PerRecord
 from .diagnosis import AMBIGUOUS, NONE, UNKNOWN, certainty, rivals
 from .thresholds import SHOWN_PROBABILITY
 
@@ -19,7 +20,13 @@ def values_of(candidate) -> str:
     """Return a candidate's fitted parameters as text, in the units of its machine."""
     table, key = candidate.model.parameters, candidate.model.newest
     fitted = ((k, table[f"{key}.{k}"]) for k in candidate.parameters if f"{key}.{k}" in table)
-    return ", ".join(f"{k.replace('_', ' ')} {digits(p.value, 4)} {p.unit}".rstrip() for k, p in fitted)
+    return ", ".join(f"{k.replace('_', ' ')} {_value(p)}" for k, p in fitted)
+
+
+def _value(p) -> str:
+    if isinstance(p.value, PerRecord):
+        return "of each record its own"
+    return f"{digits(p.value, 4)} {p.unit}".rstrip()
 
 
 def places(where) -> str:

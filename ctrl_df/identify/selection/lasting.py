@@ -59,7 +59,8 @@ def compared(ranking: Sequence[CandidateEffect], significant: float) -> list[Can
 def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: float) -> Lasting | None:
     """Compare the first of a ranking with its rivals over all stretches up to the longest that one predicts.
 
-    Errors count by their mean square over these lengths: what follows long ones by chance fails over others.
+    Errors count by their geometric mean over these lengths, each as much as any other: what follows long ones
+    by chance fails over others, and one tooth of a ripple too far, at the end of a stretch, is one length's.
     Where nothing pulls a model back, small errors of parameters drift apart in time: beyond some length no
     model predicts anything, and there nothing is compared.
 
@@ -90,7 +91,7 @@ def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: flo
     if not told.size:
         return Lasting(0.0, dict(zip(names, table[:, 0].tolist(), strict=True)), ())
     table = table[:, : told[-1] + 1]
-    usual = dict(zip(names, np.sqrt(np.mean(table**2, axis=1)).tolist(), strict=True))
+    usual = dict(zip(names, np.exp(np.mean(np.log(table), axis=1)).tolist(), strict=True))
     better = sorted((n for n in names if GROWTH * usual[n] < usual[first.id]), key=usual.__getitem__)
     others = np.array([n != first.id for n in names])
     shown = int(np.argmax(table[1] / np.min(table[others], axis=0))) if better else len(table[0]) - 1
