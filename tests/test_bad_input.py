@@ -663,9 +663,9 @@ def test_a_million_rows_take_seconds(tmp_path):
     n = 250_000
     body = "\n".join(f"{i * 1e-4:.4f},{i % 97},{abs(i % 178 - 89)}.25" for i in range(n))
     path.write_text("t,u,y\n" + body)
-    began = time.perf_counter()
+    began = time.process_time()
     assert len(cdf.Measurement.from_csv(path)) == n
-    assert time.perf_counter() - began < 1.5  # measured 0.4 s; 1.5 s for a million
+    assert time.process_time() - began < 1.5  # measured 0.4 s; 1.5 s for a million
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from ctrl_df.identify.residuals.missing_forces import missing_forces
 from ctrl_df.identify.results import explain
 from ctrl_df.identify.shooting.noise_model import prediction_error_filter
 from ctrl_df.identify.shooting.variables import default_free
-from ctrl_df.per_record import PerRecord
+from ctrl_df.values.per_record import PerRecord
 
 FEW = ("constant_force", "asymmetric_coulomb", "linear_spring", "input_delay", "sensor_delay")
 

@@ -1,8 +1,10 @@
 """The examples in public docstrings run and print what they say; nine public names of ten have one."""
 
 import doctest
+import functools
 import importlib
 import inspect
+import pickle
 import types
 
 import control as ct
@@ -49,8 +51,30 @@ def examples(name, member):
 CASES = {key: text for name, member in MEMBERS.items() for key, text in examples(name, member).items()}
 
 
+def remembered(function):
+    """Return a function that answers a question put before as it did then: results are values."""
+    known = []
+
+    @functools.wraps(function)
+    def answer(model, *args, **keywords):
+        rest = pickle.dumps((args, keywords))
+        for asked, question, result in known:
+            if question == rest and asked == model:  # blocks are equal whatever their names
+                return result
+        known.append((model, rest, function(model, *args, **keywords)))
+        return known[-1][-1]
+
+    return answer
+
+
+# several classes are shown on one diagnosis, or one ladder, of one record
+REMEMBERED = {name: remembered(getattr(cdf, name)) for name in ("diagnose", "improve")}
+
+
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_example_in_docstring(name, monkeypatch):
+    for function, answer in REMEMBERED.items():
+        monkeypatch.setattr(cdf, function, answer)
     monkeypatch.setattr(effect, "_LIBRARY", dict(effect._LIBRARY))  # an effect registered here ends here
     names = {"cdf": cdf, "ct": ct, "np": np, "__name__": "example"}
     said = []

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import ctrl_df as cdf
 from ctrl_df.identify.data.measurement import FrequencyMeasurement, Measurement
 from ctrl_df.units import si_unit
 
@@ -109,7 +110,7 @@ def test_other_refusals():
     with pytest.raises(TypeError, match="numbers in u"):
         Measurement(t, ["a"] * len(t), y)
     with pytest.raises(TypeError, match="unrecognized keyword: units=.mm.; it takes t, u, y, name"):
-        Measurement(t, u, y, units="mm")
+        cdf.Measurement(t, u, y, units="mm")
     with pytest.raises(TypeError, match="1-D array of numbers"):
         Measurement(t, None, y)
 

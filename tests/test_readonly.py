@@ -74,6 +74,12 @@ def run(folder, *arguments, home=NOWHERE, locked=False, **environment):
     )
 
 
+def words(done):
+    """Return what was said on stderr, but for waiting: a machine with other work may be slow."""
+    news = re.compile("ctrl_df: (machine code is made once|compiling |.* compiled in )")
+    return [line for line in done.stderr.splitlines() if not news.match(line)]
+
+
 def copied(folder, bare=False):
     """Copy the package without machine code; `bare`: what is imported of it imports nothing else of it."""
     shutil.copytree(PACKAGE, folder / "ctrl_df", ignore=shutil.ignore_patterns("__pycache__"))
@@ -135,13 +141,13 @@ def test_a_law_of_the_users_compiles_where_nothing_can_be_kept(cold):
         "print(p.address(own.law, 'force') != 0, 'CFunc' in repr(type(p._compiled[own.law][1])))"
     )
     done = run(cold, "-c", code)
-    assert done.stdout == "True True\n" and not done.stderr, done.stderr
+    assert done.stdout == "True True\n" and not words(done), done.stderr
 
 
 @pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "home"])
 def test_where_the_package_cannot_be_written_the_next_place_is_used(place, cold, tmp_path):
     done = run(cold, "-c", SMALL, **{place: tmp_path / "place"})
-    assert "hits 0" in done.stdout and not done.stderr, done.stderr
+    assert "hits 0" in done.stdout and not words(done), done.stderr
     assert len(list((tmp_path / "place").rglob("impact_map.wrap*.nbi"))) == 1
 
 
