@@ -57,7 +57,7 @@ class Hysteresis(Effect):
         return (1.0,)
 
     def genuine(self, stroke, at_bound):
-        """Return whether motion bends it: over a tenth of its stroke the slope changes by 1/400, a spring's."""
+        """Return whether motion bends it: over a tenth of its stroke the slope changes by 1/400."""
         return self.stroke < 10.0 * stroke
 
     def ranges(self, seen):
