@@ -253,6 +253,11 @@ def test_what_every_record_has_for_itself_is_not_told_as_one_number():
     assert text == "amplitude 2 N, wavelength 0.1 m, phase of each record its own"
 
 
+def test_a_hysteresis_that_motion_does_not_bend_is_a_spring():
+    assert cdf.Hysteresis(1.0, stroke=0.36).genuine(0.1, set())  # presliding, never saturated
+    assert not cdf.Hysteresis(3e-4, stroke=1276.0).genuine(46.0, set())
+
+
 def test_one_record_alone():
     rig = rigs.draw("linear_spring", 14, snr_db=60, n=4000)
     found = diagnose(rig.baseline, of(rig)[0], candidates=("linear_spring", "constant_force"))

@@ -56,6 +56,10 @@ class Hysteresis(Effect):
         """Return what z comes to."""
         return (1.0,)
 
+    def genuine(self, stroke, at_bound):
+        """Return whether motion bends it: over a tenth of its stroke the slope changes by 1/400."""
+        return self.stroke < 10.0 * stroke
+
     def ranges(self, seen):
         """Return strokes that take a good part of a sample: shorter ones are dry friction."""
         return {"stroke": (0.5 * seen.speed * seen.dt, float("inf"))}

@@ -54,6 +54,7 @@ def explain(d, words) -> str:
         )
     if d.verdict == UNKNOWN:
         tried = first and f"The best of the library, {named(first.effect)}, leaves {percent(first.nrmse)}."
+        tried = tried and tried + sensed_side(d, first)
         return (
             "Something outside the library is missing. The refitted model errs by "
             f"{percent(d.nrmse)}{words.of}. " + " ".join(filter(None, (tried, *d.doubts, d.remains)))
