@@ -23,7 +23,7 @@ from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
-from ..selection.lasting import lasting
+from ..selection.lasting import Lasting, lasting
 from ..selection.search import Search
 from ..selection.thresholds import CONFIRMED, FLOOR, SHOWS_HARDLY
 from ..selection.verdict import Diagnosed, diagnosed, worth
@@ -64,23 +64,21 @@ class Rung:
         ranking = self.found.ranking
         if self.refused or not ranking or self.found.verdict == NONE:
             return None
-        if self._lasts_longest is not None:
-            return self._lasts_longest
+        long = self._long
+        if long is not None and long.better:  # the best of them, or nothing where that is the model without
+            return next((c for c in ranking if c.id == long.better[0]), None)
         return plainest(ranking) if worth(ranking[0], self.search) else None
 
     @cached_property
-    def _lasts_longest(self) -> CandidateEffect | None:
-        """The candidate that clearly predicts better than the first over long stretches; None: none does.
+    def _long(self) -> Lasting | None:
+        """How the first candidate does over long stretches, beside others and the model without it.
 
         While several effects are missing, one whose hidden states are fitted anew in every segment may stand
         in for all of them there, and follow nothing beyond. What is ahead in free prediction of data held out
         need not be so in short segments: where something remains unexplained it needs no evidence there.
         """
-        found = self.found
-        least = -math.inf if found.verdict == UNKNOWN else self.search.significant
-        long = lasting(found.ranking, found.baseline, least)
-        ahead = long.better[:1] if long is not None else ()
-        return next((c for c in found.ranking if c.id in ahead), None)
+        least = -math.inf if self.found.verdict == UNKNOWN else self.search.significant
+        return lasting(self.found.ranking, self.found.baseline, least)
 
     @property
     def way(self) -> list[Rung]:

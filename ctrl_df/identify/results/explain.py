@@ -6,7 +6,7 @@ from typing import Any
 
 from ...numerals import certainty as sure
 from ...numerals import digits, percent
-from ...per_record import PerRecord
+from ...values.per_record import PerRecord
 from .diagnosis import AMBIGUOUS, NONE, UNKNOWN, certainty, rivals
 from .thresholds import SHOWN_PROBABILITY
 
