@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 # Threads of linear algebra wait for work in circles: beside those of the package, and with a worker on every
-# processor, they took four fifths of the processor time of a diagnosis. Said before NumPy is loaded.
+# processor, they took more than half of the processor time of diagnoses. Said before NumPy is loaded.
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
