@@ -18,7 +18,7 @@ import numpy as np
 from ...simulate.crew import side_by_side
 from ..prediction.values import feasible
 from ..shooting.thresholds import BETTER
-from ..thresholds import HOPELESS, STILL_POSSIBLE
+from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
@@ -186,15 +186,15 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
 def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: SegmentedData) -> list:
     """Return models that have an effect more than another, none of them left in a minimum that errs more.
 
-    With the effect next to nothing a model is the one without it: what errs more has lost its minimum. It is
-    begun again from the other one, where it can be with so little of the effect, and else with as much of it
-    as was found.
+    With the effect next to nothing a model is the one without it: what errs clearly more has lost its minimum
+    (a fit that has not come to its end may err a little more). It is begun again from the other one, where it
+    can be with so little of the effect, and else with as much of it as was found.
     """
     return side_by_side(lambda f: f and _from_base(f, base, data), fits)
 
 
 def _from_base(found: FitResult, base: FitResult, data: SegmentedData) -> FitResult:
-    if found.rmse <= base.rmse:
+    if found.rmse <= GROWTH * base.rmse:
         return found
     model, key = found.model, found.model.newest
     values = {k: v for k, v in base.parameters.items() if k in found.names}
