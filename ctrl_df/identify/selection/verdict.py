@@ -22,7 +22,7 @@ from ..results.diagnosis import (
 )
 from ..results.explain import explain, explain_so_far, falls_behind, left_out, unconfirmed, undetermined
 from ..thresholds import EXPONENT
-from .lasting import compared, lasting
+from .lasting import Lasting, compared, lasting
 from .search import Remainder, Search
 from .thresholds import FLOOR, REFUTED_MOST
 
@@ -122,25 +122,22 @@ class _Asked:
         else:
             verdict = AMBIGUOUS
         far: list = []
-        open_ = verdict == EFFECT or (verdict == AMBIGUOUS and not silent)
-        if open_:
+        if verdict == EFFECT or (verdict == AMBIGUOUS and not silent):
             course.stage("free prediction over long stretches")
             far = [base, *compared(ranking, search.significant)]
         # neither needs the other's answer; what takes longest first
         told = verdict != NONE
         jobs = [lambda: search.remainder(best, told), *(lambda m=m: m.error_by_horizon for m in far)]
         remainder, *_ = side_by_side(lambda job: job(), jobs)
-        fallen = None
-        if open_:
-            long, named = lasting(ranking, base, search.significant), ranking[0].id
-            if long is not None and long.refuted:
-                fallen = named, left_out(ranking[0], long)
+        long = lasting(ranking, base, search.significant) if far else None
+        refuted = long is not None and long.refuted
+        fallen = (ranking[0].id, left_out(ranking[0], long)) if refuted else None
         if remainder.unexplained and not search.exact():
             verdict = UNKNOWN
         doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
         doubts = (unconfirmed(ranking[0]), *doubts) if silent else doubts
         if far and verdict != AMBIGUOUS:
-            lasts, ranking, further = doubted(ranking, base, search.significant)
+            lasts, ranking, further = doubted(ranking, long)
             doubts = further if lasts == UNKNOWN else (*further, *doubts)
             if lasts == UNKNOWN:
                 # refuted: what is missing is what the model leaves without it
@@ -171,7 +168,7 @@ class _Asked:
         return result, located.note
 
 
-def doubted(ranking, base: Baseline, significant: float):
+def doubted(ranking, long: Lasting | None):
     """Return what becomes of the verdict that the first of a ranking is the effect, and why.
 
     It stands where the first predicts the motion over long stretches as well as any rival, and better than
@@ -184,7 +181,7 @@ def doubted(ranking, base: Baseline, significant: float):
         Those that predict better share the probability with the first: one judgement is against the other.
     doubts : tuple of str
     """
-    long, first = lasting(ranking, base, significant), ranking[0]
+    first = ranking[0]
     if long is not None and not long.ahead:
         doubts, named = (falls_behind(first, long),), [c for c in ranking if c.id in long.better]
         if not named:
