@@ -144,6 +144,19 @@ def test_a_law_of_the_users_compiles_where_nothing_can_be_kept(cold):
     assert done.stdout == "True True\n" and not words(done), done.stderr
 
 
+def test_a_law_that_was_imported_compiles_in_a_script_that_others_start(tmp_path):
+    script = tmp_path / "own_law.py"
+    script.write_text(
+        "from ctrl_df.simulate.program import pointers as p\n"
+        "def law(t, x, v, z, p, dz):\n    return -p[0] * x\n"
+        "print(p.address(law, 'force') != 0)\n"
+    )
+    elsewhere = f"import runpy; runpy.run_path({str(script)!r}, run_name='__main__')"
+    for code in (f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import own_law", elsewhere):
+        done = run(PACKAGE.parent, "-c", code, NUMBA_CACHE_DIR=tmp_path / "kept")
+        assert done.stdout == "True\n", done.stderr
+
+
 @pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "home"])
 def test_where_the_package_cannot_be_written_the_next_place_is_used(place, cold, tmp_path):
     done = run(cold, "-c", SMALL, **{place: tmp_path / "place"})

@@ -94,7 +94,9 @@ def cfunc(signature, law) -> Any:
     try:
         compiled.enable_caching()
         compiled.compile()
-    except (RuntimeError, OSError):  # typed at the prompt, or in a place that cannot be written
+    except (RuntimeError, OSError, ImportError, AttributeError):
+        # Typed at the prompt, in a place that cannot be written, or kept by a process that knew the file by a
+        # name this one does not (a script that another has imported).
         compiled = uncompiled()
         compiled.compile()
     return compiled
