@@ -188,13 +188,15 @@ def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: Segme
 
     With the effect next to nothing a model is the one without it: what errs clearly more has lost its minimum
     (a fit that has not come to its end may err a little more). It is begun again from the other one, where it
-    can be with so little of the effect, and else with as much of it as was found.
+    can be with so little of the effect, and else with as much of it as was found; not where the other one is
+    so far behind the best that nothing begun there catches up.
     """
-    return side_by_side(lambda f: f and _from_base(f, base, data), fits)
+    least = min((f.rmse for f in fits if f), default=math.inf)
+    return side_by_side(lambda f: f and _from_base(f, base, data, HOPELESS * least), fits)
 
 
-def _from_base(found: FitResult, base: FitResult, data: SegmentedData) -> FitResult:
-    if found.rmse <= GROWTH * base.rmse:
+def _from_base(found: FitResult, base: FitResult, data: SegmentedData, hopeless: float) -> FitResult:
+    if found.rmse <= GROWTH * base.rmse or base.rmse > hopeless:
         return found
     model, key = found.model, found.model.newest
     values = {k: v for k, v in base.parameters.items() if k in found.names}

@@ -216,10 +216,15 @@ def _begun_again(
 
     Of laws with events the cost over long segments has many minima, the right one within what shorter
     segments leave open; if it is not there these have missed it, and the fit over long ones may be nearer.
-    Where long segments show no more error than short ones both are right; `likely`: the error over long ones
-    beyond which a model is behind for other reasons.
+    Where long segments show no more error than short ones both are right, and where they show far less the
+    fit over short ones has missed what the other one found. `likely`: the error over long ones beyond which a
+    model is behind for other reasons.
     """
-    if near is None or far is None or not far.model.nonsmooth:
+    if near is None or far is None:
+        return near, far
+    if near.rmse > GROWTH * far.rmse:
+        near = min(near, shorter.moved(far), key=lambda f: f.rmse)
+    if not far.model.nonsmooth:
         return near, far
     if FLOOR * near.rmse < far.rmse <= likely:
         far = _about(near.sigma_points, near, longer, far)
