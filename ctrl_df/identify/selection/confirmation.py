@@ -62,6 +62,25 @@ def confirmed(
     told, stage : callable
         See `FirstLook.of`.
     """
+    span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)
+    while True:
+        now, chosen = _confirmed(at, found, staged, told, stage)
+        genuine = [t for t in chosen if itself(t, span)]
+        if not chosen or genuine and genuine[0] is chosen[0]:
+            break
+        # beside what is not what its name says the others were hopeless
+        others = {t.key for t in chosen} - {t.key for t in genuine}
+        found = [t for t in found if t.key not in others]
+    if len(genuine) < len(chosen):
+        chosen, noise = ranked(now.base, genuine)
+        now = replace(now, noise=noise)
+    return now, chosen
+
+
+def _confirmed(
+    at: Standing, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+) -> tuple[Standing, list[CandidateFit]]:
+    """Do what `confirmed` does, whatever the effects have become."""
     stage("the best refitted over segments of every length")
     # Disturbance forces let the first look tell little.
     found = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
@@ -80,9 +99,7 @@ def confirmed(
         return at, []
     told(at, chosen)
     stage("near ones begun again where the best one ended")
-    chosen = _to_the_end(at, chosen)
-    span = max(float(np.ptp(facts(r).place)) for r in data.train.records)
-    chosen, noise = ranked(base, [t for t in chosen if itself(t, span)])
+    chosen, noise = ranked(base, _to_the_end(at, chosen))
     return replace(at, noise=noise), chosen
 
 
