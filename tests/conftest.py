@@ -16,6 +16,10 @@ import pytest
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # A worker on every processor: threads besides only wait for each other (a tenth of a diagnosis).
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+
 from ctrl_df.warm import is_warm, warm_up  # noqa: E402
 
 SLOW = Path(__file__).with_name("slow.txt")

@@ -22,6 +22,7 @@ BLOCK = cdf.Mass(2.0, [cdf.Coulomb(0.2), cdf.Viscous(3.0)])
 @pytest.fixture(autouse=True)
 def two_threads(monkeypatch):
     monkeypatch.setattr(crew, "processors", lambda: 2)
+    monkeypatch.setattr(runs, "STEPS_ALONE", 0)  # no run is too small to be shared
 
 
 def output(mass):

@@ -22,7 +22,7 @@ from .kernel.many import Drives, How, Rows
 from .kernel.space import lent_space
 from .program import pointers
 from .program.layout import H_AFFINE
-from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, TOGETHER_RUNS
+from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, STEPS_ALONE, TOGETHER_RUNS
 
 _ready: set[int] = set()  # kinds of laws (`H_AFFINE`) for which this process has the machine code
 _SHARES = 8  # a thread's part is cut into so many, so that all end at about the same time
@@ -194,11 +194,19 @@ class _Work:
         self.log: list[tuple[np.ndarray, ...]] = []
         self.failed: dict[int, Exception] = {}
 
+    @property
+    def small(self) -> bool:
+        """Whether the runs end so soon that to ask other threads, or to be stopped, takes no less time."""
+        return int(self.rows.max_steps.sum()) <= STEPS_ALONE
+
     def on_threads(self, threads: int) -> None:
         """Make all runs, so many at once; a job makes its own, with the processors that have no job."""
         flag = crew.flag()
         if flag is not None:
             self._as_job(flag, threads)
+            return
+        if self.small:
+            self._work(deque(self._whole()))
             return
         todo = deque(self._parts(threads))
         threads = max(min(threads, len(todo)), 1)
@@ -222,7 +230,7 @@ class _Work:
 
     def _as_job(self, flag, threads: int) -> None:
         """Make all runs in this thread, and in those of processors that have no job."""
-        self.stop, others = flag, min(crew.spare(), threads - 1)
+        self.stop, others = flag, 0 if self.small else min(crew.spare(), threads - 1)
         todo = deque(self._parts(1 + others) if others else self._whole())
         pool = crew.pool(os.getpid(), crew.processors(), "runs")
         helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]

@@ -90,6 +90,8 @@ def _confirmed(
     base, *others = [t for t in judged if t is not None]
     # what contains the baseline never errs more where both are fitted as well
     base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
+    # candidates choose what fits leave open of static levels by what is held out, and so may the baseline
+    base = thresholds_refined(base, data.fine)
     chosen, noise = ranked(base, others)
     least = min((f for f in fits[0] if f is not None), key=lambda f: f.rmse)
     at = replace(at, data=data, base=base, noise=noise, floor=floor, least=least, farthest=fits[-1][0])

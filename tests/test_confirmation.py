@@ -1,0 +1,53 @@
+"""Candidates over segments of every length: no fit falls behind for where it began, nor for what another did."""
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import rigs
+
+from ctrl_df.identify.selection import confirmation
+
+
+@dataclass
+class Fit:
+    rmse: float
+    model: object = SimpleNamespace(nonsmooth=False)
+
+
+def test_a_fit_over_short_segments_errs_no_more_than_over_longer_ones():
+    shorter = SimpleNamespace(moved=lambda f: Fit(0.9 * f.rmse))
+    near, far = confirmation._begun_again(shorter, None, Fit(2.0), Fit(1.0), 5.0)
+    assert (near.rmse, far.rmse) == (0.9, 1.0)
+    near, _ = confirmation._begun_again(shorter, None, Fit(0.95), Fit(1.0), 5.0)
+    assert near.rmse == 0.95
+
+
+@dataclass
+class Standing:
+    data: object
+    base: object = None
+    noise: object = None
+
+
+def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
+    record = rigs.draw("linear_spring", 1, n=500).train[0].measurement()
+    at = Standing(SimpleNamespace(train=SimpleNamespace(records=(record,))))
+    real = {"spring": True, "joint": False, "gap": False}
+    asked = []
+
+    def confirmed(at, found, *_):
+        asked.append([t.key for t in found])
+        return replace(at, noise="theirs"), list(found[:2])  # beside the first two all others are hopeless
+
+    monkeypatch.setattr(confirmation, "_confirmed", confirmed)
+    monkeypatch.setattr(confirmation, "itself", lambda t, span: real[t.key])
+    monkeypatch.setattr(confirmation, "ranked", lambda base, trials: (list(trials), "of those left"))
+    found = [SimpleNamespace(key=k) for k in ("joint", "gap", "spring")]
+    now, chosen = confirmation.confirmed(at, found, None, None, None)
+    assert asked == [["joint", "gap", "spring"], ["spring"]]
+    assert [t.key for t in chosen] == ["spring"] and now.noise == "theirs"
+    _, chosen = confirmation.confirmed(at, found[::-1], None, None, None)
+    assert [t.key for t in chosen] == ["spring"]
+    now, chosen = confirmation.confirmed(at, found[:2], None, None, None)
+    assert not chosen and np.all(asked[-1] == [])
