@@ -1,6 +1,6 @@
 """Candidates over segments of every length: no fit falls behind for where it began, nor for what another did."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +12,7 @@ from ctrl_df.identify.selection import confirmation
 @dataclass
 class Fit:
     rmse: float
-    model: object = SimpleNamespace(nonsmooth=False)
+    model: object = field(default_factory=lambda: SimpleNamespace(nonsmooth=False))
 
 
 def test_a_fit_over_short_segments_errs_no_more_than_over_longer_ones():
