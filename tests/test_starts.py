@@ -174,3 +174,18 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
     again = {t.key: t.train for t in begun_like_better(found, data, PLAIN)}
     # 26 times the noise as it was lost, 0.95 begun again
     assert again["stiction"].rmse < 1.1 * data.noise < found[1].train.rmse / 10
+
+
+def test_what_drove_a_lag_before_the_record_is_found():
+    """A machine at rest, and a record that begins with a step: the lag has not settled at the first sample."""
+    t = 2e-3 * np.arange(1500)
+    force = np.where(t % 1.0 < 0.5, 3.0, -2.0)
+    machine = cdf.Mass(2.0).with_effect(cdf.Viscous(5.0))
+    lagged = machine.with_effect(cdf.InputLag(0.04))
+    x = np.asarray(cdf.event_response(lagged, t, force, input_hold="zoh").outputs)[0]
+    noise = 1e-5 * np.random.default_rng(3).standard_normal(t.size)
+    record = cdf.Measurement(t, force, x + noise)
+    fit = cdf.refit(lagged.with_parameters({"input_lag.time_constant": 0.06, "mass": 2.2}), record)
+    found = fit.parameters["input_lag.time_constant"]
+    assert abs(found.value - 0.04) < 3 * found.standard_error < 1e-3
+    assert fit.comparison.white and fit.comparison.rmse < 1.1e-5

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
-from ...blocks.primitives import Ramp
+from ...blocks.primitives import Lag, Ramp
 from ...cached import cached_property
 from ...simulate.crew import require_compiled
 from ...simulate.engine import State, sampled_drive
@@ -21,7 +21,7 @@ from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
-from .thresholds import RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
+from .thresholds import FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
 from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
@@ -107,7 +107,17 @@ class Simulator:
     @cached_property
     def nuisances(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per segment."""
-        return initial_states.fitted_names(self.block.core, self.begins) if self.mechanism else ()
+        if not self.mechanism:
+            return ()
+        return (*initial_states.fitted_names(self.block.core, self.begins), *self._unsettled)
+
+    @cached_property
+    def _unsettled(self) -> dict[str, Lag]:
+        """Lags of the input, whose states at the first sample nobody knows, by the names of their corrections."""
+        if not self.mechanism or self.closed or self.begins != initial_states.FREE:
+            return {}
+        lags = [p for p, _ in self.block.core.input_channel if isinstance(p, Lag)]
+        return {f"lag{i}": p for i, p in enumerate(lags)}
 
     @cached_property
     def continued(self) -> bool:
@@ -123,7 +133,14 @@ class Simulator:
         """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
         if not self.nuisances:
             return np.zeros((len(segments), 0))
-        return initial_states.reach(self.nuisances, self.block.core, self.facts, segments)
+        unsettled = self._unsettled
+        states = [n for n in self.nuisances if n not in unsettled]
+        reach = initial_states.reach(states, self.block.core, self.facts, segments)
+        since = self.record.t[segments.begins] - self.record.t[0]
+        # a lag forgets: deep in the record its state is known
+        begun = abs(float(self.input[0])) + self.facts.force
+        forgets = [np.maximum(np.exp(-since / p.time_constant), FORGOTTEN) for p in unsettled.values()]
+        return np.column_stack((reach, *(begun * left for left in forgets)))
 
     def run(
         self,
@@ -288,8 +305,8 @@ class Simulator:
         states = x0[:, part.offset :]
         usual = self._usual(part, segments, slice(None))
         initial_states.fill(states, part.core, given, usual, self.facts.speed)
-        for state, samples in part.lags:
-            states[:, state] = samples[segments.begins]
+        for i, (state, samples) in enumerate(part.lags):
+            states[:, state] = samples[segments.begins] + given.get(f"lag{i}", 0.0)
         return x0
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
@@ -327,7 +344,7 @@ class Simulator:
         part, rows = self.prepared(values), []
         for w in range(len(segments)):
             given = initial_states.at_rest(part.core, self._usual(part, segments, w), self.facts.speed)
-            rows.append([given[name] for name in self.nuisances])
+            rows.append([given.get(name, 0.0) for name in self.nuisances])
         return np.array(rows)
 
     def carried_on(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
@@ -362,7 +379,7 @@ class Simulator:
                 came = initial_states.corrections(
                     result.x[i, part.offset :], part.core, usual, self.facts.speed
                 )
-                found[w + 1] = [came[name] for name in self.nuisances]
+                found[w + 1] = [came.get(name, 0.0) for name in self.nuisances]
         return found
 
     def _drive(self, part):
@@ -408,8 +425,8 @@ class Simulator:
         usual = self._usual(part, segments, w)
         states = x0[:, part.offset :]
         initial_states.fill(states, core, given, usual, self.facts.speed)
-        for state, samples in part.lags:
-            states[:, state] = samples[i]
+        for k, (state, samples) in enumerate(part.lags):
+            states[:, state] = samples[i] + given.get(f"lag{k}", 0.0)
         return engine.start(x0[0], time)
 
     def _usual(self, part, segments, w) -> tuple[Any, Any, Any]:

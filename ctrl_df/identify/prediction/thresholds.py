@@ -20,6 +20,10 @@ over those that the typical force makes. States end at three times these: two bo
 other, each at its typical speed, and a joint bent by a sudden force, twice as far as at rest. Half of the
 bend gains 4 nats of 3840, twice loses 28 (a joint)."""
 
+FORGOTTEN = 1e-3
+"""Share of what a lag may be off by at the first sample below which its state counts as known: after seven
+time constants."""
+
 LONG_BEFORE = 1e3
 """Durations of a record before it from which its first value has held: any lag has settled."""
 
