@@ -1,4 +1,4 @@
-"""Candidates over segments of every length: no fit falls behind for where it began, nor for what another did."""
+"""Candidates over segments of every length: none falls behind for where it began, or for another one."""
 
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace

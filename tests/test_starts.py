@@ -177,7 +177,7 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
 
 
 def test_what_drove_a_lag_before_the_record_is_found():
-    """A machine at rest, and a record that begins with a step: the lag has not settled at the first sample."""
+    """A machine at rest, and a record that begins with a step: the lag has not settled there."""
     t = 2e-3 * np.arange(1500)
     force = np.where(t % 1.0 < 0.5, 3.0, -2.0)
     machine = cdf.Mass(2.0).with_effect(cdf.Viscous(5.0))

@@ -53,8 +53,8 @@ RTOL_RANGE = (1e-14, 0.1)
 """Tolerances that may be asked for: rounding leaves fifty eps."""
 
 STEPS_ALONE = 500_000
-"""Steps of many runs at most, all together, below which one thread makes them and none waits to hear Ctrl-C: a
-fraction of a second (0.3 to 1 us a step). To ask another thread takes 0.1 ms, longer than most of them run."""
+"""Steps that many runs may take together up to which the thread that asks for them makes them: Ctrl-C waits a
+fraction of a second at most (0.3 to 1 us a step). To ask another thread takes 0.1 ms, longer than most run."""
 
 MAX_STEPS = 20_000_000
 """Steps of a run at most: minutes of work."""

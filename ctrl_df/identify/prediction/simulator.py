@@ -113,7 +113,7 @@ class Simulator:
 
     @cached_property
     def _unsettled(self) -> dict[str, Lag]:
-        """Lags of the input, whose states at the first sample nobody knows, by the names of their corrections."""
+        """Lags of the input, whose first states nobody knows, by the names of their corrections."""
         if not self.mechanism or self.closed or self.begins != initial_states.FREE:
             return {}
         lags = [p for p, _ in self.block.core.input_channel if isinstance(p, Lag)]

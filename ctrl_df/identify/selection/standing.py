@@ -134,6 +134,8 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
     short = [shortest.fit(begin, free, iterations=BASE_STEPS) for begin in begins]
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.nonsmooth and free:
+        # from its own values without a turn by short segments, too: what was fitted before stays there
+        fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS))
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
     return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])
