@@ -54,7 +54,7 @@ RTOL_RANGE = (1e-14, 0.1)
 
 STEPS_ALONE = 500_000
 """Steps that many runs may take together up to which the thread that asks for them makes them: Ctrl-C waits a
-fraction of a second at most (0.3 to 1 us a step). To ask another thread takes 0.1 ms, longer than most run."""
+fraction of a second at most (0.3 to 1 us a step). Asking another thread takes 0.1 ms, more than most runs."""
 
 MAX_STEPS = 20_000_000
 """Steps of a run at most: minutes of work."""
