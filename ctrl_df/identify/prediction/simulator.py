@@ -116,8 +116,8 @@ class Simulator:
         """Lags of the input, whose first states nobody knows, by the names of their corrections."""
         if not self.mechanism or self.closed or self.begins != initial_states.FREE:
             return {}
-        lags = [p for p, _ in self.block.core.input_channel if isinstance(p, Lag)]
-        return {f"lag{i}": p for i, p in enumerate(lags)}
+        core = self.block.core
+        return {core.state_names[state]: p for p, state in core.input_channel if isinstance(p, Lag)}
 
     @cached_property
     def continued(self) -> bool:
@@ -298,15 +298,19 @@ class Simulator:
 
     def _starts(self, part, segments: Segments, start) -> np.ndarray:
         """Return the states (nw, nx) in which segments begin."""
-        x0 = np.zeros((len(segments), part.engine.nstates))
+        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start).T, strict=True))
+        return self._begun(part, segments, slice(None), given, len(segments))
+
+    def _begun(self, part, segments: Segments, which, given: Mapping[str, Any], count: int) -> np.ndarray:
+        """Return the states (count, nx) in which the segments `which` begin; `given`: corrections by name."""
+        x0 = np.zeros((count, part.engine.nstates))
         if part.core is None:
             return x0
-        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start).T, strict=True))
-        states = x0[:, part.offset :]
-        usual = self._usual(part, segments, slice(None))
+        states, usual = x0[:, part.offset :], self._usual(part, segments, which)
         initial_states.fill(states, part.core, given, usual, self.facts.speed)
-        for i, (state, samples) in enumerate(part.lags):
-            states[:, state] = samples[segments.begins] + given.get(f"lag{i}", 0.0)
+        for state, samples in part.lags:
+            off = given.get(part.core.state_names[state], 0.0)
+            states[:, state] = samples[segments.begins[which]] + off
         return x0
 
     def _read(self, part, segments: Segments, out: np.ndarray, rounded: bool) -> np.ndarray:
@@ -416,18 +420,8 @@ class Simulator:
         return part
 
     def _start(self, part, segments, w, start, time, hidden) -> State:
-        engine, core = part.engine, part.core
-        x0 = np.zeros((1, engine.nstates))
-        if core is None:
-            return engine.start(x0[0], time)
         given = hidden | (dict(zip(self.nuisances, start, strict=True)) if start is not None else {})
-        i = int(segments.begins[w])
-        usual = self._usual(part, segments, w)
-        states = x0[:, part.offset :]
-        initial_states.fill(states, core, given, usual, self.facts.speed)
-        for k, (state, samples) in enumerate(part.lags):
-            states[:, state] = samples[i] + given.get(f"lag{k}", 0.0)
-        return engine.start(x0[0], time)
+        return part.engine.start(self._begun(part, segments, w, given, 1)[0], time)
 
     def _usual(self, part, segments, w) -> tuple[Any, Any, Any]:
         """Return position, speed and acceleration with which segments begin, without what sensors add.

@@ -65,14 +65,13 @@ def confirmed(
     span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)
     while True:
         now, chosen = _confirmed(at, found, staged, told, stage)
-        genuine = [t for t in chosen if itself(t, span)]
-        if not chosen or genuine and genuine[0] is chosen[0]:
+        odd = {t.key for t in chosen if not itself(t, span)}
+        if not odd or chosen[0].key not in odd:
             break
         # beside what is not what its name says the others were hopeless
-        others = {t.key for t in chosen} - {t.key for t in genuine}
-        found = [t for t in found if t.key not in others]
-    if len(genuine) < len(chosen):
-        chosen, noise = ranked(now.base, genuine)
+        found = [t for t in found if t.key not in odd]
+    if odd:
+        chosen, noise = ranked(now.base, [t for t in chosen if t.key not in odd])
         now = replace(now, noise=noise)
     return now, chosen
 
