@@ -55,6 +55,10 @@ GROWTH = round(math.exp(BY_CHANCE / math.sqrt(100)), 2)
 """Best error over segments four times as long that still counts as the same: chance for 100 effective
 samples, 1.35."""
 
+FLOOR = round(1 + 1 / math.sqrt(2 * 500), 2)
+"""Error over the noise, or over the least that the shortest segments leave, up to which a fit has nothing to
+gain: the spread of an rms over 500 effective samples, 1.03."""
+
 UNMOVED = 0.5
 """Error over the shortest segments, of the output's rms, beyond which a model explains no motion: one that
 stands still at a fitted place and speed errs by as much over half a turn of a sine."""

@@ -25,8 +25,9 @@ from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.lasting import Lasting, lasting
 from ..selection.search import Search
-from ..selection.thresholds import CONFIRMED, FLOOR, SHOWS_HARDLY
+from ..selection.thresholds import CONFIRMED, SHOWS_HARDLY
 from ..selection.verdict import Diagnosed, diagnosed, worth
+from ..thresholds import FLOOR
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .structure import Structure, plainness

@@ -25,7 +25,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import feasible
-from ..thresholds import GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
+from ..thresholds import FLOOR, GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
 from .attempts import itself
 from .evidence import misses_lines, ranked, rounds
@@ -36,7 +36,6 @@ from .thresholds import (
     EFFORT_CONFIRMED,
     EFFORT_ENDED,
     EXPLAINS_LITTLE,
-    FLOOR,
     LITTLE_LUCK,
     PROMISING,
     STOPPED_EARLY,

@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 
 from ...blocks.massless import without_answer
+from ..thresholds import FLOOR
 from .confirmation import over
 from .structure_search import StructureSearch
-from .thresholds import FLOOR
 
 
 class ImposedSearch(StructureSearch):

@@ -8,10 +8,10 @@ from dataclasses import replace
 from ...simulate.crew import side_by_side
 from ..estimation.refit_records import blurred, refit_records
 from ..estimation.segmented import CandidateFit
-from ..thresholds import GROWTH, RULED_OUT
+from ..thresholds import FLOOR, GROWTH, RULED_OUT
 from .evidence import ranked
 from .standing import Standing
-from .thresholds import FLOOR, ON_LIMIT, REFIT_MOST
+from .thresholds import ON_LIMIT, REFIT_MOST
 
 
 def refitted(

@@ -15,9 +15,9 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.values import feasible
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
-from ..thresholds import UNMOVED
+from ..thresholds import FLOOR, UNMOVED
 from .evidence import ranked
-from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, FLOOR, GROWN, by_chance
+from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)

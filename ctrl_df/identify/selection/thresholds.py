@@ -36,10 +36,6 @@ PROMISES = 0.25
 """Share of the squared error the best candidate explains that an effect has to explain for one that contains
 it to be tried: the special case of a right law is right over a part of the motion."""
 
-FLOOR = round(1 + 1 / math.sqrt(2 * 500), 2)
-"""Error over the least that the shortest segments leave up to which a fit has nothing to gain: the spread of
-an rms over 500 effective samples, 1.03."""
-
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 """Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
 

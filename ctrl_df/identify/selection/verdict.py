@@ -21,10 +21,10 @@ from ..results.diagnosis import (
     rivals,
 )
 from ..results.explain import explain, explain_so_far, falls_behind, left_out, unconfirmed, undetermined
-from ..thresholds import EXPONENT
+from ..thresholds import EXPONENT, FLOOR
 from .lasting import Lasting, compared, lasting
 from .search import Remainder, Search
-from .thresholds import FLOOR, REFUTED_MOST
+from .thresholds import REFUTED_MOST
 
 
 @dataclass(frozen=True, eq=False)

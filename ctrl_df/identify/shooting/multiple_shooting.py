@@ -19,14 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from ..thresholds import NEARLY_NOTHING, NOTHING, QUARTILE
+from ..thresholds import FLOOR, NEARLY_NOTHING, NOTHING, QUARTILE
 from .noise_model import power
 from .outputs import SegmentOutputs, Signals, States
 from .past_events import step_past_events
 from .restarts import restarted_segments, scanned_gap_states
 from .states import descend, find_states
 from .thresholds import (
-    AT_NOISE,
     DAMPING,
     DAMPING_LEAST,
     DAMPING_MOST,
@@ -105,7 +104,7 @@ class Stage(SegmentOutputs):
         problem = self.problem
         for _ in range(TURNS_PAST if problem.followed and problem.nonsmooth and not problem.outlook else 0):
             squares, count = power(found.residual), sum(map(len, found.residual))
-            at_noise = squares <= (AT_NOISE * problem.noise) ** 2 * count
+            at_noise = squares <= (FLOOR * problem.noise) ** 2 * count
             beyond = None if at_noise or problem.nfev >= problem.budget else step_past_events(self, found)
             if beyond is None:
                 break

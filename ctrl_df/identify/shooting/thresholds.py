@@ -62,10 +62,10 @@ one step of the parameters."""
 DAMPED = 4
 """Times that a refused step of an initial state is damped tenfold: from 1e-3 to 1, a step half as long."""
 
-TURNS_PAST, SHARES_PAST, AT_NOISE = 6, (1.0, 0.5), 1.03
-"""Steps past events at most, of which each takes about a second of a gap; the shares of each that are tried;
-error over the noise at which there is nothing to gain, by chance of 500 effective samples. Of a gap under a
-PID (nothing hidden) six steps left 1.15 times the noise over short segments, two to three 1.4, none 1.7."""
+TURNS_PAST, SHARES_PAST = 6, (1.0, 0.5)
+"""Steps past events at most, of which each takes about a second of a gap; the shares of each that are tried.
+Of a gap under a PID (nothing hidden) six steps left 1.15 times the noise over short segments, two to three
+1.4, none 1.7."""
 
 UNFOLLOWED = 0.7
 """Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
