@@ -273,3 +273,24 @@ def test_errors_are_clear():
         diagnose(cdf.Mass(1), data, candidates=["gremlin"])
     with pytest.raises(TypeError, match="inertia"):
         diagnose(3.0, data)
+
+
+@pytest.mark.parametrize("second, verdict", [("constant_force", "effect"), ("quadratic_drag", "unknown")])
+def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
+    """A spring and a constant force: the spring is named, and that something is missing beside it."""
+    true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60)).with_effect(cdf.ConstantForce(0.4))
+    t = 2e-3 * np.arange(2000)
+
+    def recorded(seed):
+        rng = np.random.default_rng(seed)
+        tones, phases = (1.3, 3.1, 5.3, 8.9, 14, 23), rng.uniform(0, 2 * np.pi, 6)
+        force = sum(6 * np.sin(w * t + phase) for w, phase in zip(tones, phases, strict=True))
+        x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
+        return Measurement(t, force, x + 1e-5 * rng.standard_normal(t.size))
+
+    few = ("linear_spring", second)
+    found = diagnose(cdf.friction_mass(2.2, 3, 6), recorded(1), holdout=recorded(2), candidates=few)
+    assert found.verdict == verdict and found.best.id == "linear_spring"
+    told = " ".join(found.doubts)
+    assert "What linear spring leaves is more than noise" in told
+    assert ("constant force is missing beside it" in told) == (verdict == "effect")

@@ -9,7 +9,8 @@ from units_apart import alike, diagnosed, scales_of
 from user_copies import copied
 
 import ctrl_df as cdf
-from ctrl_df.blocks.effect import ROLES, effect_class
+from ctrl_df.blocks.effect import effect_class
+from ctrl_df.blocks.stated import ROLES
 
 PACKAGES = ("identify", "df", "limit_cycles", "simulate")
 
@@ -88,3 +89,16 @@ def test_a_copy_is_a_class_of_its_own(tmp_path):
         assert [f.metadata for f in mine] == [f.metadata for f in original]
         assert own.id in cdf.effect_library()
     assert "own_stiction" not in cdf.effect_library()
+
+
+def test_a_law_without_a_role_is_refused_registered_or_not():
+    @dataclasses.dataclass(frozen=True)
+    class Nameless(cdf.Effect):
+        level: float = cdf.parameter("N")
+
+        @staticmethod
+        def law(t, x, v, z, p, dz):
+            return -p[0]
+
+    with pytest.raises(ValueError, match="needs a role out of force, friction"):
+        Nameless(1.0)

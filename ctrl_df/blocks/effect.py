@@ -47,10 +47,7 @@ from . import probing
 from .coordinates import either
 from .parameter import Parameter, checked
 from .primitives import Primitive
-from .stated import require_complete, share_name, stated_parameters
-
-TOLD = ("x", "drive", "load")
-ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
+from .stated import ROLES, require_complete, share_name, stated_parameters
 
 _LIBRARY: dict[str, type[Effect]] = {}
 _EffectClass = TypeVar("_EffectClass", bound="type[Effect]")
@@ -65,13 +62,13 @@ class Effect:
     id : str
         Canonical name, the class name in snake_case.
     role : str
-        One of `ROLES`.
+        One of the table above.
     shows : str
         How the effect shows in the residual of a model without it, in plain words.
     source : str
         Where the law comes from.
     asks : tuple of str
-        What a friction law has to know besides the motion, out of `TOLD`: ``x``, where the body is [m];
+        What a friction law has to know besides the motion, out of three: ``x``, where the body is [m];
         ``drive`` and ``load`` [N], what drives the body and what else acts on it, but dry friction, taken
         positive against the drive. A transmission carries the drive where all inertia lies behind it, the
         load where all lies before it. A law that asks for any of them is told all. Such laws run by
@@ -283,13 +280,6 @@ def register_effect(cls: _EffectClass) -> _EffectClass:
         raise TypeError(
             f"register_effect needs a frozen dataclass derived from ctrl_df.Effect; got {shown(cls)}. "
             "Decorate the class: @register_effect above @dataclass(frozen=True)."
-        )
-    if cls.role not in ROLES:
-        raise ValueError(f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}.")
-    if not set(cls.asks) <= set(TOLD) or (cls.asks and cls.role != "friction"):
-        raise ValueError(
-            f"{cls.__name__} may ask for {', '.join(TOLD)}, if its role is friction; got role {cls.role!r}, "
-            f"asks={cls.asks!r}."
         )
     require_complete(cls)
     taken = _LIBRARY.get(cls.id)

@@ -6,6 +6,9 @@ import dataclasses
 import functools
 from typing import Any
 
+ROLES = ("force", "friction", "contact", "coupling", "presliding", "input", "output")
+TOLD = ("x", "drive", "load")
+
 
 @functools.cache
 def stated_parameters(cls: type) -> tuple[tuple[str, dict[str, Any]], ...]:
@@ -63,7 +66,17 @@ def _missing(cls, what) -> str:
 
 @functools.cache
 def require_complete(cls: type) -> None:
-    """Raise ValueError where a class does not state what its role needs."""
+    """Raise ValueError where a class does not state its role, or what the role needs."""
+    if cls.role not in ROLES:
+        raise ValueError(
+            f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}. State it in the class: "
+            'role = "force".'
+        )
+    if not set(cls.asks) <= set(TOLD) or (cls.asks and cls.role != "friction"):
+        raise ValueError(
+            f"{cls.__name__} may ask for {', '.join(TOLD)}, if its role is friction; got role {cls.role!r}, "
+            f"asks={cls.asks!r}."
+        )
     if cls.role in ("force", "friction", "coupling", "presliding") and cls.law is None:
         raise ValueError(
             f"{cls.__name__} has role {cls.role!r} and needs a law; got none. Define a static function law, "

@@ -115,9 +115,15 @@ def diagnose(
     dataset = dataset.with_prior(known_beforehand(block, prior))
     block = dataset.with_own(block, own)
 
+    kept = frozenset(block.parameters) - set(names)
+
+    def beside(model):
+        return dataset.search(model, [k for k in dataset.free_parameters(model) if k not in kept])
+
     def work():
         course.stage("the model refitted")
         part = course.within(attrgetter("diagnosis"))
-        return diagnosed(dataset.search(block, names), classes, executor, part, limits).diagnosis
+        search = dataset.search(block, names)
+        return diagnosed(search, classes, executor, part, limits, beside).diagnosis
 
     return course.run(work)

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...blocks.effect import ROLES, Effect
+from ...blocks.effect import Effect
+from ...blocks.stated import ROLES
 from ..starting.extend import applicable, extended
 
 

@@ -124,6 +124,15 @@ def left_out(first, long) -> str:
     return f"{falls_behind(first, long)} All others were therefore tried again without {named(first.effect)}."
 
 
+def leaves(first, second) -> str:
+    """Return what the diagnosis `second` of the model with the first effect says of what that leaves."""
+    left = f"What {named(first.effect)} leaves is more than noise"
+    if second.verdict == UNKNOWN or not second.ranking:
+        return f"{left}, and no second effect of the library explains it."
+    also = named(second.ranking[0].effect)
+    return f"{left}: {also} is missing beside it. improve adds one effect after the other."
+
+
 def grows(short: float, error: float, seconds: float, effect=None) -> str:
     """Return that a model which follows short segments does not follow long ones, refitted to these.
 

@@ -15,7 +15,7 @@ from ..shooting.noise_model import NoiseModel
 from ..thresholds import BY_CHANCE, NOTHING
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
-from .thresholds import FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+from .thresholds import FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
 
 
 def remainder(
@@ -71,7 +71,12 @@ def remainder(
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
     unexplained = telling if rounded else share > LEFT
-    return Remainder(spread, max(structure, outside), unexplained, missed)
+    # The same share of its own error. Disturbance forces leave some of every model, and where there is no
+    # noise what a fit leaves is none.
+    own = max(structure / max(best.train.rmse, NOTHING), outside / max(best.validation.rmse, NOTHING))
+    shows = telling if rounded else own > LEFT and share > FOLLOWED
+    more = shows and not (data.disturbed or data.noise_free)
+    return Remainder(spread, max(structure, outside), unexplained, missed, more=more)
 
 
 def _noisier(best: CandidateFit, colour: NoiseModel) -> float:

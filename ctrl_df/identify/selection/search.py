@@ -41,6 +41,8 @@ class Remainder:
         What the data know besides, for `Search.located`.
     doubt : str
         Where it shows, in a sentence, if not in these numbers.
+    more : bool
+        Whether more is missing beside the best candidate: what it leaves is too much for noise.
     """
 
     noise: float
@@ -48,6 +50,7 @@ class Remainder:
     unexplained: bool
     about: Any = None
     doubt: str = ""
+    more: bool = False
 
 
 @dataclass(frozen=True)

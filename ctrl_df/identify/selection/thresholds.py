@@ -51,6 +51,11 @@ LEFT = 0.2
 """Share of the structure (rms) that the best candidate may leave: 4 % of its power. Rigs with something
 unknown hidden leave more to whatever stands in for it, those of the library less."""
 
+FOLLOWED = 0.05
+"""The same share up to which the best candidate is the answer whatever remains: 0.25 % of the power. A right
+law leaves that where the input is not known exactly (a moving base read by an accelerometer: 0.015), one that
+stands in for another law more (rigs with something unknown hidden: 0.07 and more)."""
+
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,15 @@ from ..results.diagnosis import (
     Diagnosis,
     rivals,
 )
-from ..results.explain import explain, explain_so_far, falls_behind, left_out, unconfirmed, undetermined
+from ..results.explain import (
+    explain,
+    explain_so_far,
+    falls_behind,
+    leaves,
+    left_out,
+    unconfirmed,
+    undetermined,
+)
 from ..thresholds import EXPONENT, FLOOR
 from .lasting import Lasting, compared, lasting
 from .search import Remainder, Search
@@ -35,7 +44,14 @@ class Diagnosed:
     search: Search
 
 
-def diagnosed(search: Search, classes, executor=None, course: Course | None = None, limits=None) -> Diagnosed:
+def diagnosed(
+    search: Search,
+    classes,
+    executor=None,
+    course: Course | None = None,
+    limits=None,
+    beside: Callable[[Any], Search] | None = None,
+) -> Diagnosed:
     """Try effects, confirm the best candidates, and say what they amount to.
 
     Parameters
@@ -49,11 +65,17 @@ def diagnosed(search: Search, classes, executor=None, course: Course | None = No
         Hears of the same as it stands.
     limits : mapping or None
         What the next experiment may do to the machine.
+    beside : callable or None
+        ``beside(block)``: the search for what the model with the best candidate misses, where that leaves
+        more than noise; None: that is asked elsewhere.
     """
     began, limits = time.perf_counter(), dict(limits or {})
 
     def so_far(known) -> Diagnosed:
         return _Asked(known[0], began, limits).so_far(known[1])
+
+    def rest(block, part: Course) -> Diagnosis | None:
+        return None if beside is None else diagnosed(beside(block), classes, executor, part).diagnosis
 
     course = (course or Course()).within(so_far)
     first: Diagnosed | None = None
@@ -63,7 +85,7 @@ def diagnosed(search: Search, classes, executor=None, course: Course | None = No
         after, found = search.candidates(left, executor, course)
         after, chosen = after.confirm(found, course)
         course.stage("verdict")
-        known, fallen = _Asked(after, began, limits, refuted).answer(chosen, found, course)
+        known, fallen = _Asked(after, began, limits, refuted).answer(chosen, found, course, rest)
         ranking = known.diagnosis.ranking
         if first is not None and not (ranking and worth(ranking[0], after)):
             return first  # without what was refuted nothing is explained
@@ -94,12 +116,15 @@ class _Asked:
         return Diagnosed(replace(result, explanation=explain_so_far(result, search.words)), search)
 
     def answer(
-        self, chosen: Sequence, found: Sequence, course: Course
+        self, chosen: Sequence, found: Sequence, course: Course, rest: Callable
     ) -> tuple[Diagnosed, tuple[str, str] | None]:
         """Return what confirmed candidates amount to, `found` beside them; and the first if it is refuted.
 
         That is its id, and why in a sentence. What follows short segments by its hidden states alone, begun
         anew in each, has set the pace at which others were given up: they are worth a look without it.
+
+        Where the first leaves more than noise a second effect is missing beside it, or it stands in for one
+        outside the library. `rest(block, course)` tells: the diagnosis of the model with the first.
         """
         search = self.search
         best = chosen[0] if chosen else search.base
@@ -143,6 +168,12 @@ class _Asked:
                 # refuted: what is missing is what the model leaves without it
                 best, remainder = search.base, search.remainder(search.base, False)
             verdict = lasts if verdict == EFFECT else verdict
+        if verdict in (EFFECT, AMBIGUOUS) and remainder.more and not silent:
+            course.stage(f"what {ranking[0].id.replace('_', ' ')} leaves")
+            second = rest(best.block, course.within(lambda _: (search, chosen)))
+            if second is not None:
+                verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
+                doubts = (*doubts, leaves(ranking[0], second))
         doubts = (*doubts, *(why for _, why in self.refuted))
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
