@@ -47,7 +47,7 @@ from . import probing
 from .coordinates import either
 from .parameter import Parameter, checked
 from .primitives import Primitive
-from .stated import ROLES, require_complete, share_name, stated_parameters
+from .stated import require_complete, share_name, stated_parameters
 
 _LIBRARY: dict[str, type[Effect]] = {}
 _EffectClass = TypeVar("_EffectClass", bound="type[Effect]")

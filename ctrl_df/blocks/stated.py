@@ -69,8 +69,8 @@ def require_complete(cls: type) -> None:
     """Raise ValueError where a class does not state its role, or what the role needs."""
     if cls.role not in ROLES:
         raise ValueError(
-            f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}. State it in the class: "
-            'role = "force".'
+            f"{cls.__name__} needs a role out of {', '.join(ROLES)}; got {cls.role!r}. State it "
+            'in the class, as role = "force".'
         )
     if not set(cls.asks) <= set(TOLD) or (cls.asks and cls.role != "friction"):
         raise ValueError(
