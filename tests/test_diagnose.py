@@ -294,3 +294,24 @@ def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
     told = " ".join(found.doubts)
     assert "What linear spring leaves is more than noise" in told
     assert ("constant force is missing beside it" in told) == (verdict == "effect")
+
+
+@pytest.mark.parametrize(
+    "stated, free, told",
+    [
+        (cdf.friction_mass(2.2, 300, 6), ("mass",), "explains nothing of this motion"),
+        (cdf.friction_mass(2.2, 300, 6), None, "coulomb.level"),  # fits go to a twelfth of it
+    ],
+)  # fmt: skip
+def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
+    true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60))
+    t = 2e-3 * np.arange(2000)
+    force = sum(6 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
+    x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
+    record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
+    found = diagnose(stated, record, free=free, candidates=["quadratic_drag"])
+    assert found.verdict == "unknown" and any(told in doubt for doubt in found.doubts)
+    if free is not None:
+        assert found.best.model.parameters["coulomb.level"].value == 300
+        with pytest.raises(ValueError, match="moves under"):
+            found.next_experiment  # noqa: B018

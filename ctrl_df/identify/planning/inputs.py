@@ -13,7 +13,6 @@ from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..prediction.simulator import free_run
 from ..results.experiment import Experiment, separated
-from ..thresholds import NOTHING
 from .thresholds import (
     PLAN_BAND,
     PLAN_LEAST,
@@ -48,6 +47,7 @@ def input_that_separates(
     """
     record = diagnosis.train[0]
     given, long, strong = diagnosis.limits, place_unit(record), record.input_unit
+    noise = facts(record).noise  # of the output; what remained may be of accelerations
     force = float(force or given.get("force") or np.max(np.abs(record.u)))
     place = facts(record).place
     centre = float(place[0])
@@ -62,9 +62,9 @@ def input_that_separates(
     play = (
         _Free(models, record, t, centre, reach)
         if loop is None
-        else _Loop(models, loop, record, t, centre, diagnosis.noise)
+        else _Loop(models, loop, record, t, centre, noise)
     )
-    best, best_moves = None, False
+    best, best_moves, still = None, False, 0
     shapes = _shapes(t, record) if loop is None else _references(t, record)
     for kind, shape in shapes.items():
         for size in PLAN_SIZES:
@@ -73,14 +73,20 @@ def input_that_separates(
             far = max(float(np.max(np.abs(y - centre))) for y in ys)
             if not np.isfinite(far) or far > PLAN_MARGIN * reach * PLAN_SLACK or asked > force:
                 continue
-            if max(float(np.ptp(y)) for y in ys) <= diagnosis.noise:
-                continue  # nothing moves
-            separation = min(gaps) / max(diagnosis.noise, NOTHING)
+            if max(float(np.ptp(y)) for y in ys) <= noise:
+                still += 1
+                continue
+            separation = min(gaps) / noise
             # A record in which nothing may move teaches one bit; where all candidates move it teaches their
             # shape.
             moves = min(float(np.ptp(y)) for y in ys) > PLAN_MOVES * max(float(np.ptp(y)) for y in ys)
             if best is None or (moves, separation) > (best_moves, best.separation):
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
+    if best is None and still == len(shapes) * len(PLAN_SIZES):
+        raise ValueError(
+            f"no model of {separated(names)} moves under ±{force:g} {strong}, though the machine did in "
+            "these records: its friction or inertia is far too large. Give better values, or leave them free."
+        )
     if best is None:
         raise ValueError(
             f"every input tried leaves the range of ±{reach:g} {long} (stroke), asks more than {force:g} "

@@ -342,7 +342,8 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
 
 def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:
     """Return the attempt that begins at a start; None where the effect contradicts the block."""
-    base = screen.block.with_parameters(feasible(screen.block, dict(start.values)))
+    values = {k: v for k, v in start.values if k in free}
+    base = screen.block.with_parameters(feasible(screen.block, values))
     block, key = extended(base, start.effect), start.effect.id
     if block is None:
         return None

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ...simulate.crew import side_by_side
 from ..estimation.refit_records import blurred, refit_records
 from ..estimation.segmented import CandidateFit
+from ..prediction.values import feasible
 from ..thresholds import FLOOR, GROWTH, RULED_OUT
 from .evidence import ranked
 from .standing import Standing
@@ -96,13 +97,14 @@ def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Ca
     """
     values = {k: p.value for k, p in at.base.block.parameters.items()}
     spans = {k: span for k, span in at.data.limits.items() if k in at.base.train.names}
-    if (
-        at.data.disturbed
-        or best.train.rmse <= FLOOR * at.data.noise
-        or all(a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items())
+    if best.train.rmse <= FLOOR * at.data.noise or all(
+        a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items()
     ):
         return None
-    other = refit(replace(at, data=replace(at.data, limits={})), at.base, seen=True)
+    free = replace(at, data=replace(at.data, limits={}))
+    regressed = at.base.block.with_parameters(feasible(at.base.block, at.regressed))
+    begins = (at.base, replace(at.base, train=free.data.fine.fit(regressed, at.base.train.names)))
+    other = min((refit(free, begin, seen=True) for begin in begins), key=lambda f: f.train.rmse)
     values = {k: p.value for k, p in other.block.parameters.items()}
     left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)
     (judged,), _ = ranked(at.base, [other])

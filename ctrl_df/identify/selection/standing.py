@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,6 +42,8 @@ class Standing:
         The fit over the shortest segments that errs least; None where it is not known yet.
     farthest : FitResult or None
         The model refitted over the longest segments that may judge; None: not known yet.
+    regressed : mapping of str to float
+        Its free parameters as a regression of the force tells them.
     """
 
     segmentations: Sequence[SegmentedData]
@@ -52,6 +54,7 @@ class Standing:
     floor: float = 0.0
     least: FitResult | None = None
     farthest: FitResult | None = None
+    regressed: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def grows(self) -> bool:
@@ -138,7 +141,8 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
         fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS))
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
-    return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])
+    noise = ranked(base, ())[1]
+    return Standing(segmentations, data, base, shortest.moved(base.train), noise, regressed=guess)
 
 
 def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:
