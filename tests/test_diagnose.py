@@ -315,3 +315,22 @@ def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
         assert found.best.model.parameters["coulomb.level"].value == 300
         with pytest.raises(ValueError, match="moves under"):
             found.next_experiment  # noqa: B018
+
+
+def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
+    """Of amperes, torque constant, inertia and friction have a common factor: it is told, the spring named."""
+    true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.TorqueConstant(0.8)).with_effect(cdf.LinearSpring(60))
+    t = 2e-3 * np.arange(2000)
+    current = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
+    x = np.asarray(cdf.event_response(true, t, current, input_hold="zoh").outputs)[0]
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(t.size)
+    record = Measurement(t, current, x + noise, input="current")
+    stated = cdf.friction_mass(2, 2.5, 5).with_effect(cdf.TorqueConstant(1.0))
+    found = diagnose(stated, record, candidates=["linear_spring"])
+    assert found.verdict == "effect" and found.best.determined
+    assert any("mass" in s and "cannot be told apart" in s for s in found.doubts)
+    model = {k: p.value for k, p in found.best.model.parameters.items()}
+    scale = model["torque_constant.constant"] / 0.8
+    # measured: 1e-4
+    assert model["linear_spring.stiffness"] / scale == pytest.approx(60, rel=1e-3)
+    assert model["mass"] / scale == pytest.approx(2.2, rel=1e-3)

@@ -34,7 +34,7 @@ class TorqueConstant(Effect):
     """
 
     constant: float = parameter("N/A", strict=True, meaning="force over current")
-    resistance: float = parameter("V/A", default=0.0, meaning="resistance; 0: driven by current")
+    resistance: float = parameter("V/A", default=0.0, free=False, meaning="resistance; 0: driven by current")
 
     role: ClassVar[str] = "input"
     affine: ClassVar[bool] = True

@@ -146,7 +146,7 @@ def blurred(found: FitResult) -> set[str]:
 
     Those that every record has for itself where that holds in all records.
     """
-    names = {k for _, parts in found.null for k, _, _ in parts if k not in found.own}
+    names = in_null_directions(found)
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0)) if len(found.names) else np.zeros(0)
     for k, value, error, scale in zip(found.names, found.values, errors, found.scale, strict=True):
         if k not in found.own and (not math.isfinite(error) or error > max(abs(value), scale)):
@@ -154,17 +154,19 @@ def blurred(found: FitResult) -> set[str]:
     return names | {k for k, own in found.own.items() if not any(v.determined for v in own.values())}
 
 
-def doubts(found: FitResult) -> tuple[str, ...]:
-    """Return a sentence for every direction the data do not determine."""
-    lines, told, alone = [], set(), {}
-    for parts in (part for _, whole in found.null for part in _by_record(whole)):
+def in_null_directions(found: FitResult) -> set[str]:
+    """Return the parameters in a null direction but those that every record has for itself."""
+    return {k for _, parts in found.null for k, _, _ in parts if k not in found.own}
+
+
+def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:
+    """Return a sentence for every null direction of several parameters."""
+    lines = []
+    for parts in _directions(found):
         moves: dict[str, float] = {}
         for k, _, d in sorted(parts, key=lambda p: -abs(p[2])):
             moves.setdefault(k, d)
-        told |= {(k, r) for k, r, _ in parts}
         if len(moves) == 1:
-            for k, record, _ in parts:
-                alone.setdefault(k, {})[record] = None
             continue
         names = {k: _of(k, [r for n, r, _ in parts if n == k], found) for k in moves}
         first = next(iter(moves.values()))
@@ -175,6 +177,17 @@ def doubts(found: FitResult) -> tuple[str, ...]:
             f"{' and '.join(names.values())} cannot be told apart on these data: {change} leaves the "
             "output as it is. Fix one of them, or excite the drive otherwise."
         )
+    return tuple(lines)
+
+
+def doubts(found: FitResult) -> tuple[str, ...]:
+    """Return a sentence for every direction the data do not determine."""
+    lines, told, alone = list(cannot_be_told_apart(found)), set(), {}
+    for parts in _directions(found):
+        told |= {(k, r) for k, r, _ in parts}
+        if len({k for k, _, _ in parts}) == 1:
+            for k, record, _ in parts:
+                alone.setdefault(k, {})[record] = None
     for k, records in alone.items():
         lines.append(
             f"{_of(k, [*records], found)} leaves no trace in these data: its value is the start value."
@@ -193,6 +206,11 @@ def doubts(found: FitResult) -> tuple[str, ...]:
         if doubt:
             lines.append(f"{k} is less certain than it is large: these data do not determine it.")
     return tuple(lines)
+
+
+def _directions(found: FitResult) -> list:
+    """Return the null directions, those of own parameters alone by record."""
+    return [part for _, whole in found.null for part in _by_record(whole)]
 
 
 def _by_record(parts) -> list[list]:

@@ -169,6 +169,10 @@ class Search(ABC):
         """Return the parameters of the newest effect of a confirmed candidate that data do not determine."""
         return ()
 
+    def open_directions(self) -> tuple[str, ...]:
+        """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
+        return ()
+
     def predicted(self, judged) -> tuple[Any, tuple] | None:
         """Return a model and the records that it is to predict; None where there is nothing to predict."""
         return None

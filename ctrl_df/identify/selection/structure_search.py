@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..course import Course
-from ..estimation.refit_records import blurred
+from ..estimation.refit_records import blurred, cannot_be_told_apart, in_null_directions
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -165,7 +165,14 @@ class StructureSearch(Search):
         # the size of an effect, its first parameter, is measured by itself
         size = set(own_names(judged.block)[:1]).intersection(own)
         doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
+        if len(fit.null) <= len(self.at.base.train.null):
+            # the model has these without the effect, too: sizes are told but for its scale
+            doubtful -= in_null_directions(fit)
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
+
+    def open_directions(self):
+        """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
+        return cannot_be_told_apart(self.at.base.train)
 
     def predicted(self, judged):
         """Return the model and the records held out (angles as these have them), or those fitted."""

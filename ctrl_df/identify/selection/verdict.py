@@ -174,7 +174,7 @@ class _Asked:
             if second is not None:
                 verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
                 doubts = (*doubts, leaves(ranking[0], second))
-        doubts = (*doubts, *(why for _, why in self.refuted))
+        doubts = (*doubts, *(why for _, why in self.refuted), *search.open_directions())
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
         return Diagnosed(replace(result, explanation=explain(result, words) + note), search), fallen
