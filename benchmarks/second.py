@@ -30,6 +30,7 @@ import rigs_second as rigs
 from second_table import claims_of, draw_reliability, table
 
 import ctrl_df as cdf
+from ctrl_df.identify.prediction.simulator import free_run
 
 KINDS = ("single", "nothing", "outside", "double", "triple")
 WORSE = 1.1
@@ -83,8 +84,35 @@ def _one(rig):
         row["values"] = _held_values(rig, first) if row["first"] and first.id in rig.hidden else []
     if rig.kind == "outside":
         row["region"] = bool(set(found.regions) & set(rig.regions))
+    if rig.kind == "single" and found.verdict == "ambiguous":
+        row["experiment"] = _experiment(rig, found)
     best = found.best
     return row, found.model if best is None else best.model
+
+
+def _experiment(rig, found):
+    """Return what a diagnosis with the record of the experiment that it asked for says.
+
+    It is played on the true structure, as the library runs it, under white noise of the sensor's size.
+    """
+    try:
+        t, u = planned = found.next_experiment
+    except ValueError as reason:  # nothing within the limits moves the machine and keeps to its range
+        return dict(refused=str(reason))
+    before = rig.train
+    played = before.replaced(
+        t=t, u=u, outputs={"position": np.full(len(t), before.y[0])}, velocity=None, channels={},
+        input_hold="zoh",
+    )  # fmt: skip
+    y = free_run(rig.truth, played, position=float(before.y[0]))
+    noise = before.noise_floor() * np.random.default_rng(rig.number).standard_normal(len(t))
+    record = played.replaced(outputs={"position": y + noise})
+    again = cdf.diagnose(rig.baseline, [before, record], holdout=rig.held, free=list(rig.free))
+    first = again.best
+    right = first is not None and bool({first.id, *first.equivalents} & rig.accepted[rig.hidden[0]])
+    return dict(
+        separates=planned.candidates, separation=planned.separation, verdict=again.verdict, right=right
+    )
 
 
 def _apart(a, b, turns):

@@ -54,6 +54,9 @@ def table(rows):
     line("1.5 to 5 times the noise: right, or honestly ambiguous or none", "95 %", small, honest)
     line("the same: wrong with p > 0.9", "≤ 1 %", small,
          lambda r: r.get("verdict") == "effect" and not r["first"] and r["said"] > 0.9)  # fmt: skip
+    asked = [r["experiment"] for r in singles if "experiment" in r]
+    line("ambiguous, the experiment asked for played: then `effect`, and right", "", asked,
+         lambda e: e.get("verdict") == "effect" and e["right"])  # fmt: skip
     line("nothing hidden: none", "99 %", of["nothing"], lambda r: r.get("verdict") == "none")
     line("outside the library: unknown", "90 %", of["outside"], lambda r: r.get("verdict") == "unknown")
     line("outside the library: region right", "85 %", of["outside"], lambda r: r.get("region"))
