@@ -318,7 +318,7 @@ def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
 
 
 def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
-    """Of amperes, torque constant, inertia and friction have a common factor: it is told, the spring named."""
+    """Driven by current, torque constant, inertia and friction have a common factor: it is told."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.TorqueConstant(0.8)).with_effect(cdf.LinearSpring(60))
     t = 2e-3 * np.arange(2000)
     current = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
@@ -331,6 +331,6 @@ def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
     assert any("mass" in s and "cannot be told apart" in s for s in found.doubts)
     model = {k: p.value for k, p in found.best.model.parameters.items()}
     scale = model["torque_constant.constant"] / 0.8
-    # measured: 1e-4
+    # measured: one part in ten thousand
     assert model["linear_spring.stiffness"] / scale == pytest.approx(60, rel=1e-3)
     assert model["mass"] / scale == pytest.approx(2.2, rel=1e-3)

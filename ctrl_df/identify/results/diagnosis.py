@@ -115,6 +115,8 @@ class CandidateEffect(Brief, Predicting):
     undetermined : tuple of str
         Parameters of the effect that the data do not determine: at a bound of their range, or less certain
         than they are large.
+    displaced : tuple of str
+        Parameters of the model that end at a bound of their range with the effect, and do not without it.
 
     Examples
     --------
@@ -141,6 +143,7 @@ class CandidateEffect(Brief, Predicting):
     errors: Mapping[str, float] = field(default_factory=dict)
     evidence_holdout: float = 0.0
     undetermined: tuple[str, ...] = ()
+    displaced: tuple[str, ...] = ()
 
     @property
     def determined(self) -> bool:

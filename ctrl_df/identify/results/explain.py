@@ -169,6 +169,16 @@ def undetermined(first) -> str:
     return f"These data do not determine its {names}."
 
 
+def displaces(first) -> str:
+    """Return which parameters of the model an effect drives to a bound."""
+    table = first.model.parameters
+    values = " and ".join(f"{k} at {digits(table[k].value)} {table[k].unit}".strip() for k in first.displaced)
+    return (
+        f"With {named(first.effect)} the model's own parameters come to a bound of their range ({values}): "
+        "it may stand in for them."
+    )
+
+
 def explain_so_far(d, words) -> str:
     """Return what a `Diagnosis` under way knows."""
     size = f"So far: with its parameters refitted the model errs by {percent(d.nrmse)}{words.of}"

@@ -169,6 +169,10 @@ class Search(ABC):
         """Return the parameters of the newest effect of a confirmed candidate that data do not determine."""
         return ()
 
+    def displaced(self, judged) -> tuple[str, ...]:
+        """Return the model's parameters at a bound with the newest effect that are within without it."""
+        return ()
+
     def open_directions(self) -> tuple[str, ...]:
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
         return ()

@@ -170,6 +170,25 @@ class StructureSearch(Search):
             doubtful -= in_null_directions(fit)
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
+    def displaced(self, judged):
+        """Return the model's parameters at a bound with the newest effect that are within without it.
+
+        Those that the data leave free to be what the model states are not meant: two standard errors.
+        """
+        stated, errors = self.block.parameters, self.standard_errors(judged)
+        with_it, without = (
+            {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
+            for fit in (judged.train, self.at.base.train)
+        )
+        values = judged.train.parameters
+        return tuple(
+            sorted(
+                k
+                for k in with_it - without - set(own_names(judged.block))
+                if SIZE_KNOWN * abs(values[k] - stated[k].value) > errors.get(k, math.inf)
+            )
+        )
+
     def open_directions(self):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
         return cannot_be_told_apart(self.at.base.train)

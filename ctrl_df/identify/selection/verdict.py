@@ -22,6 +22,7 @@ from ..results.diagnosis import (
     rivals,
 )
 from ..results.explain import (
+    displaces,
     explain,
     explain_so_far,
     falls_behind,
@@ -203,7 +204,8 @@ def doubted(ranking, long: Lasting | None):
     """Return what becomes of the verdict that the first of a ranking is the effect, and why.
 
     It stands where the first predicts the motion over long stretches as well as any rival, and better than
-    the model without it, and where the data determine the effect's size, its first parameter.
+    the model without it, where the data determine the effect's size, its first parameter, and where the
+    model's own parameters keep to their ranges beside it.
 
     Returns
     -------
@@ -222,6 +224,8 @@ def doubted(ranking, long: Lasting | None):
         return AMBIGUOUS, shared, doubts
     if next(iter(first.parameters), None) in first.undetermined:
         return AMBIGUOUS, ranking, (undetermined(first),)
+    if first.displaced:
+        return AMBIGUOUS, ranking, (displaces(first),)
     return EFFECT, ranking, ()
 
 
@@ -280,4 +284,5 @@ def _entry(judged, search: Search, probability: float, same) -> CandidateEffect:
         equivalents=same, confirmed=judged.confirmed,
         errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
         evidence_holdout=judged.evidence_validation, undetermined=search.undetermined(judged),
+        displaced=search.displaced(judged),
     )  # fmt: skip
