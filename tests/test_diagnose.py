@@ -334,3 +334,16 @@ def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
     # measured: one part in ten thousand
     assert model["linear_spring.stiffness"] / scale == pytest.approx(60, rel=1e-3)
     assert model["mass"] / scale == pytest.approx(2.2, rel=1e-3)
+
+
+def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
+    base = cdf.friction_mass(2, 1.0, 6).with_effect(cdf.LinearSpring(60))
+    true = cdf.Mass(2.2).with_effect(cdf.Viscous(6)).with_effect(cdf.LinearSpring(60))
+    true = true.with_effect(cdf.LoadDependentFriction(0.3))
+    t = 2e-3 * np.arange(2000)
+    force = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
+    x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
+    record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
+    found = diagnose(base, record, candidates=["load_dependent_friction"])
+    assert found.best.id == "load_dependent_friction" and found.best.displaced == ("coulomb.level",)
+    assert found.verdict == "ambiguous" and "coulomb.level" in found.explanation
