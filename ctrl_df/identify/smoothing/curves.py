@@ -35,7 +35,7 @@ class Curve:
     share: float
 
 
-def curve_over(values, force, std, own, known) -> Curve:
+def curve_over(values, force, std, own, beside, known) -> Curve:
     """Fit a force by a step curve over a quantity and by the model's own parameters together.
 
     Parameters
@@ -43,7 +43,9 @@ def curve_over(values, force, std, own, known) -> Curve:
     values, force, std : (n,) arrays
         Quantity, force and its standard deviation.
     own : (n, p) array
-        Regressors of the model's own parameters.
+        Regressors of the model's own parameters: what they do alone is no share of a curve.
+    beside : (n, q) array
+        Those of them that a curve over this quantity can be told from.
     known : (n,) bool array
         Which instants count.
     """
@@ -53,8 +55,7 @@ def curve_over(values, force, std, own, known) -> Curve:
         return Curve(none, none, none, np.zeros((2, 0)), 0.0)
     order = np.argsort(values[use], kind="stable")
     root = 1.0 / std[use]
-    scale = np.linalg.norm(own[use], axis=0)
-    rest = own[use][:, scale > 0] / scale[scale > 0] * root[:, None]
+    rest = _weighed(beside[use], root)
     y, count, together = force[use] * root, CURVE_BINS, 1.0
     bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
     # what neither explains tells how many instants know the same, and so how many bins can be told apart
@@ -67,7 +68,7 @@ def curve_over(values, force, std, own, known) -> Curve:
         together = _together(left)
         count = int(np.clip(len(use) / together / CURVE_ALONE, CURVE_LEAST, count))
     count = int(bins.max()) + 1
-    alone = np.column_stack([rest, root])
+    alone = np.column_stack([_weighed(own[use], root), root])
     before = y - alone @ np.linalg.lstsq(alone, y, rcond=DEPENDENT)[0]
     free = max(len(use) / together, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
     share = 1.0 - float(left @ left) / free[1] / max(float(before @ before) / free[0], NOTHING)
@@ -78,6 +79,11 @@ def curve_over(values, force, std, own, known) -> Curve:
     mean = np.bincount(bins, weight * partial, count) / total
     error = np.sqrt(together / total)
     return Curve(at, mean, error, np.array([values[use], partial]), float(np.clip(share, 0.0, 1.0)))
+
+
+def _weighed(columns, root) -> np.ndarray:
+    scale = np.linalg.norm(columns, axis=0)
+    return columns[:, scale > 0] / scale[scale > 0] * root[:, None]
 
 
 def _together(d) -> float:

@@ -18,7 +18,7 @@ from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
 from ..shooting.variables import default_free
-from ..thresholds import SLOWLY
+from ..thresholds import DEPENDENT, NOTHING, SLOWLY
 from .curves import Curve, curve_over
 from .smoother import smooth_record
 from .thresholds import FORCE_KNOWN, PARAMETER_NUDGE
@@ -37,10 +37,11 @@ class MissingForce:
     Attributes
     ----------
     time : (n,) array
-        [s].
+        [s]; of a record of many samples every few of them, in the middle between two.
     force, std : (n,) array
         The force (a torque, of machines that turn) and its standard deviation [`unit`]. Where the machine
-        sticks nothing is known of it, and the standard deviation says so.
+        sticks nothing is known of it, and the standard deviation says so. A force may change as roughly as
+        the record allows: one that is smooth is known to half of that.
     quantities : mapping
         position, velocity, load (the force recorded; under an imposed motion the model's) and reversal
         (distance moved since the last reversal), (n,) each.
@@ -104,9 +105,22 @@ class MissingForce:
 
     def _over(self, against) -> Curve:
         signs = np.sign(self.quantities["velocity"]) if against == "reversal" else np.ones(len(self.time))
+        own, beside = self.own, self._at_scale if against == "load" else self.own
         return curve_over(
-            self.quantities[against], self.force * signs, self.std, self.own * signs[:, None], self.known
-        )
+            self.quantities[against], self.force * signs, self.std, own * signs[:, None],
+            beside * signs[:, None], self.known,
+        )  # fmt: skip
+
+    @cached_property
+    def _at_scale(self) -> np.ndarray:
+        """The model's own parameters, their common scale held, (n, p).
+
+        All of them larger by a factor, and a force in proportion to the load, would be any force there is.
+        """
+        own = self.own / np.maximum(np.linalg.norm(self.own, axis=0), NOTHING)
+        scale = np.linalg.lstsq(own, self.force + self.quantities["load"], rcond=DEPENDENT)[0]
+        scale /= max(float(np.linalg.norm(scale)), NOTHING)
+        return own - np.outer(own @ scale, scale)
 
     def plot(self, against: str = "time", **keywords):
         """Draw it over time, or as points and a curve over another quantity; returns a ``ct.ControlPlot``.
