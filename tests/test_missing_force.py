@@ -191,3 +191,32 @@ def test_a_force_is_a_curve_over_its_own_quantity(true, against):
     if against is not None:
         assert shares.pop(against) > 0.85
     assert max(shares.values()) < (0.6 if against else 0.15)
+
+
+def test_text_and_picture_of_a_comparison_say_what_is_missing():
+    """A spring errs everywhere alike: no region of the error shows it. All say the same of its curve."""
+    rng, t = np.random.default_rng(1), np.arange(2500) * 5e-3
+    u = 8 * np.sin(4.4 * t) + 4 * np.sin(12 * t + 1) + 2 * np.sin(1.1 * t + 2)
+
+    def compared(true):
+        x = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs[0])
+        return cdf.compare(PLAIN, cdf.Measurement(t, u, x + 1e-5 * rng.standard_normal(len(t))))
+
+    told = compared(PLAIN.with_effect(cdf.LinearSpring(60.0)))
+    missing = told.missing_force
+    share = f"{missing.shares['position']:.0%}"
+    assert missing.significant and not told.where.significant
+    assert told.places[0].startswith(f"{share} of") and "curve over the position" in told.places[0]
+    assert f"{share} over the position" in missing.summary() and "rms" in missing.summary()
+    assert f"{missing.shares['position']:.1%}" in told.stands_out.table()
+    bars = told.plot().axes[-1, -1] if np.ndim(told.plot().axes) == 2 else told.plot().axes[-1]
+    assert bars.get_title() == "what the missing force is"
+    plt.close("all")
+
+    wrong = compared(PLAIN.with_parameters({"mass": 2.3})).missing_force
+    assert wrong.made[0] > 0.98 and "parameters of the model" in repr(wrong)  # seen: 0.998
+    constant = compared(PLAIN.with_effect(cdf.ConstantForce(0.5))).missing_force
+    assert constant.made[1] > 0.9  # seen: 0.97
+    none = compared(PLAIN).missing_force
+    # seen: 0.4 standard deviations at most, in 18 records; three are needed
+    assert not none.significant and none.summary().startswith("No missing force")

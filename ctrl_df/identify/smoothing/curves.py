@@ -26,6 +26,8 @@ class Curve:
         Quantity and force of every instant.
     share : float
         Of the variance that the regressors leave, how much the curve explains, 0 to 1.
+    p_value : float
+        Probability of a share as large by chance.
     """
 
     at: np.ndarray
@@ -33,6 +35,19 @@ class Curve:
     std: np.ndarray
     points: np.ndarray
     share: float
+    p_value: float = 1.0
+
+
+def known_to_make(force, std, own, known) -> tuple[float, float]:
+    """Return the share of a force's square that own regressors make, and that which a constant adds."""
+    root, use = 1.0 / std[known], known
+    y, columns = force[use] * root, _weighed(own[use], root)
+    whole = max(float(y @ y), NOTHING)
+    left = []
+    for regressors in (columns, np.column_stack([columns, root])):
+        rest = y - regressors @ np.linalg.lstsq(regressors, y, rcond=DEPENDENT)[0]
+        left.append(float(rest @ rest) / whole)
+    return 1.0 - left[0], left[0] - left[1]
 
 
 def curve_over(values, force, std, own, beside, known) -> Curve:
@@ -49,6 +64,8 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     known : (n,) bool array
         Which instants count.
     """
+    from scipy.stats import f as f_distribution
+
     use = np.flatnonzero(known & np.isfinite(values))
     none = np.zeros(0)
     if len(use) < 2 * CURVE_LEAST:
@@ -71,14 +88,18 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     alone = np.column_stack([_weighed(own[use], root), root])
     before = y - alone @ np.linalg.lstsq(alone, y, rcond=DEPENDENT)[0]
     free = max(len(use) / together, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
-    share = 1.0 - float(left @ left) / free[1] / max(float(before @ before) / free[0], NOTHING)
+    power = np.array([before @ before, left @ left])
+    share = 1.0 - power[1] / free[1] / max(power[0] / free[0], NOTHING)
+    more = max(both.shape[1] - alone.shape[1], 1)
+    ratio = (power[0] - power[1]) / more / max(power[1] / free[1], NOTHING)
     partial = (y - rest @ fit[: rest.shape[1]]) / root
     weight = root**2
     total = np.bincount(bins, weight, count)
     at = np.bincount(bins, weight * values[use], count) / total
     mean = np.bincount(bins, weight * partial, count) / total
     error = np.sqrt(together / total)
-    return Curve(at, mean, error, np.array([values[use], partial]), float(np.clip(share, 0.0, 1.0)))
+    share, p_value = float(np.clip(share, 0.0, 1.0)), float(f_distribution.sf(ratio, more, free[1]))
+    return Curve(at, mean, error, np.array([values[use], partial]), share, p_value)
 
 
 def _weighed(columns, root) -> np.ndarray:

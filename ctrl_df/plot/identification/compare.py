@@ -91,7 +91,7 @@ def comparison_plot(
             for ax in (top, below):
                 ax.axvline(data.t[edge], color="0.85", lw=0.6, zorder=0)
         said = moving_in(facts(data).units[0]).text
-        lines[2] = _regions(bars, chosen.where, rows, said)
+        lines[2] = _regions(bars, chosen.stands_out, rows, said)
         top.tick_params(labelbottom=False)
         return drawn.finished(lines, data.name if title is None else title)
 
@@ -111,7 +111,7 @@ def _regions(ax, regions, rows, said):
     """Bars: share of the error, filled where beyond chance; ticks: of the samples; `said`: in whose words."""
     significant = regions.significant
     shown = (significant if len(significant) else regions)[:rows][::-1]
-    ax.set_title("where the error is" if len(significant) else "no region stands out")
+    ax.set_title(regions.heading if len(significant) else "no region stands out")
     if not shown:
         ax.set_axis_off()
         return []
@@ -120,8 +120,13 @@ def _regions(ax, regions, rows, said):
     colour = [ERROR if r.p_value < 0.01 else "0.8" for r in shown]
     bars = list(ax.barh(place, share, 0.36, color=colour))
     for i, region in enumerate(shown):
-        expected = 100 * region.expected_share
-        ax.plot([expected, expected], [i - 0.18, i + 0.18], color="black", lw=1.5)
+        ax.vlines(
+            [100 * share for share in [region.expected_share] if share > 0],
+            i - 0.18,
+            i + 0.18,
+            color="black",
+            lw=1.5,
+        )
         words = f"{said(_KINDS.get(region.kind, region.kind.replace('_', ' ')))}: {region.label}"
         words = "\n".join(textwrap.wrap(words, 36))
         ax.annotate(
@@ -131,5 +136,5 @@ def _regions(ax, regions, rows, said):
     ax.set_yticks([])
     ax.set_ylim(min(len(shown), 5) - 5.6, len(shown) - 0.1)  # few bars stay slim, at the top
     ax.set_xlim(0, max(1.25 * max(share), 1.05 * max(100 * r.expected_share for r in shown)))
-    ax.set_xlabel("share of squared error [%]\n(black: of the samples)")
+    ax.set_xlabel(regions.measure)
     return bars
