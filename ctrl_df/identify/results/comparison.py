@@ -118,7 +118,7 @@ class RecordComparison(Brief):
         """Test of the residual for whiteness; of several outputs that which passes least."""
         if len(self.by_output) > 1:
             return min((r.white for r in self.by_output.values()), key=lambda w: w.p_value)
-        return whiteness(self.residual)
+        return whiteness(self.residual, band=self.record.band)
 
     @cached_property
     def input_test(self) -> InputTest | None:
