@@ -155,3 +155,17 @@ def test_a_free_run_of_a_wrong_model_begins_where_it_errs_least(seed, attained):
         .with_effect(cdf.Coulomb(level))
     )
     assert cdf.compare(wrong, record, mode="free").nrmse < 1.02 * attained
+
+
+def test_models_beside_each_other_are_given_in_a_row_or_by_name():
+    rig = rigs.draw("linear_spring", 11, snr_db=60, n=1000)
+    record = rig.train[0].measurement()
+    one, other = cdf.compare(rig.baseline, record), cdf.compare(rig.baseline, record)
+    for beside in (other, [other], {"other": other}):
+        labels = [text.get_text() for text in one.plot(beside=beside).axes.flat[0].get_legend().get_texts()]
+        assert labels == ["measured", "model 1", "other" if isinstance(beside, dict) else "model 2"]
+    assert one.plot(beside={}).axes.flat[0] is not None
+    for wrong in (3, None, ["other"], {"other": "other"}):
+        with pytest.raises(TypeError, match=r"needs beside as what compare\(\) returns"):
+            one.plot(beside=wrong)
+    plt.close("all")

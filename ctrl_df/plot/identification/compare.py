@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable, Mapping
 
 import control as ct
 import matplotlib.pyplot as plt
@@ -10,7 +11,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from ...blocks.coordinates import moving_in
-from ...checks import known_name
+from ...checks import known_name, shown
 from ...identify.data.quantities import word_of
 from ...identify.prediction.segments import facts
 from ...numerals import digits, probability
@@ -34,8 +35,8 @@ def comparison_plot(
         Which record; None: the one with the largest error.
     output : str or None
         Which of several outputs, by quantity; None: the one that leads.
-    beside : Comparison or sequence of them
-        Of other models with the same records, drawn in the same picture.
+    beside : Comparison, sequence or mapping of them
+        Of other models with the same records, drawn in the same picture; a mapping gives their names.
     labels : sequence of str
         Names of the models: that of `comparison` first.
     title : str or None
@@ -45,7 +46,8 @@ def comparison_plot(
     width : float or None
         Of a new figure [in].
     """
-    others = [beside] if hasattr(beside, "records") else list(beside)
+    others, named = compared("plot", "beside", beside)
+    labels = labels or (["model 1", *named] if named else ())
     index = comparison.records.index(comparison.worst) if record is None else record
     choices = comparison.records[index].by_output
     quantity = known_name("plot", "output", output or next(iter(choices)), choices)
@@ -94,6 +96,21 @@ def comparison_plot(
         lines[2] = _regions(bars, chosen.stands_out, rows, said)
         top.tick_params(labelbottom=False)
         return drawn.finished(lines, data.name if title is None else title)
+
+
+def compared(owner: str, name: str, beside) -> tuple[list, list[str]]:
+    """Return comparisons given alone, in a row or by name, and these names."""
+    named = list(beside) if isinstance(beside, Mapping) else []
+    rows = list(beside.values()) if named else [beside]
+    if isinstance(beside, Iterable) and not named:
+        rows = list(beside)
+    for row in rows:
+        if not hasattr(row, "records"):
+            raise TypeError(
+                f"{owner} needs {name} as what compare() returns, several of them, or a mapping of names to "
+                f"them; got {shown(row)}."
+            )
+    return rows, [str(key) for key in named]
 
 
 def _readable(values, unit):
