@@ -102,6 +102,7 @@ def parameter(
     >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True)
     ... class Spring(cdf.Effect):
+    ...     role = "force"
     ...     stiffness: float = cdf.parameter("N/m", meaning="of the spring")
     >>> Spring(200.0).parameters["stiffness"].unit
     'N/m'
