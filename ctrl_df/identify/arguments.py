@@ -14,7 +14,7 @@ from ..simulate.imposed_response import imposable
 from ..units import dimension
 from .data.imposed import imposes_motion
 from .data.measurement import Measurement
-from .data.quantities import quantity_of
+from .data.quantities import quantity_of, word_of
 from .prediction.sensed import OUTPUT_COLUMNS
 from .shooting.variables import default_free
 from .thresholds import ON_SAMPLE, SEGMENT_SAMPLES
@@ -155,6 +155,7 @@ def check_quantities(model, records) -> None:
     block = model.parts.block if closed else model
     if not isinstance(block, Mechanism):
         return  # nothing is known of its signals
+    _check_motions(records)
     if isinstance(block, Massless) or any(imposes_motion(r) for r in records):
         return _check_imposed(block, records, closed)
     given = block.signals
@@ -203,6 +204,24 @@ def _driven_by(block: Mechanism) -> str:
     """Return the word for the input of a mechanism."""
     quantity = quantity_of(block.signals[block.input_labels[0]])
     return block.coordinates.force if quantity == "force" else quantity
+
+
+def _check_motions(records) -> None:
+    """Check that a motion that is imposed was recorded as a place: laws may know it."""
+    for record in records:
+        given = quantity_of(record.input_unit)
+        if quantity_of(record.output_unit) == "force" and given in _INTEGRALS:
+            place = "rad" if "rad" in record.input_unit else "m"
+            raise ValueError(
+                f"record {record.name!r} has an imposed {given} [{record.input_unit}] as input and the "
+                f"{word_of(record.output_unit)} that it took as output; a motion is imposed as a position. "
+                f"{_INTEGRALS[given]} (scipy.integrate.cumulative_trapezoid(u, t, initial=0)), without the "
+                f'drift of an offset, and give that as u with input_unit="{place}"; a velocity that was '
+                "measured goes along as velocity=."
+            )
+
+
+_INTEGRALS: Mapping[str, str] = {"velocity": "Integrate it once", "acceleration": "Integrate it twice"}
 
 
 def _check_imposed(block, records, closed) -> None:

@@ -128,35 +128,48 @@ def check_output(owner: str, y: np.ndarray) -> None:
 
 def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
     """Check that a measured place does not leap."""
-    found = leaps(x)
+    found = leaps(t, x)
     if len(found):
         i = int(found[0])
         raise ValueError(
             f"{owner} needs a position without leaps; it has {len(found)}, the first from {x[i]:.6g} to "
-            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Was the encoder reset? Give the parts as "
-            "separate records: Measurement.in_parts (an angle that wraps: np.unwrap first)."
+            f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s, which the velocities before and after do not make. Was "
+            "the encoder reset? Give the parts as separate records: Measurement.in_parts (an angle that "
+            "wraps: np.unwrap first)."
         )
 
 
-def leaps(x: np.ndarray) -> np.ndarray:
+def leaps(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return the samples after which a place leaps, as it does where an encoder is reset or an angle wraps.
 
-    A leap is a step between two samples that is far larger than those around it, than any other in the
-    record, and than noise and rounding: no machine is that fast for one sample alone.
+    Between two samples a machine moves at a velocity between those before and after, impacts included, but
+    for what its acceleration may add. A leap is farther by far: than what the accelerations around it would
+    add, than what any other of the record would, and than noise and rounding.
     """
-    steps = np.abs(np.diff(x))
-    around = np.zeros(len(steps))
-    for lag in range(1, BESIDE + 1):
-        around[lag:] = np.maximum(around[lag:], steps[:-lag])
-        around[:-lag] = np.maximum(around[:-lag], steps[lag:])
+    steps = np.diff(x)
     seen = LEAP * max(step_of(x), grain(x))
-    alone = steps > np.maximum(LEAP * around, seen)
-    found = np.flatnonzero(alone & (steps > FAST * np.max(steps[~alone], initial=0.0)))
+    # by the clock, and by the count of samples: a clock may be read late
+    found = np.flatnonzero(_thrown(steps, np.diff(t), seen) & _thrown(steps, np.ones(len(steps)), seen))
     jumps = np.zeros(len(steps))
-    jumps[found] = np.diff(x)[found]
+    jumps[found] = steps[found]
     between = np.ptp(x[1:] - np.cumsum(jumps))
     # A coarse sensor that rounds moves by its steps alone: nothing is seen between them, or, where noise
     # comes after it, less than half a step. After a reset the next one leaps by what the machine moved.
-    if len(found) > SINGLE and between < 0.5 * np.min(steps[found]):
+    if len(found) > SINGLE and between < 0.5 * np.min(np.abs(steps[found])):
         return found[:0]
-    return found[np.minimum(steps[found], seen) < between]
+    return found[np.minimum(np.abs(steps[found]), seen) < between]
+
+
+def _thrown(steps, dt, seen) -> np.ndarray:
+    """Return which steps of a place, over these times, go beyond the velocities to either side by far."""
+    v = steps / dt
+    before, after = np.concatenate([[-v[1]], v[:-1]]), np.concatenate([v[1:], [-v[-2]]])
+    beyond = np.maximum(v - np.maximum(before, after), np.minimum(before, after) - v)
+    a = np.abs(np.diff(v)) * 2 / (dt[1:] + dt[:-1])
+    around = np.zeros(len(v))
+    for lag in range(1, BESIDE + 1):  # accelerations without the step itself
+        around[lag + 1 :] = np.maximum(around[lag + 1 :], a[: len(a) - lag])
+        around[: -lag - 1] = np.maximum(around[: -lag - 1], a[lag:])
+    alone = beyond * dt > np.maximum(LEAP * around * dt**2, seen)
+    others = a[~(alone[1:] | alone[:-1])]
+    return alone & (beyond > FAST * np.max(others, initial=0.0) * dt)

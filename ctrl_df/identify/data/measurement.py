@@ -19,7 +19,7 @@ from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
-from .thresholds import MINIMUM, REGULAR
+from .thresholds import MINIMUM, REGULAR, THINNED_BAND
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
 
@@ -68,6 +68,8 @@ class Measurement:
         or the first. `velocity` is not fitted: drives compute it from the position.
     units : mapping
         SI unit of each output, by quantity.
+    band : float
+        Share of the Nyquist frequency that the outputs fill: 1, or less where the record was decimated.
     note : str
         How the record was read if it was changed on reading; otherwise empty.
 
@@ -102,6 +104,7 @@ class Measurement:
     outputs: Mapping[str, Any] | None = None
     units: Mapping[str, str] = field(init=False)
     note: str = field(init=False, default="")
+    band: float = field(init=False, default=1.0)
 
     def __post_init__(self):
         choice("Measurement", "input_hold", self.input_hold, HOLDS)
@@ -449,8 +452,9 @@ class Measurement:
         held = self.input_hold == "zoh"
         u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
         return self.replaced(
-            t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels)
-        )
+            t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels),
+            band=THINNED_BAND,
+        )  # fmt: skip
 
     def _part(self, where, name):
         channels = MappingProxyType({k: v[where] for k, v in self.channels.items()})  # type: ignore[union-attr]

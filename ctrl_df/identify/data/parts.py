@@ -109,7 +109,7 @@ def _spans(t, there, places) -> list[slice]:
     regular = [r for run in runs for r in _cut(run, lambda i: _after(holes(t[i]), i))]
 
     def leap(i):
-        return np.logical_or.reduce([_after(leaps(x[i]), i) for x in places] or [False])
+        return np.logical_or.reduce([_after(leaps(t[i], x[i]), i) for x in places] or [False])
 
     parts = [r for run in regular for r in _cut(run, leap)]
     return [slice(int(i[0]), int(i[-1]) + 1) for i in parts]

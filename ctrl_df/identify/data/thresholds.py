@@ -7,8 +7,10 @@ from __future__ import annotations
 MINIMUM = 10
 """Samples of a record at least: fewer have no derivatives."""
 
-BESIDE, LEAP, FAST = 5, 20.0, 5.0
-"""Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
+BESIDE, LEAP, FAST = 5, 10.0, 5.0
+"""Samples to either side whose accelerations a leap stands out from, how far, and how far from all others of
+the record: the largest of ten second differences of white noise is four to six of its deviations, so that a
+leap of a hundred of them is seen wherever it is, and noise never makes one."""
 
 SINGLE = 2
 """Leaps up to which none is a step of a coarse sensor: there and back again is no motion."""

@@ -91,7 +91,7 @@ class TimeDataset(Dataset):
         comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
             self.block_of(found.model), found.standard_errors, found.at_bound, blurred(found), doubts(found),
-            found.covariance, comparison, found.converged, found.nfev, found.own,
+            found.whole_covariance, comparison, found.converged, found.nfev, found.own,
         )  # fmt: skip
 
     def _tells_references(self) -> bool:

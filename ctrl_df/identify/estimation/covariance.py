@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtr, stdtrit
 
 from ..shooting.multiple_shooting import Solution, Stage
-from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOTHING
+from ..thresholds import DEPENDENT, NOTHING
 from .noise_spectrum import noise_spectrum
 from .sensitivity import OutputSensitivity
 from .thresholds import FREEDOM_MOST, MANY_SEGMENTS, NOISE_LEAST, UNDETERMINED
@@ -26,6 +26,7 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     Returns
     -------
     covariance : (p, p) array
+        Within the directions that the data determine; positive semidefinite.
     null : list of (float, (p,) array)
         Relative singular value and direction in scaled parameters.
 
@@ -45,31 +46,41 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     size[size <= DEPENDENT * max(float(size.max()), NOTHING)] = 1.0
     eigen, vectors = np.linalg.eigh(h / np.outer(size, size))
     top = max(float(eigen[-1]), NOTHING)
+    told = eigen >= UNDETERMINED * top
+    # of what the data leave open they tell less than derivatives err by: only what is stated counts there
+    vectors = vectors / size[:, None]
+    tilted, turn = np.linalg.eigh(error * vectors[:, ~told].T @ np.diag(problem.stated) @ vectors[:, ~told])
+    left, known = vectors[:, ~told] @ turn, tilted > DEPENDENT * max(np.max(tilted, initial=0.0), NOTHING)
     null = [
-        (math.sqrt(max(e, 0.0) / top), v / size / max(float(np.max(np.abs(v / size))), NOTHING))
-        for e, v in zip(eigen, vectors.T, strict=True)
-        if e < UNDETERMINED * top
+        (math.sqrt(max(e, 0.0) / top), v / max(float(np.max(np.abs(v))), NOTHING))
+        for e, v in zip(tilted[~known], left[:, ~known].T, strict=True)
     ]
-    root = vectors / np.sqrt(np.maximum(eigen, NEARLY_NOTHING * top)) / size[:, None]
-    inverse = root @ root.T
-    middle, variances = error**2 * np.diag(problem.stated), [(np.zeros(len(h)), np.zeros(len(h)))]
+    # the information is (root root')^-1 over what is determined: all that follows is a product of factors
+    eigen = np.concatenate([eigen[told], tilted[known]])
+    root = np.column_stack([vectors[:, told], left[:, known]]) / np.sqrt(eigen)
+    middle = error**2 * root.T @ np.diag(problem.stated) @ root
+    variances = [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):
-        e, columns, segments = stage.weighed(k, e), sensitivity.parameters[k], stage.segments[k]
+        e, columns, segments = stage.weighed(k, e), sensitivity.parameters[k] @ root, stage.segments[k]
         if problem.error_filter is None and len(segments) >= MANY_SEGMENTS:
             scores = np.array([columns[w].T @ e[w] for w in segments.places])
             middle += _long_run(scores)
             continue
         floor = NOISE_LEAST * (problem.noise**2 if problem.error_filter is None else float(np.mean(e * e)))
-        absorbed = np.column_stack((columns @ root, sensitivity.absorbed_by_starts(k)))
+        absorbed = np.column_stack((columns, sensitivity.absorbed_by_starts(k)))
         for block in segments.blocks if problem.error_filter is None else [slice(0, len(e))]:
             noise = noise_spectrum(e[block], absorbed[block], floor)
             middle += noise.product(columns[block])
-            variances.append(noise.variances(columns[block] @ inverse))
+            variances.append(noise.variances(columns[block] @ root.T))
     wide = _widening(*np.sum(variances, axis=0))
-    covariance = inverse @ middle @ inverse * np.outer(wide, wide)
-    lost = np.flatnonzero(np.diag(covariance) <= 0) if null else ()  # by rounding, where nothing is told
-    covariance[lost, lost] = math.inf
-    return covariance, null
+    factor = wide[:, None] * root @ _factor(middle)
+    return factor @ factor.T, null
+
+
+def _factor(matrix) -> np.ndarray:
+    """Return f with f f' the positive semidefinite matrix that is closest to a symmetric one."""
+    eigen, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    return vectors * np.sqrt(np.maximum(eigen, 0.0))
 
 
 def _widening(variances, errors) -> np.ndarray:

@@ -46,7 +46,7 @@ class FitResult:
         The free parameters. Of those that every record has for itself (`PerRecord`) what follows is of their
         mean over the records, weighted by one over the variance where that is known.
     covariance : (p, p) array
-        Of `values`, for residuals of the colour seen.
+        Of `values`, for residuals of the colour seen, within the directions that the data determine.
     residual, simulated : list of (n,) array
         Per record, measured minus simulated.
     count : int
@@ -168,7 +168,8 @@ class FitResult:
             i = self.names.index(name)
             covariance[i, :] = covariance[:, i] = 0.0
             covariance[i, i] = error**2
-        return replace(self, covariance=covariance)
+        null = [(size, [part for part in parts if part[0] not in errors]) for size, parts in self.null]
+        return replace(self, covariance=covariance, null=[(size, parts) for size, parts in null if parts])
 
     @property
     def segment_of(self) -> list[np.ndarray]:
@@ -194,10 +195,20 @@ class FitResult:
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Standard errors by name."""
-        return dict(
-            zip(self.names, map(float, np.sqrt(np.maximum(np.diag(self.covariance), 0))), strict=True)
-        )
+        """Standard errors by name; infinite where the data do not determine a parameter."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.whole_covariance)).tolist(), strict=True))
+
+    @property
+    def whole_covariance(self) -> np.ndarray:
+        """The covariance, infinite and by itself for parameters that take part in a null direction."""
+        if not len(self.covariance):
+            return self.covariance
+        found = self.covariance.copy()
+        part = {name for _, parts in self.null for name, _, _ in parts if name not in self.own}
+        lost = np.array([name in part for name in self.names])
+        found[lost], found[:, lost] = 0.0, 0.0
+        found[lost, lost] = math.inf
+        return found
 
 
 def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:

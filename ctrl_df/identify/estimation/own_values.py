@@ -42,6 +42,7 @@ def own_values(problem: Problem, named, covariance, null, at_bound, scale) -> di
     unknown = np.full(len(scale), math.nan)
     errors = np.sqrt(np.maximum(np.diag(covariance), 0)) if len(covariance) else unknown
     open_ = _open(null, len(scale))
+    errors = np.where(open_, math.inf, errors)
     found: dict[str, dict[str, OwnValue]] = {k: {} for k in problem.names if isinstance(named[k], PerRecord)}
     for k, record in enumerate(problem.records):
         for name, i in zip(problem.names, problem.of_record[k], strict=True):

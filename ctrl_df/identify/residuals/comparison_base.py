@@ -44,9 +44,14 @@ class ComparisonBase(Brief):
         raise NotImplementedError
 
     @property
+    def stands_out(self) -> Any:
+        """Regions that text, table and picture show."""
+        return self.where
+
+    @property
     def places(self) -> tuple[str, ...]:
         """Where the error is, in sentences; of a model that misses the motion itself, that it does."""
-        where, error = self.where, self.worst.nrmse
+        where, error = self.stands_out, self.worst.nrmse
         if not where.significant and error > UNMOVED:
             return (
                 f"The model misses the motion as a whole: it errs by {error:.0%} of the measured, in "

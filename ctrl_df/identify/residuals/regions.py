@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -61,7 +62,7 @@ class Region:
     def __repr__(self) -> str:
         return (
             f"<Region {self.kind}, {self.label}: {self.share:.1%} of the squared error, expected "
-            f"{self.expected_share:.1%}, p {_p(self.p_value)}>"
+            f"{self.expected_share:.1%}, p {chance(self.p_value)}>"
         )
 
     @property
@@ -73,10 +74,13 @@ class Region:
 class Regions(tuple[Region, ...]):
     """Regions, worst first."""
 
+    heading: ClassVar[str] = "where the error is"
+    measure: ClassVar[str] = "share of squared error [%]\n(black: of the samples)"
+
     @property
     def significant(self) -> Regions:
         """Those whose share of the error is beyond chance (p < 0.01)."""
-        return Regions(r for r in self if r.p_value < LEVEL)
+        return type(self)(r for r in self if r.p_value < LEVEL)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -101,7 +105,7 @@ class Regions(tuple[Region, ...]):
         lines = [f"{'kind':<15} {'region':<34} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"]
         for r in self[:rows]:
             lines.append(
-                f"{r.kind:<15} {r.label:<34} {r.share:>7.1%} {r.expected_share:>8.1%} {_p(r.p_value):>8} "
+                f"{r.kind:<15} {r.label:<34} {r.share:>7.1%} {r.expected_share:>8.1%} {chance(r.p_value):>8} "
                 f"{r.bias:>+6.2f}"
             )
         return "\n".join(lines)
@@ -350,8 +354,8 @@ def _sentence(region: Region, words: dict[str, str]) -> str:
         f"{region.share:.0%} of the squared error lies in {place}, against {region.expected_share:.0%} {of}"
     )
     if region.p_value >= LEVEL:
-        return f"{text}: no more than chance (p = {_p(region.p_value)})."
-    text += f" (p {_p(region.p_value)})"
+        return f"{text}: no more than chance (p = {chance(region.p_value)})."
+    text += f" (p {chance(region.p_value)})"
     if region.bias_p_value < LEVEL:
         side = "above" if region.bias > 0 else "below"
         text += (
@@ -360,7 +364,8 @@ def _sentence(region: Region, words: dict[str, str]) -> str:
     return text + "."
 
 
-def _p(p: float) -> str:
+def chance(p: float) -> str:
+    """Return a probability for a table."""
     return "< 1e-6" if p < SMALLEST_P else f"{p:.2g}"
 
 

@@ -72,7 +72,9 @@ class Whiteness:
         return self.white
 
 
-def whiteness(residual, lags: int | None = None, *, fitted: int = 0, alpha: float = 0.01) -> Whiteness:
+def whiteness(
+    residual, lags: int | None = None, *, fitted: int = 0, alpha: float = 0.01, band: float = 1.0
+) -> Whiteness:
     """Test whether a residual is white noise.
 
     Parameters
@@ -86,14 +88,20 @@ def whiteness(residual, lags: int | None = None, *, fitted: int = 0, alpha: floa
         of an output-error model, which take next to none.
     alpha : float
         Level of the test.
+    band : float
+        Share of the Nyquist frequency that the signal fills: below it, noise may be white or not. The test is
+        of as many samples as that takes.
 
     References
     ----------
     Ljung & Box (1978), eq. (1.3).
     """
+    from scipy.signal import resample
     from scipy.stats import chi2
 
     r = _series(residual)
+    if band < 1.0:
+        r = np.asarray(resample(r, int(band * len(r))))
     n = len(r)
     lags = min(WHITENESS_LAGS, max(n // 5, 1)) if lags is None else int(lags)
     if not 0 < lags < n or fitted >= lags:

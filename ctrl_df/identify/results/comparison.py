@@ -118,7 +118,7 @@ class RecordComparison(Brief):
         """Test of the residual for whiteness; of several outputs that which passes least."""
         if len(self.by_output) > 1:
             return min((r.white for r in self.by_output.values()), key=lambda w: w.p_value)
-        return whiteness(self.residual)
+        return whiteness(self.residual, band=self.record.band)
 
     @cached_property
     def input_test(self) -> InputTest | None:
@@ -148,6 +148,19 @@ class RecordComparison(Brief):
             force=known.load[kept],
             units=known.units,
         )
+
+    @cached_property
+    def stands_out(self) -> Regions:
+        """What text, table and picture show: where the error is; where it is nowhere, what force is missing.
+
+        A force over the position errs by as much everywhere: no region shows it, its curve does.
+        """
+        if self.where.significant or self.white:
+            return self.where
+        try:
+            return self.missing_force.regions or self.where
+        except (TypeError, ValueError, ArithmeticError):  # nobody knows where a force acts, or what it was
+            return self.where
 
     def _acceleration_error(self) -> tuple[np.ndarray, slice]:
         """Return the error of the acceleration, low-passed, and the samples at which it holds.
@@ -227,6 +240,11 @@ class Comparison(ComparisonBase):
         return self.worst.where
 
     @property
+    def stands_out(self) -> Regions:
+        """What text, table and picture of the worst record show; see `RecordComparison.stands_out`."""
+        return self.worst.stands_out
+
+    @property
     def missing_force(self) -> MissingForce:
         """The force that would have to be added for the model to follow the worst record."""
         return self.worst.missing_force
@@ -271,8 +289,8 @@ class Comparison(ComparisonBase):
             else:
                 so = "The residual is neither white nor a linear response to the input"
             lines.append(f"{so} (p{probability(test.p_value)} of no correlation).")
-        if self.where:
-            lines += ["", *self.places[:6], "", self.where.table(8)]
+        if self.stands_out:
+            lines += ["", *self.places[:6], "", self.stands_out.table(8)]
         return "\n".join(lines)
 
     def __str__(self) -> str:

@@ -70,7 +70,8 @@ class Fit:
     comparison : ComparisonBase
         The refitted model beside the records.
     covariance : (p, p) array
-        Of the free parameters, in their order.
+        Of the free parameters, in their order; positive semidefinite. Of those that the data do not determine
+        it is infinite, and zero beside the diagonal.
     unidentifiable : tuple of str
         A sentence for every direction the data do not determine; empty if all is well.
     converged : bool
@@ -135,8 +136,8 @@ class Fit:
     def correlation(self) -> np.ndarray:
         """Correlations of the free parameters, (p, p), in their order; NaN where an error is not known."""
         errors = np.sqrt(np.diag(self.covariance))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self.covariance / np.outer(errors, errors)
+        errors = np.where(np.isfinite(errors) & (errors > 0), errors, np.nan)
+        return np.clip(self.covariance / np.outer(errors, errors), -1.0, 1.0)
 
     def correlated(self, beyond: float = 0.95) -> list[tuple[str, str, float]]:
         """Return pairs of parameters that the data hardly tell apart, the strongest first."""

@@ -172,27 +172,7 @@ class Study(Brief):
 
     def summary(self) -> str:
         """Return the outcome in plain words."""
-        first, last = self.steps[0], self.steps[-1]
-        if self.verdict == NONE:
-            head = (
-                f"Nothing is missing: with refitted parameters the model errs by {percent(first.nrmse)}, "
-                "the noise of these data."
-            )
-        else:
-            added = ", ".join(_words(e) for e in self.effects) or "nothing"
-            held = ""
-            if math.isfinite(first.nrmse_holdout + last.nrmse_holdout):
-                held = (
-                    f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
-                )
-            head = (
-                f"Added: {added}. The error falls from {percent(first.nrmse)} to {percent(last.nrmse)}{held} "
-                f"(noise {percent(self.noise)})."
-            )
-        if self.verdict == UNKNOWN and last.diagnosis is not None:
-            d = last.diagnosis
-            left = f"Something outside the library is missing. {d.remains}" if d.remains else d.explanation
-            head += " " + left
+        head = self._outcome()
         if self.status != COMPLETE:
             head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
         told = [line for line in (which_errors(self.measure),) if line]
@@ -202,6 +182,35 @@ class Study(Brief):
         for name, p in self.model.parameters.items():
             lines.append(f"  {name:<30} {p.value:>12.6g} {p.unit}")
         return "\n".join(lines)
+
+    def _outcome(self) -> str:
+        first, last = self.steps[0], self.steps[-1]
+        if self.verdict == NONE:
+            return (
+                f"Nothing is missing: with refitted parameters the model errs by {percent(first.nrmse)}, "
+                "the noise of these data."
+            )
+        far, told = ("", last.diagnosis) if self.status == COMPLETE else (" so far", None)
+        held = math.isfinite(first.nrmse_holdout + last.nrmse_holdout)
+        if self.effects:
+            on = f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
+            head = (
+                f"Added{far}: {', '.join(map(_words, self.effects))}. The error falls from "
+                f"{percent(first.nrmse)} to {percent(last.nrmse)}{on if held else ''} "
+                f"(noise {percent(self.noise)})."
+            )
+        else:
+            on = f"held out {percent(last.nrmse_holdout)}, " if held else ""
+            head = (
+                f"Nothing is added{far}: with refitted parameters the model errs by {percent(last.nrmse)} "
+                f"({on}noise {percent(self.noise)})."
+            )
+        if self.verdict == UNKNOWN and told is not None:
+            left = f"Something outside the library is missing. {told.remains}"
+            head += f" {left if told.remains else told.explanation}"
+        elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
+            head += f" {last.diagnosis.explanation}"
+        return head
 
     def plot(self, **keywords):
         """Draw the error of every step beside the noise; returns a ``ct.ControlPlot``."""

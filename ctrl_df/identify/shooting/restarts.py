@@ -46,7 +46,8 @@ def restarted_segments(stage, found):
         column, segments, starts = simulator.nuisances.index("v"), stage.segments[k], all_starts[k]
         values = problem.values(found.theta, k)
         rms = np.sqrt(segments.means(found.residual[k] ** 2))
-        bad = (rms > OUTLYING_SEGMENT * np.quantile(rms, GOOD)) & (rms > OUTLYING_NOISE * problem.noise)
+        usual = OUTLYING_SEGMENT * np.quantile(rms, GOOD) if _comparable(problem, segments) else 0.0
+        bad = rms > max(usual, OUTLYING_NOISE * problem.noise)
         if not bad.any():
             continue
         some = segments.only(bad)
@@ -81,6 +82,11 @@ def restarted_segments(stage, found):
         starts[bad] = chosen
         problem.count(len(tries) * len(some) / len(segments))
     return States(all_starts, all_reach), better_found
+
+
+def _comparable(problem, segments) -> bool:
+    """Return whether segments tell which of them err: a free run alone, of a wrong model, says nothing."""
+    return bool(problem.names) or not problem.followed or GOOD * len(segments) >= 1
 
 
 def _ends(stage, theta, k, some, trials, powers):

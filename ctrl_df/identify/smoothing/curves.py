@@ -26,6 +26,8 @@ class Curve:
         Quantity and force of every instant.
     share : float
         Of the variance that the regressors leave, how much the curve explains, 0 to 1.
+    p_value : float
+        Probability of a share as large by chance.
     """
 
     at: np.ndarray
@@ -33,9 +35,22 @@ class Curve:
     std: np.ndarray
     points: np.ndarray
     share: float
+    p_value: float = 1.0
 
 
-def curve_over(values, force, std, own, known) -> Curve:
+def known_to_make(force, std, own, known) -> tuple[float, float]:
+    """Return the share of a force's square that own regressors make, and that which a constant adds."""
+    root, use = 1.0 / std[known], known
+    y, columns = force[use] * root, _weighed(own[use], root)
+    whole = max(float(y @ y), NOTHING)
+    left = []
+    for regressors in (columns, np.column_stack([columns, root])):
+        rest = y - regressors @ np.linalg.lstsq(regressors, y, rcond=DEPENDENT)[0]
+        left.append(float(rest @ rest) / whole)
+    return 1.0 - left[0], left[0] - left[1]
+
+
+def curve_over(values, force, std, own, beside, known) -> Curve:
     """Fit a force by a step curve over a quantity and by the model's own parameters together.
 
     Parameters
@@ -43,18 +58,21 @@ def curve_over(values, force, std, own, known) -> Curve:
     values, force, std : (n,) arrays
         Quantity, force and its standard deviation.
     own : (n, p) array
-        Regressors of the model's own parameters.
+        Regressors of the model's own parameters: what they do alone is no share of a curve.
+    beside : (n, q) array
+        Those of them that a curve over this quantity can be told from.
     known : (n,) bool array
         Which instants count.
     """
+    from scipy.stats import f as f_distribution
+
     use = np.flatnonzero(known & np.isfinite(values))
     none = np.zeros(0)
     if len(use) < 2 * CURVE_LEAST:
         return Curve(none, none, none, np.zeros((2, 0)), 0.0)
     order = np.argsort(values[use], kind="stable")
     root = 1.0 / std[use]
-    scale = np.linalg.norm(own[use], axis=0)
-    rest = own[use][:, scale > 0] / scale[scale > 0] * root[:, None]
+    rest = _weighed(beside[use], root)
     y, count, together = force[use] * root, CURVE_BINS, 1.0
     bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
     # what neither explains tells how many instants know the same, and so how many bins can be told apart
@@ -67,17 +85,26 @@ def curve_over(values, force, std, own, known) -> Curve:
         together = _together(left)
         count = int(np.clip(len(use) / together / CURVE_ALONE, CURVE_LEAST, count))
     count = int(bins.max()) + 1
-    alone = np.column_stack([rest, root])
+    alone = np.column_stack([_weighed(own[use], root), root])
     before = y - alone @ np.linalg.lstsq(alone, y, rcond=DEPENDENT)[0]
     free = max(len(use) / together, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
-    share = 1.0 - float(left @ left) / free[1] / max(float(before @ before) / free[0], NOTHING)
+    power = np.array([before @ before, left @ left])
+    share = 1.0 - power[1] / free[1] / max(power[0] / free[0], NOTHING)
+    more = max(both.shape[1] - alone.shape[1], 1)
+    ratio = (power[0] - power[1]) / more / max(power[1] / free[1], NOTHING)
     partial = (y - rest @ fit[: rest.shape[1]]) / root
     weight = root**2
     total = np.bincount(bins, weight, count)
     at = np.bincount(bins, weight * values[use], count) / total
     mean = np.bincount(bins, weight * partial, count) / total
     error = np.sqrt(together / total)
-    return Curve(at, mean, error, np.array([values[use], partial]), float(np.clip(share, 0.0, 1.0)))
+    share, p_value = float(np.clip(share, 0.0, 1.0)), float(f_distribution.sf(ratio, more, free[1]))
+    return Curve(at, mean, error, np.array([values[use], partial]), share, p_value)
+
+
+def _weighed(columns, root) -> np.ndarray:
+    scale = np.linalg.norm(columns, axis=0)
+    return columns[:, scale > 0] / scale[scale > 0] * root[:, None]
 
 
 def _together(d) -> float:

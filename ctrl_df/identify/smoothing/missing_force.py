@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,22 +14,38 @@ from ...blocks.mechanism import Mechanism
 from ...cached import cached_property
 from ...checks import choice
 from ...drawing import draw
+from ...numerals import digits
 from ..data.measurement import Measurement
 from ..prediction.prepared import REFERENCE
 from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
+from ..residuals.regions import Region, Regions, chance
 from ..shooting.variables import default_free
-from ..thresholds import SLOWLY
-from .curves import Curve, curve_over
+from ..thresholds import BY_CHANCE, DEPENDENT, LEVEL, NOTHING, SLOWLY
+from .curves import Curve, curve_over, known_to_make
 from .smoother import smooth_record
-from .thresholds import FORCE_KNOWN, PARAMETER_NUDGE
+from .thresholds import FORCE_KNOWN, MADE_LEAST, PARAMETER_NUDGE
 
 _WORDS = {
     "force": "force", "time": "time", "position": "position", "velocity": "velocity",
     "load": "force recorded", "reversal": "distance since the last reversal",
 }  # fmt: skip
 AGAINST = ("time", "position", "velocity", "load", "reversal")
+
+
+class Curves(Regions):
+    """What a missing force is made of, as regions: curves over quantities, and what the model could do."""
+
+    heading: ClassVar[str] = "what the missing force is"
+    measure: ClassVar[str] = "share of its square [%]"
+
+    def table(self, rows: int = 12) -> str:
+        """Return the largest `rows` shares as text."""
+        lines = [f"{'what the missing force is':<52} {'share':>6} {'p':>8}"]
+        for r in self[:rows]:
+            lines.append(f"{f'{r.kind} {r.label}':<52} {r.share:>6.1%} {chance(r.p_value):>8}")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +55,11 @@ class MissingForce:
     Attributes
     ----------
     time : (n,) array
-        [s].
+        [s]; of a record of many samples every few of them, in the middle between two.
     force, std : (n,) array
         The force (a torque, of machines that turn) and its standard deviation [`unit`]. Where the machine
-        sticks nothing is known of it, and the standard deviation says so.
+        sticks nothing is known of it, and the standard deviation says so. A force may change as roughly as
+        the record allows: one that is smooth is known to half of that.
     quantities : mapping
         position, velocity, load (the force recorded; under an imposed motion the model's) and reversal
         (distance moved since the last reversal), (n,) each.
@@ -88,8 +107,79 @@ class MissingForce:
         of friction, one over position a spring or a ripple, one over the distance since the last reversal
         presliding or a gap.
         """
-        found = {name: self._over(name).share for name in self.quantities}
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+        return {name: curve.share for name, curve in self._curves.items()}
+
+    @cached_property
+    def _curves(self) -> dict[str, Curve]:
+        found = {name: self._over(name) for name in AGAINST}
+        return dict(sorted(found.items(), key=lambda item: -item[1].share))
+
+    @property
+    def significant(self) -> bool:
+        """Whether it is beyond its uncertainty anywhere: by three standard deviations."""
+        return bool(np.any(self.known & (np.abs(self.force) > BY_CHANCE * self.std)))
+
+    @property
+    def rms(self) -> float:
+        """Rms over the record [`unit`]."""
+        return float(np.sqrt(np.mean(self.force**2)))
+
+    @cached_property
+    def made(self) -> tuple[float, float]:
+        """Share of its square that other values of the model's own parameters make; that a constant adds."""
+        return known_to_make(self.force, self.std, self.own, self.known)
+
+    @property
+    def _left(self) -> bool:
+        """Whether parameters and a constant leave anything to be a curve."""
+        return sum(self.made) < 1.0 - MADE_LEAST
+
+    @cached_property
+    def regions(self) -> Curves:
+        """What it is a curve over, as regions of an error are told; none where it is not significant."""
+        if not self.significant:
+            return Curves()
+        words, (own, constant) = self.words, self.made
+        size = f"the missing {words['force']} ({digits(self.rms)} {self.unit} rms)"
+        told = [
+            (
+                own,
+                "parameters",
+                "of the model",
+                f"of {size} is what other values of the model's parameters make",
+            ),
+            (constant, "constant", words["force"], f"of {size} is a constant {words['force']}"),
+        ]
+        found = [
+            Region(
+                kind,
+                label,
+                share,
+                0.0,
+                float(share < MADE_LEAST),
+                0.0,
+                1.0,
+                (-inf, inf),
+                f"{share:.0%} {said}.",
+            )
+            for share, kind, label, said in told
+        ]
+        rest = f"of what parameters leave of {size} is a curve over the"
+        for name, curve in self._curves.items() if self._left else ():
+            found.append(
+                Region(
+                    "curve",
+                    f"over the {words[name]}",
+                    curve.share,
+                    0.0,
+                    curve.p_value,
+                    0.0,
+                    1.0,
+                    (-inf, inf),
+                    f"{curve.share:.0%} {rest} {words[name]}.",
+                )  # fmt: skip
+            )
+        return Curves(sorted(found, key=lambda region: (region.p_value >= LEVEL, -region.share)))
 
     def curve(self, against: str) -> Curve:
         """Return the force as a curve over a quantity, what the model's own parameters could do left aside.
@@ -104,9 +194,23 @@ class MissingForce:
 
     def _over(self, against) -> Curve:
         signs = np.sign(self.quantities["velocity"]) if against == "reversal" else np.ones(len(self.time))
+        own, beside = self.own, self._at_scale if against == "load" else self.own
+        values = {"time": self.time, **self.quantities}[against]
         return curve_over(
-            self.quantities[against], self.force * signs, self.std, self.own * signs[:, None], self.known
-        )
+            values, self.force * signs, self.std, own * signs[:, None],
+            beside * signs[:, None], self.known,
+        )  # fmt: skip
+
+    @cached_property
+    def _at_scale(self) -> np.ndarray:
+        """The model's own parameters, their common scale held, (n, p).
+
+        All of them larger by a factor, and a force in proportion to the load, would be any force there is.
+        """
+        own = self.own / np.maximum(np.linalg.norm(self.own, axis=0), NOTHING)
+        scale = np.linalg.lstsq(own, self.force + self.quantities["load"], rcond=DEPENDENT)[0]
+        scale /= max(float(np.linalg.norm(scale)), NOTHING)
+        return own - np.outer(own @ scale, scale)
 
     def plot(self, against: str = "time", **keywords):
         """Draw it over time, or as points and a curve over another quantity; returns a ``ct.ControlPlot``.
@@ -119,19 +223,32 @@ class MissingForce:
         return draw("missing force", self, against=against, **keywords)
 
     def summary(self) -> str:
-        """Return one or two sentences: how large it is, and what it is a curve over."""
-        rms = float(np.sqrt(np.mean(self.force**2)))
-        first = (
-            f"Missing beside {self.name!r}: {rms:.3g} {self.unit} rms, known to "
-            f"{float(np.median(self.std)):.2g} {self.unit} (median)."
+        """Return in sentences how large it is, how well it is known, and what it is a curve over."""
+        words, load = self.words, float(np.sqrt(np.mean(self.quantities["load"] ** 2)))
+        size = (
+            f"{digits(self.rms)} {self.unit} rms, standard deviation {digits(np.median(self.std), 2)} "
+            f"{self.unit} (median); the {words['load']} is {digits(load)} {self.unit} rms"
         )
-        if not np.any(self.known):
-            return first + " Nowhere is it larger than what the record leaves open."
-        best, share = next(iter(self.shares.items()))
-        return first + f" {100 * share:.0f} % of it is a curve over the {self.words[best]}."
+        if not self.significant:
+            return (
+                f"No missing {words['force']} is seen beside {self.name!r}: nowhere beyond three standard "
+                f"deviations ({size})."
+            )
+        own, constant = self.made
+        curves = [
+            f"{share:.0%} over the {words[name]}"
+            for name, share in self.shares.items()
+            if self._left and share >= MADE_LEAST
+        ]
+        rest = f" Of the rest, as a curve: {', '.join(curves)}." if curves else ""
+        return (
+            f"Missing {words['force']} beside {self.name!r}: {size}. Other values of the model's parameters "
+            f"make {own:.0%} of its square, a constant {words['force']} {constant:.0%}.{rest}"
+        )
 
     def __repr__(self) -> str:
-        return f"<MissingForce: {self.summary()}>"
+        seen = next((f"{r.share:.0%} {r.kind} {r.label}" for r in self.regions), "not significant")
+        return f"<MissingForce {self.name}: {digits(self.rms)} {self.unit} rms, {seen}>"
 
 
 def missing_force(model, record: Measurement) -> MissingForce:

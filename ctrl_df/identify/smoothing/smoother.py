@@ -45,11 +45,11 @@ class Smoothed:
 
     Attributes
     ----------
-    time : (N + 1,) array
-        [s].
-    states, force, std : (N + 1, n), (N + 1,), (N + 1,) arrays
-        States of the block, the force missing and its standard deviation [N].
-    own : (N + 1, p) array
+    time : (N,) array
+        Middles of the steps [s]: a force that acts over a whole step is the one of its middle.
+    states, force, std : (N, n), (N,), (N,) arrays
+        There, the states of the block, the force missing and its standard deviation [N].
+    own : (N, p) array
         Force that a small change of each of the block's parameters makes, over that change.
     size, memory, noise : float
         Standard deviation [N] and correlation time [s] of the process, and of the sensor's noise.
@@ -92,10 +92,14 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
         if turn > 1 and moved < SMOOTHER_STILL:
             break
     return Smoothed(
-        steps.times, mean[:, :-1] * scale[:-1], mean[:, -1] * scale[-1],
-        np.sqrt(cov[:, -1, -1]) * scale[-1], steps.own(mean * scale), math.exp(sizes[0]) * scale[-1],
+        _middles(steps.times), _middles(mean[:, :-1] * scale[:-1]), mean[:-1, -1] * scale[-1],
+        np.sqrt(cov[:-1, -1, -1]) * scale[-1], steps.own(mean * scale), math.exp(sizes[0]) * scale[-1],
         math.exp(sizes[1]), math.exp(sizes[2]), evidence,
     )  # fmt: skip
+
+
+def _middles(at_edges) -> np.ndarray:
+    return 0.5 * (at_edges[1:] + at_edges[:-1])
 
 
 def _leak(steps: Steps, known, scale) -> np.ndarray:
@@ -156,6 +160,10 @@ class _Told:
         keep = np.exp(-self.dt / memory)
         a, q = self.a.copy(), self.q.copy()
         a[:, -1, -1], q[:, -1, -1] = keep, size**2 * -np.expm1(-2 * self.dt / memory)
+        # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
+        apart = size**2 * -np.expm1(-self.dt / (6 * memory))
+        pushed = a[:, :-1, -1]
+        q[:, :-1, :-1] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
         cov0[-1], cov0[:, -1], cov0[-1, -1], mean0[-1] = 0.0, 0.0, size**2, 0.0
         mean, cov, evidence = smoothed(a, self.b, q, info, told, mean0, cov0, back)

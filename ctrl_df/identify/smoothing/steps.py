@@ -16,7 +16,7 @@ from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..prediction import initial_states
 from ..prediction.segments import facts_of
-from ..prediction.sensed import POSITION
+from ..prediction.sensed import POSITION, force_scale
 from ..prediction.simulator import Simulator, most_steps
 from ..thresholds import UNPLACED
 from .thresholds import HELD_BACK, SMOOTHER_NUDGE, SMOOTHER_RTOL
@@ -98,8 +98,8 @@ class Steps:
 
     @property
     def times(self) -> np.ndarray:
-        """Times at which steps begin and the last ends [s], (N + 1,)."""
-        return self.record.t[self.edges]
+        """Times at which steps begin and the last ends [s], (N + 1,): of the states, not of the sensor."""
+        return self.record.t[self.edges] - self.late
 
     def _sensed(self) -> list[np.ndarray]:
         """Return the outputs, each over its own noise, without what sensors of the place add to it.
@@ -171,9 +171,10 @@ class Steps:
         return x[self.edges], v[self.edges], a[self.edges]
 
     def own(self, mean: np.ndarray) -> np.ndarray:
-        """Return what each of the block's parameters would do as a force, per change of it, (N + 1, p).
+        """Return what each of the block's parameters would do as a force per change of it, (N, p), by step.
 
         Each is changed a little, and the force taken that would change the speed of the body driven as much.
+        What scales the force recorded is held: with it and all others any force could be made.
         """
         every, columns = np.arange(len(self)), []
         speed = int(np.flatnonzero(self.free == 2 * self.core.driven + 1)[0])
@@ -188,13 +189,19 @@ class Steps:
         for name in mine:
             value = parameters[name].value
             nudge = SMOOTHER_NUDGE * (abs(value) or pushed)
+            if self._scales(name, value + nudge):
+                continue
             try:
                 moved = self.run(mean[:-1], every, {name: value + nudge})[0][:, speed] - base
             except (ValueError, KeyError):  # taken out of the engine, or bound by another
                 continue
             columns.append(moved / gain / nudge)
-        table = np.array(columns).reshape(len(columns), -1).T
-        return np.vstack([table, table[-1:]])
+        return np.array(columns).reshape(len(columns), len(self)).T
+
+    def _scales(self, name: str, value: float) -> bool:
+        """Return whether this value of a parameter changes the force that a unit of the input makes."""
+        block = self.simulator.block
+        return force_scale(block) != force_scale(block.with_parameters({name: value}))
 
     def run(self, s: np.ndarray, step: np.ndarray, values=None) -> tuple[np.ndarray, np.ndarray]:
         """Run from states s (m, n) over the steps of these numbers (m,), with `values` of parameters.

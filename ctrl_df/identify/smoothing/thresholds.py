@@ -58,3 +58,6 @@ PARAMETER_NUDGE = 1e-4
 
 HELD_BACK = 0.1
 """Share of the largest gain below which a state is moved by no force: it sticks."""
+
+MADE_LEAST = 0.01
+"""Share of a missing force's square that is worth a word: a tenth of its size."""

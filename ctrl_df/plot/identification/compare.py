@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Iterable, Mapping
 
 import control as ct
 import matplotlib.pyplot as plt
@@ -10,7 +11,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from ...blocks.coordinates import moving_in
-from ...checks import known_name
+from ...checks import known_name, shown
 from ...identify.data.quantities import word_of
 from ...identify.prediction.segments import facts
 from ...numerals import digits, probability
@@ -34,8 +35,8 @@ def comparison_plot(
         Which record; None: the one with the largest error.
     output : str or None
         Which of several outputs, by quantity; None: the one that leads.
-    beside : Comparison or sequence of them
-        Of other models with the same records, drawn in the same picture.
+    beside : Comparison, sequence or mapping of them
+        Of other models with the same records, drawn in the same picture; a mapping gives their names.
     labels : sequence of str
         Names of the models: that of `comparison` first.
     title : str or None
@@ -45,7 +46,8 @@ def comparison_plot(
     width : float or None
         Of a new figure [in].
     """
-    others = [beside] if hasattr(beside, "records") else list(beside)
+    others, named = compared("plot", "beside", beside)
+    labels = labels or (["model 1", *named] if named else ())
     index = comparison.records.index(comparison.worst) if record is None else record
     choices = comparison.records[index].by_output
     quantity = known_name("plot", "output", output or next(iter(choices)), choices)
@@ -91,9 +93,24 @@ def comparison_plot(
             for ax in (top, below):
                 ax.axvline(data.t[edge], color="0.85", lw=0.6, zorder=0)
         said = moving_in(facts(data).units[0]).text
-        lines[2] = _regions(bars, chosen.where, rows, said)
+        lines[2] = _regions(bars, chosen.stands_out, rows, said)
         top.tick_params(labelbottom=False)
         return drawn.finished(lines, data.name if title is None else title)
+
+
+def compared(owner: str, name: str, beside) -> tuple[list, list[str]]:
+    """Return comparisons given alone, in a row or by name, and these names."""
+    named = list(beside) if isinstance(beside, Mapping) else []
+    rows = list(beside.values()) if named else [beside]
+    if isinstance(beside, Iterable) and not named:
+        rows = list(beside)
+    for row in rows:
+        if not hasattr(row, "records"):
+            raise TypeError(
+                f"{owner} needs {name} as what compare() returns, several of them, or a mapping of names to "
+                f"them; got {shown(row)}."
+            )
+    return rows, [str(key) for key in named]
 
 
 def _readable(values, unit):
@@ -111,7 +128,7 @@ def _regions(ax, regions, rows, said):
     """Bars: share of the error, filled where beyond chance; ticks: of the samples; `said`: in whose words."""
     significant = regions.significant
     shown = (significant if len(significant) else regions)[:rows][::-1]
-    ax.set_title("where the error is" if len(significant) else "no region stands out")
+    ax.set_title(regions.heading if len(significant) else "no region stands out")
     if not shown:
         ax.set_axis_off()
         return []
@@ -120,8 +137,13 @@ def _regions(ax, regions, rows, said):
     colour = [ERROR if r.p_value < 0.01 else "0.8" for r in shown]
     bars = list(ax.barh(place, share, 0.36, color=colour))
     for i, region in enumerate(shown):
-        expected = 100 * region.expected_share
-        ax.plot([expected, expected], [i - 0.18, i + 0.18], color="black", lw=1.5)
+        ax.vlines(
+            [100 * share for share in [region.expected_share] if share > 0],
+            i - 0.18,
+            i + 0.18,
+            color="black",
+            lw=1.5,
+        )
         words = f"{said(_KINDS.get(region.kind, region.kind.replace('_', ' ')))}: {region.label}"
         words = "\n".join(textwrap.wrap(words, 36))
         ax.annotate(
@@ -131,5 +153,5 @@ def _regions(ax, regions, rows, said):
     ax.set_yticks([])
     ax.set_ylim(min(len(shown), 5) - 5.6, len(shown) - 0.1)  # few bars stay slim, at the top
     ax.set_xlim(0, max(1.25 * max(share), 1.05 * max(100 * r.expected_share for r in shown)))
-    ax.set_xlabel("share of squared error [%]\n(black: of the samples)")
+    ax.set_xlabel(regions.measure)
     return bars
