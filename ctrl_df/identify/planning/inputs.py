@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...numerals import digits
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
@@ -43,20 +44,24 @@ def input_that_separates(
         Two or more.
     names : tuple of str
         What is separated.
-    force, stroke, duration, dt, loop
+    force, stroke : float or None
+        Largest input, and largest distance from the start; None: what the records reached, and twice the
+        stroke of the first.
+    duration, dt, loop
         As for `next_experiment`.
     """
     record = diagnosis.train[0]
-    given, long, strong = diagnosis.limits, place_unit(record), record.input_unit
-    force = float(force or given.get("force") or np.max(np.abs(record.u)))
+    long, strong = place_unit(record), record.input_unit
+    words = moving_in(long)
+    force = float(force or np.max(np.abs(record.u)))
     place = facts(record).place
     centre = float(place[0])
-    reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(place - centre)))
+    reach = float(stroke or 2 * np.max(np.abs(place - centre)))
     duration, dt = float(duration or record.duration), float(dt or record.dt)
     if not (force > 0 and reach > 0 and duration > PLAN_LEAST * dt):
         raise ValueError(
-            f"next_experiment needs force > 0, stroke > 0 and duration > {PLAN_LEAST} dt; got {force}, "
-            f"{reach}, {duration}, {dt}."
+            f"next_experiment needs {words.force} > 0, {words.reach} > 0 and duration > {PLAN_LEAST} dt; got "
+            f"{force}, {reach}, {duration}, {dt}."
         )
     t = dt * np.arange(int(round(duration / dt)))
     play = (
@@ -83,9 +88,9 @@ def input_that_separates(
                 best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
     if best is None:
         raise ValueError(
-            f"every input tried leaves the range of ±{reach:g} {long} (stroke), asks more than {force:g} "
-            f"{strong} or moves nothing. Allow more of either, or give loop= (a closed_loop whose controller "
-            "holds the drive in place)."
+            f"every input tried leaves the range of ±{reach:g} {long} ({words.reach}), asks more than "
+            f"{force:g} {strong} or moves nothing. Allow more of either, or give loop= (a closed_loop whose "
+            "controller holds the drive in place)."
         )
     what = (
         f"{best.kind} of up to {digits(best.force)} {strong}"
