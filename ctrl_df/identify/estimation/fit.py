@@ -381,9 +381,8 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
     core = simulator.block.core if simulator.mechanism else None
     joint = None if core is None or core.coupling is None else core.coupling.effect
     if core is not None and joint is not None:
-        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         stiff = stiffness(joint, simulator.facts.force)
-        first = [min(f, 4 * 2 * math.pi * math.sqrt(mass / max(stiff, NOTHING))) for f in first]
+        first = [min(f, 4 * 2 * math.pi * math.sqrt(core.reduced_mass / max(stiff, NOTHING))) for f in first]
     first = [max(f, SEGMENT_LEAST * facts(r).dt) for f, r in zip(first, records, strict=True)]
     stages: list[list[float | None]] = []
     factor = 1.0

@@ -335,7 +335,7 @@ class Climb:
     def _compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
         """Return the evidence for a model over another on the data of a search, and both errors held out."""
         old, new = (search.fitted(b, self.free(b), 6) for b in (other, block))
-        judged = search.ranked(old, [replace(new, extra=new.extra - old.extra)])[0]
+        judged = search.ranked_over(old, [new])[0]
         return judged.evidence, (search.errors(new)[1], search.errors(old)[1])
 
     # --- what is known --------------------------------------------------------------------------------

@@ -69,8 +69,7 @@ class Around:
 
     def fit(self, trial: Trial) -> None:
         """Fit one to the data that judge the model."""
-        found = self._fitted(trial.structure.block, 8)
-        self.near.append((trial, replace(found, extra=found.extra - self.own.extra)))
+        self.near.append((trial, self._fitted(trial.structure.block, 8)))
 
     # --- an effect less -------------------------------------------------------------------------------
 
@@ -141,7 +140,7 @@ class Around:
     # --- what they come to ----------------------------------------------------------------------------
 
     def _judged(self) -> list[tuple[Trial, Any]]:
-        ranked = self.search.ranked(self.own, [t for _, t in self.near])
+        ranked = self.search.ranked_over(self.own, [t for _, t in self.near])
         by_block = {id(t.block): t for t in ranked}
         return [(trial, by_block[id(t.block)]) for trial, t in self.near]
 

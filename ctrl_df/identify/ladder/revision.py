@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..selection.search import Search
 from .structure import Structure, exchanged
@@ -55,9 +55,7 @@ def revised(structure: Structure, search: Search, free: Callable) -> Revision:
             other = exchanged(less.block, effect)
             if other is not None:
                 tried.append((effect, fitted(other, 8)))
-        judged = search.ranked(
-            less, [replace(t, extra=t.extra - less.extra) for t in (own, *(t for _, t in tried))]
-        )
+        judged = search.ranked_over(less, [own, *(t for _, t in tried)])
         own = next(t for t in judged if t.block is own.block)
         best = judged[0]
         if best.evidence < search.significant:

@@ -72,11 +72,10 @@ def reach(which, core, known, segments) -> np.ndarray:
     } | {name: 0.5 * one for name, _, _ in _inner(core)}
     if core.joint == ELASTIC:
         stiff = stiffness(core.coupling.effect, known.force)
-        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         bend, rate = known.position, known.speed  # of a joint that nothing holds together
         if stiff > NOTHING:
             bend = known.force / stiff
-            rate = bend * math.sqrt(stiff / mass)
+            rate = bend * math.sqrt(stiff / core.reduced_mass)
         table["stretch"], table["stretch_rate"] = BEND_REACH * bend * one, BEND_REACH * rate * one
     return np.column_stack([table[name] for name in which])
 

@@ -9,7 +9,7 @@ thing, and count as few. All are adjusted for the number of regions looked at.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -148,12 +148,10 @@ def error_regions(
     found = [null.region(*part) for part in _parts(t, bins, units, **signals)]
     found += _bands(t, r, signals.values())
     found.sort(key=lambda region: region.p_value)
-    count, worst, worst_bias = len(found), 0.0, 0.0
-    adjusted = []
-    for i, region in enumerate(found):  # Holm's step-down adjustment
-        worst = max(worst, min(region.p_value * (count - i), 1.0))
-        worst_bias = min(region.bias_p_value * count, 1.0)
-        adjusted.append(replace(region, p_value=worst, bias_p_value=worst_bias))
+    adjusted = [
+        replace(region, p_value=float(p), bias_p_value=min(region.bias_p_value * len(found), 1.0))
+        for region, p in zip(found, holm([region.p_value for region in found]), strict=True)
+    ]
     adjusted.sort(key=lambda region: (region.p_value >= LEVEL, -region.excess))
     words = {"position": moving_in(units[0]).position, "load": word_of(units[1], "force")}
     return Regions(replace(region, sentence=_sentence(region, words)) for region in adjusted)
@@ -251,7 +249,6 @@ class _Null:
         return pairs
 
     def region(self, kind, label, mask, span) -> Region:
-        from scipy.stats import f as f_distribution
         from scipy.stats import t as t_distribution
 
         count = int(mask.sum())
@@ -260,8 +257,7 @@ class _Null:
             return Region(kind, label, share, expected, 1.0, 0.0, 1.0, span)
         inside, outside = self._pairs(mask), self._pairs(~mask)
         squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
-        ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
-        p = float(f_distribution.sf(ratio, *squares))
+        p = chance_of(share, expected, *squares)
         # A step between the region and the rest colours the residual by itself: without it the test is
         # sharper, where enough independent samples remain to know the two means.
         mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
@@ -276,6 +272,23 @@ class _Null:
         if share > expected:  # more error than its part: by its spread, or by its mean
             p = min(1.0, 2 * min(p, bias_p))
         return Region(kind, label, share, expected, p, mean_in / math.sqrt(self.power), bias_p, span)
+
+
+def chance_of(share: float, expected: float, inside: float, outside: float) -> float:
+    """Return the probability of a share of the squared error as large as this by chance: an F test.
+
+    `inside`, `outside`: independent squares in the region and in the rest.
+    """
+    from scipy.stats import f as f_distribution
+
+    ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
+    return float(f_distribution.sf(ratio, inside, outside))
+
+
+def holm(p_values: Sequence[float]) -> np.ndarray:
+    """Return probabilities, in ascending order, adjusted for how many there are: Holm's step-down method."""
+    count = len(p_values)
+    return np.maximum.accumulate([min(p * (count - i), 1.0) for i, p in enumerate(p_values)])
 
 
 def _independent(pairs, correlation) -> float:

@@ -54,9 +54,14 @@ def seen_by(block, records, known: Facts) -> RecordScales:
     )  # fmt: skip
 
 
+def total_inertia(block) -> float:
+    """Return the mass of all bodies of a block; 0 of one without."""
+    return sum(p.value for k, p in block.parameters.items() if "." not in k)
+
+
 def typical_mass(block, force: float, position: float, speed: float) -> float:
     """Return the mass of a block; of one without, that whose inertia the force is [kg]."""
-    return sum(p.value for k, p in block.parameters.items() if "." not in k) or force * position / speed**2
+    return total_inertia(block) or force * position / speed**2
 
 
 def default_free(block) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ import numpy as np
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
 from ..shooting.scales import Scales
+from ..shooting.variables import total_inertia
 from ..starting.extend import extended
 from ..thresholds import NEARLY_NOTHING
 from .force_balance import ForceBalance, can_be_imposed
@@ -89,9 +90,8 @@ def plane_of(block, points: Points) -> Plane:
     spans = (points.A[moved], swing, swing * points.omega[moved], points.omega[moved])
     still = points.A[~moved]
     force, swings, speed, omega = (Span(float(s.min()), float(s.max())) for s in spans)
-    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
     friction, stuck = kinetic_level(block.effects), float(still.max(initial=0.0))
-    return Plane(force, swings, speed, omega, friction, mass, stuck)
+    return Plane(force, swings, speed, omega, friction, total_inertia(block), stuck)
 
 
 def _any(cls, plane: Plane):

@@ -92,16 +92,19 @@ class Kicks:
     def _swung(self, size):
         """States of the linear part as a harmonic output of the block leaves them, its input that large."""
         x = np.zeros(self.engine.nstates)
-        a, b, c, dt = self._controller()
+        states, output = self._answer()
         if not isinstance(self.block, Element):
             x[self.loop.syslist[0].nstates or 0 :] = size  # nothing is known of the states of a user's system
-        if len(a):
-            z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
-            swing = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
-            seen = complex((c[:1] @ swing)[0])
-            if seen != 0:
-                x[: len(a)] = np.real(size * swing / seen)
+        if output != 0:
+            x[: len(states)] = np.real(size * states / output)
         return x
+
+    def _answer(self) -> tuple[np.ndarray, complex]:
+        """States and output of the linear part under a harmonic input of size one at the loop's pace."""
+        a, b, c, dt = self._controller()
+        z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
+        states = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
+        return states, complex((c[:1] @ states)[0])
 
     def _controller(self):
         controller = self.loop.syslist[0]
@@ -137,11 +140,7 @@ class Kicks:
 
     def _gain(self) -> float:
         """Gain of the linear part at the loop's pace."""
-        a, b, c, dt = self._controller()
-        z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
-        return (
-            float(np.abs(c[:1] @ np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]))[0, 0]) if len(a) else 0.0
-        )
+        return abs(self._answer()[1])
 
     def _law(self, u) -> float:
         return float(

@@ -265,7 +265,7 @@ class PoincareSearch:
                 state, times[-1], times=times, rtol=COURSE_RTOL, log=1, max_steps=SAMPLED_WORK
             )
             y = run.outputs[:, self.row]
-            ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+            ups = upward_crossings(y)
             passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
             found = []
             for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
@@ -273,6 +273,11 @@ class PoincareSearch:
                 found.append(Crossing(float(t), np.array(x), float(np.max(swing, initial=0.0)) / self._unit))
             state = run.state
             yield _Stretch(state.time, state.x, run.steps, run.status, found)
+
+
+def upward_crossings(y) -> np.ndarray:
+    """Return the samples after which a signal passes zero upwards."""
+    return np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
 
 
 def _growth(crossings, ago: int = 0) -> float:
