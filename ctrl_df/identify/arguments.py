@@ -240,7 +240,7 @@ def limit_units(block: Mechanism) -> dict[str, str]:
 def check_limits(owner: str, block: Mechanism, limits) -> dict[str, float]:
     """Return what the next experiment may do to the machine, in the words of its motion."""
     units = limit_units(block)
-    example = str(dict(zip(units, (40.0, 0.1), strict=True)))
+    example = str(dict.fromkeys(units, 1.0))
     return {
         known_name(owner, "limits", name, units): positive(owner, name, value, units[name])
         for name, value in mapping(owner, "limits", {} if limits is None else limits, example).items()
