@@ -19,6 +19,7 @@ from .exact.fate import Explorer
 from .exact.orbit import NoOrbit, Orbit, Try
 from .exact.poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch
 from .exact.shrinking import Merged, trace
+from .exact.thresholds import COURSE_RTOL, CROSSINGS, CROSSINGS_AVERAGED, PIECES, RECENT_CLOSED, REPEATS_LEAST
 from .forced_start import harmonic_start, path_starts
 from .pieces import by_pieces
 from .predicted.answer import responder
@@ -27,16 +28,10 @@ from .predicted.path import End, Path, corrected_near, follow_path
 from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
-    COURSE_RTOL,
-    CROSSINGS,
-    CROSSINGS_AVERAGED,
     ENOUGH,
     EVENTS_KEPT,
     NEAR_MISS,
     NOTHING,
-    PIECES,
-    RECENT_CLOSED,
-    REPEATS_LEAST,
     RETURN_GONE,
     RETURN_NEAR,
     RETURN_POINTS,

@@ -11,9 +11,10 @@ from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
+from .exact.thresholds import COURSE_RTOL
 from .predicted.answer import responder
 from .predicted.path import Path
-from .thresholds import COURSE_RTOL, FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
+from .thresholds import FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
 
 
 def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, motion=None) -> np.ndarray:

@@ -12,9 +12,10 @@ from .check import Check, Row, in_band
 from .exact.fate import Fate
 from .exact.known import KnownOrbits
 from .exact.orbit import NoOrbit, Orbit
+from .exact.thresholds import COURSE_RTOL, CROSSINGS_VERIFIED
 from .finder import OrbitFinder
 from .predicted.grade import LimitCycle
-from .thresholds import CONFIRMED_WITHIN, COURSE_RTOL, CROSSINGS_VERIFIED, LEFT_ALONE, SAME_CYCLE
+from .thresholds import CONFIRMED_WITHIN, LEFT_ALONE, SAME_CYCLE
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"

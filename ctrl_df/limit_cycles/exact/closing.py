@@ -9,14 +9,18 @@ import numpy as np
 from ...simulate.engine import Engine, Event
 from ...simulate.program.layout import AUX, KIND, MECHANISM, MODE
 from ...status import Status
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .monodromy import Tracer
+from .multiple_shooting import close_pieces
+from .orbit import Orbit
+from .symmetry import shift_directions, transverse
+from .thresholds import (
     ACCEPTED,
     CLOSED,
     COURSE_RTOL,
     FREE_POINTS,
     MOST_ROUNDS,
     NEWTON_LONGEST,
-    NOTHING,
     ON_CIRCLE,
     ORBIT_POINTS,
     PERIOD_RTOL,
@@ -27,10 +31,6 @@ from ..thresholds import (
     STILL,
     STRETCH,
 )
-from .monodromy import Tracer
-from .multiple_shooting import close_pieces
-from .orbit import Orbit
-from .symmetry import shift_directions, transverse
 
 
 class NoClosure(Exception):

@@ -10,7 +10,8 @@ import numpy as np
 from ...blocks.core import level
 from ...blocks.elements.element import Element
 from ...simulate.sampled import Sampled
-from ..thresholds import (
+from ..thresholds import ROUNDED
+from .thresholds import (
     BEND_HALVINGS,
     BENT,
     DECADES,
@@ -19,7 +20,6 @@ from ..thresholds import (
     JUMPED,
     POLE_AT_ZERO,
     REAL_ROOT,
-    ROUNDED,
     SAMPLED_PACE,
     SAMPLED_POINTS,
     SAMPLED_SLOWEST,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
 from .orbit import Orbit
 from .poincare import CYCLES, Course, Crossing, PoincareSearch, upward_crossings
+from .thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
 
 
 class KnownOrbits:

@@ -20,10 +20,10 @@ from ...simulate.kernel import driver
 from ...simulate.kernel.look import jump, look
 from ...simulate.program import layout
 from ...status import Status
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .thresholds import (
     EVENT_NUDGE,
     FLOW_NUDGE,
-    NOTHING,
     PERIOD_EVENTS,
     PERIOD_REACH,
     PERIOD_RTOL,

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import NOTHING, PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
+from ..thresholds import NOTHING
+from .thresholds import PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
 
 
 def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:

@@ -13,7 +13,9 @@ from ...simulate.engine import Engine, State
 from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
 from ...status import Status
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .kicks import Kicks
+from .thresholds import (
     BEYOND,
     COURSE_RTOL,
     DEAD,
@@ -27,7 +29,6 @@ from ..thresholds import (
     LOOK_POINTS,
     LOOK_RTOL,
     LOOK_WORK,
-    NOTHING,
     ON_TICK,
     PATIENCE,
     QUIET,
@@ -44,7 +45,6 @@ from ..thresholds import (
     WITHIN,
     WORK,
 )
-from .kicks import Kicks
 
 RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"
 

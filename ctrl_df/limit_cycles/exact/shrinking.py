@@ -15,10 +15,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...arclength import correction, tangent
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .closing import Closing, NoClosure
+from .orbit import Orbit
+from .symmetry import shift_directions
+from .thresholds import (
     ACROSS,
     CLOSED,
-    NOTHING,
     SHRINK_BEND,
     SHRINK_CLOSED,
     SHRINK_FAR,
@@ -28,9 +31,6 @@ from ..thresholds import (
     SHRINK_SHORTEST,
     SHRINK_STEPS,
 )
-from .closing import Closing, NoClosure
-from .orbit import Orbit
-from .symmetry import shift_directions
 
 
 class Merged(NoClosure):

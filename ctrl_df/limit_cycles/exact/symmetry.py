@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import MODE_SAMPLES, NOTHING, NULL, SHIFT_NUDGE, SHIFT_SAME
+from ..thresholds import NOTHING
+from .thresholds import MODE_SAMPLES, NULL, SHIFT_NUDGE, SHIFT_SAME
 
 
 def shift_directions(tracer, segments, size) -> np.ndarray:

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .thresholds import (
     ACCEPT,
     BISECTIONS,
     CELLS_AT_ONCE,
@@ -28,7 +29,6 @@ from ..thresholds import (
     MOST_PER_CELL,
     MOST_STARTS,
     NOT_REAL,
-    NOTHING,
     ON_EDGE,
     SAME,
     SETTLED,
