@@ -76,7 +76,7 @@ class Closing:
                 raise NoClosure(_not_traced(traced))
             if beside is None:
                 # shifts that the loop does not notice: an orbit closes up to them
-                free = shift_directions(self.tracer, traced.segments, size)
+                free = shift_directions(self.tracer, traced, size)
                 beside = np.eye(self.tracer.n) - free @ free.T
             residual = beside @ ((traced.end.x - start.x) / size)
             mismatch = float(np.max(np.abs(residual)))
@@ -214,7 +214,7 @@ class Closing:
         if np.max(np.ptp(run.states, axis=0) / size) < STILL:
             raise NoClosure("Newton ended at rest")  # an equilibrium, periodic with any period
         # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
-        across = transverse(shift_directions(self.tracer, traced.segments, size))
+        across = transverse(shift_directions(self.tracer, traced, size))
         carried = across.T @ (traced.monodromy * size / size[:, None]) @ across
         values = np.linalg.eigvals(carried)
         trivial = int(np.argmin(np.abs(values - 1.0)))

@@ -58,7 +58,8 @@ class Kicks:
             self.scale, self.unit = self._length_scale(), self.block.coordinates.unit
         elif self.parts is not None:
             self.pace = _pole_frequency(self._controller())
-            self.scale, self.unit = self._corner(), "at the block's input"
+            self.scale, self.straight = self._corner()
+            self.unit = "at the block's input"
         else:
             self.pace, self.scale, self.unit = 1.0, 1.0, "of every state"
 
@@ -115,28 +116,28 @@ class Kicks:
             return *(np.asarray(m, float) for m in (controller.A, controller.B, controller.C)), 0.0
         return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), 0.0
 
-    def _corner(self) -> float:
-        """Input at which an element or a law bends; of one that jumps at zero, what its jump drives."""
+    def _corner(self) -> tuple[float, float]:
+        """Input at which an element or a law bends, and `straight`.
+
+        Of one that jumps at zero the former is what its jump drives.
+        """
         primitive = getattr(self.block, "primitive", None)
         corners = [abs(corner) for corner in getattr(primitive, "corners", ())]
         step = getattr(primitive, "step", 0.0)
         size = max([*corners, step, getattr(primitive, "gap", 0.0)])
         if size > 0:
-            if not self.block.nstates:
-                self.straight = min([*corners, 0.5 * step] if step else corners)
-            return size
+            return size, 0.0 if self.block.nstates else min([*corners, 0.5 * step] if step else corners)
         if self.block.nstates:
-            return 1.0
+            return 1.0, 0.0
         least = 10.0 ** DECADES[0]
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
         # over six decades any power of the argument grows by more than twofold, unless a jump hides it
         if jump > 0.5 * abs(law(JUMPED * least)):
-            return jump * gain or 1.0
+            return jump * gain or 1.0, 0.0
         bend = _bend(law, 1 / gain if gain else 0.0)
-        self.straight = bend or 0.0
-        return bend or 1.0
+        return bend or 1.0, bend or 0.0
 
     def _gain(self) -> float:
         """Gain of the linear part at the loop's pace."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...blocks.elements.element import Element
+from ...cached import cached_property
 from ...simulate.engine import Engine, State
 from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
@@ -116,18 +117,19 @@ class PoincareSearch:
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
         self.kicks = Kicks(loop, engine)
         self.stride = STRIDE * np.pi / self.kicks.pace  # ten swings at the loop's own pace
-        self._units: np.ndarray | None = None
-        self._unit = 1.0
 
     @property
     def units(self) -> np.ndarray:
         """What each state is measured in: the largest it becomes in the first swing from the largest kick."""
-        self._measure()
-        return self._units  # pyright: ignore[reportReturnType]
+        return self._first_swing[0]
 
-    def _measure(self):
-        if self._units is not None:
-            return
+    @property
+    def _unit(self) -> float:
+        """What the signal watched is measured in, likewise."""
+        return self._first_swing[1]
+
+    @cached_property
+    def _first_swing(self) -> tuple[np.ndarray, float]:
         x0 = self.kicks.all()[-1][1]
         times = np.linspace(0.0, LOOK * self.stride, LOOK_POINTS)
         limits: Any = dict(rtol=LOOK_RTOL, log=1, max_steps=LOOK_WORK)
@@ -138,8 +140,8 @@ class PoincareSearch:
             return np.where(np.isfinite(seen), seen, 0.0).max(axis=0)
 
         states, swing = largest(run.states), float(largest(run.outputs)[self.row])
-        self._units = np.where(states > 0, states, max(float(states.max(initial=0.0)), NOTHING))
-        self._unit = swing if swing > 0 else 1.0
+        units = np.where(states > 0, states, max(float(states.max(initial=0.0)), NOTHING))
+        return units, swing if swing > 0 else 1.0
 
     def size(self, x) -> float:
         """Largest state in units of the loop."""

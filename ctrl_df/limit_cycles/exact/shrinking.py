@@ -104,7 +104,7 @@ class _Curve:
         self.phase = phase / max(np.linalg.norm(phase), NOTHING)
         self.beside = np.eye(self.n)
         traced = self.tracer.trace(start, period, size=self.size)
-        free = shift_directions(self.tracer, traced.segments, self.size)
+        free = shift_directions(self.tracer, traced, self.size)
         self.beside = np.eye(self.n) - free @ free.T
         self.first, _ = self._mismatch(np.zeros(self.n + 1))
         self.scale = float(np.max(np.abs(self.first)))

@@ -57,8 +57,8 @@ SAME_ORBIT, SAME_ROUGHLY, SAME_SIZES = 1e-4, 2e-2, 10
 PERIOD_EVENTS, PERIOD_STEPS = 5000, 200_000
 """Events of a period, and steps between two of them."""
 
-PERIOD_REACH, REACH_AT_FIRST = 1e-6, 1e-9
-"""Of a period: the time over which rates of inputs are taken; in seconds, until one is known."""
+PERIOD_REACH = 1e-6
+"""Of a period: the time over which rates of inputs are taken."""
 
 TOLD = 1e-7
 """Of what the other states move a state by in a period: a size below that is rounding."""
