@@ -82,9 +82,8 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     sought: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
     for cycle in cycles if finder.parts is not None else []:
-        found = finder.from_guess(cycle)
+        found, sought[id(cycle)] = finder.from_guess(cycle)
         orbit = known.kept(found)
-        sought[id(cycle)] = finder.none()
         if found is not None and orbit is not None and not found.note:
             led[id(cycle)] = orbit
     fate = Fate()
