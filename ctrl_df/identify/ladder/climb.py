@@ -31,7 +31,7 @@ from ..thresholds import FLOOR
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .structure import Structure, plainness
-from .thresholds import BRANCHES
+from .thresholds import BRANCHES, STEPS_COMPARED
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,7 +344,7 @@ class Climb:
 
     def _compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
         """Return the evidence for a model over another on the data of a search, and both errors held out."""
-        old, new = (search.fitted(b, self.free(b), 6) for b in (other, block))
+        old, new = (search.fitted(b, self.free(b), STEPS_COMPARED) for b in (other, block))
         judged = search.ranked_over(old, [new])[0]
         return judged.evidence, (search.errors(new)[1], search.errors(old)[1])
 

@@ -20,10 +20,12 @@ from .thresholds import (
     PLAN_LEAST,
     PLAN_MARGIN,
     PLAN_MOVES,
+    PLAN_PEAK,
     PLAN_SAMPLES,
     PLAN_SINES,
     PLAN_SIZES,
     PLAN_SLACK,
+    PLAN_SMOOTH,
     PLAN_STEP_RATE,
     PLAN_STEP_SIZES,
     PLAN_STEPS,
@@ -143,7 +145,7 @@ class _Loop:
         self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]
         self.thin = max(1, len(t) // PLAN_SAMPLES)
         # The controller passes the noise of the sensor on to the drive.
-        self.tremor = 4 * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
+        self.tremor = PLAN_PEAK * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 
     def __call__(self, u):
         from ...simulate.response import event_response
@@ -206,7 +208,7 @@ def _rms(values) -> float:
 def _references(t, record):
     """Return references of peak one that begin at rest and turn no faster than the records did."""
     swing = max(facts(record).swing, PLAN_SWING[0] * (t[1] - t[0]))
-    half = max(int(round(0.25 * swing / (t[1] - t[0]))), 1)
+    half = max(int(round(PLAN_SMOOTH * swing / (t[1] - t[0]))), 1)
     window = np.hanning(2 * half + 1)
     fade = np.sin(0.5 * math.pi * np.clip((t - t[0]) / swing, 0, 1)) ** 2
     found = {}

@@ -13,7 +13,7 @@ from ...numerals import digits
 from ..results.experiment import Experiment, separated
 from ..tables.thresholds import WORK_MEDIUM
 from ..thresholds import NOTHING
-from .thresholds import COUNTED, SETTLE, SIGMA_LEAST, SINES
+from .thresholds import COUNTED, PLANE, PLANE_BEYOND, SETTLE, SIGMA_LEAST, SINE_SAMPLES, SINES
 
 
 def stepped_sines(
@@ -52,8 +52,12 @@ def stepped_sines(
             f"next_experiment needs {moves.force} > 0 and {moves.reach} > 0; got {force}, {reach}."
         )
     low = min(float(r.A[0]) for r in tables)
-    A = np.geomspace(min(low, force), force, 9)
-    omega = np.geomspace(0.5 * min(r.omega[0] for r in tables), 2 * max(r.omega[-1] for r in tables), 11)
+    A = np.geomspace(min(low, force), force, PLANE[0])
+    omega = np.geomspace(
+        PLANE_BEYOND[0] * min(r.omega[0] for r in tables),
+        PLANE_BEYOND[1] * max(r.omega[-1] for r in tables),
+        PLANE[1],
+    )
     found = []
     for m in models:
         options: dict[str, Any] = dict(WORK_MEDIUM) if method_for(m).takes_options else {}
@@ -76,7 +80,7 @@ def stepped_sines(
     chosen = sorted(zip(A[i].tolist(), omega[k].tolist(), strict=True), key=lambda p: (p[1], p[0]))
     needed = sum((SETTLE + COUNTED) * 2 * math.pi / w for _, w in chosen)
     factor = 1.0 if duration is None else float(duration) / needed
-    dt = float(dt or 2 * math.pi / (100 * max(w for _, w in chosen)))
+    dt = float(dt or 2 * math.pi / (SINE_SAMPLES * max(w for _, w in chosen)))
     parts = []
     for a, w in chosen:
         periods = max(int(round((SETTLE + COUNTED) * factor)), 2)

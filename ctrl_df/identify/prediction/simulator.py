@@ -21,7 +21,7 @@ from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
-from .thresholds import FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
+from .thresholds import FAR_LIMIT, FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
 from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
@@ -326,7 +326,7 @@ class Simulator:
                     x += primitive.offset + primitive.rate * (record.t[inside] - later)
                 elif rounded:
                     x = primitive.value(x)
-            low, high = centre - 100 * limit, centre + 100 * limit
+            low, high = centre - FAR_LIMIT * limit, centre + FAR_LIMIT * limit
             if not (x.min() >= low and x.max() <= high):  # NaN fails both
                 with np.errstate(invalid="ignore"):
                     x = np.where(np.isfinite(x), np.clip(x, low, high), centre + limit)

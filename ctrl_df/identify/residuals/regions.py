@@ -20,7 +20,19 @@ from ..data.quantities import word_of
 from ..thresholds import LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
-from .thresholds import AFTER_REVERSAL, EDGE_ZERO, FAINT, FASTEST, LOW_SPEED, MEDIUM_SPEED, REGION_SAMPLES
+from .thresholds import (
+    AFTER_REVERSAL,
+    BAND_LOWEST,
+    BANDS_LEAST,
+    CORRELATED,
+    EDGE_ZERO,
+    FAINT,
+    FASTEST,
+    LOW_SPEED,
+    MEDIUM_SPEED,
+    REGION_LEAST,
+    REGION_SAMPLES,
+)
 
 KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
 
@@ -237,7 +249,7 @@ class _Null:
     def _colour(self, r):
         rho = autocorrelation(r, self.lags)
         # Lags whose correlation is within three standard errors of none add noise only.
-        rho = np.where(rho**2 > 9 / self.n, rho, 0.0)
+        rho = np.where(rho**2 > CORRELATED**2 / self.n, rho, 0.0)
         rho[0] = 1.0
         return rho
 
@@ -253,7 +265,7 @@ class _Null:
 
         count = int(mask.sum())
         share, expected = float(np.sum(self.r[mask] ** 2)) / (self.n * self.power), count / self.n
-        if count < 8 or self.n - count < 8:
+        if count < REGION_LEAST or self.n - count < REGION_LEAST:
             return Region(kind, label, share, expected, 1.0, 0.0, 1.0, span)
         inside, outside = self._pairs(mask), self._pairs(~mask)
         squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
@@ -303,14 +315,14 @@ def _bands(t, r, signals) -> list[Region]:
 
     n, dt = len(r), (t[-1] - t[0]) / (len(r) - 1)
     f = np.fft.rfftfreq(n, dt)
-    edges = [2.5 / (n * dt)]
+    edges = [BAND_LOWEST / (n * dt)]
     while edges[-1] < f[-1]:
         edges.append(edges[-1] * 2 ** (1 / 3))
     where = np.searchsorted(f, edges)
     bands = [(a, b) for a, b in zip(where[:-1], where[1:], strict=True) if b - a >= 2]
     power = _periodogram(r)
     total = float(power[1:].sum())
-    if total == 0 or len(bands) < 6:
+    if total == 0 or len(bands) < BANDS_LEAST:
         return []
     density = np.array([power[a:b].mean() for a, b in bands]) + FAINT * total
     references = [np.array([_periodogram(x)[a:b].mean() for a, b in bands]) for x in signals]

@@ -58,3 +58,7 @@ PARAMETER_NUDGE = 1e-4
 
 HELD_BACK = 0.1
 """Share of the largest gain below which a state is moved by no force: it sticks."""
+
+SMOOTHER_PRIOR, SMOOTHER_RANGE = (4.0, 1.5, 1.0), 40.0
+"""Standard deviations of the logarithms of a missing force's size and time and of the noise, about the usual
+ones: factors of 55, 4.5 and 2.7; logarithms beyond which they are not tried."""

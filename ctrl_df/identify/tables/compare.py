@@ -16,6 +16,7 @@ from ..thresholds import LEVEL
 from .errors import rms
 from .points import Points, counted, points_of
 from .simulated import relative_error, simulate_table
+from .thresholds import REGION_BANDS
 
 
 @dataclass(frozen=True)
@@ -207,7 +208,7 @@ def plane_regions(points: Points, error) -> Regions:
     return Regions(regions)
 
 
-def _bands(axis, count=4):
+def _bands(axis, count=REGION_BANDS):
     """Yield up to `count` bands of about as many distinct values each."""
     values = np.unique(axis)
     for part in np.array_split(values, min(count, len(values))):

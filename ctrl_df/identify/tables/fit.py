@@ -15,7 +15,7 @@ from ..shooting.variables import Variable
 from .errors import rms
 from .points import Points
 from .simulated import relative_error, simulate_table
-from .thresholds import TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
+from .thresholds import FIT_BUDGET, FIT_STEPS, FIT_TOLERANCE, TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,15 @@ class FittedTable:
 
 
 def fit_table(
-    block, points: Points, names, scales: Scales, *, iterations=10, tolerance=1e-3, budget=400, work=None
+    block,
+    points: Points,
+    names,
+    scales: Scales,
+    *,
+    iterations=FIT_STEPS,
+    tolerance=FIT_TOLERANCE,
+    budget=FIT_BUDGET,
+    work=None,
 ) -> FittedTable:
     """Fit parameters to points by least squares within their bounds (`scipy.optimize.least_squares`).
 

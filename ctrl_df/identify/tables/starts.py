@@ -32,6 +32,7 @@ from .thresholds import (
     HOPELESS_START,
     START_COMMON,
     START_SAME,
+    STARTS_KEPT,
     TABLE_SIZES,
     UNKNOWN_SIZES,
     WORK_MEDIUM,
@@ -150,7 +151,14 @@ def balanced(grown: Sequence, names: Sequence[str], points: Points, scales: Scal
 
 
 def best_starts(
-    cls, block, points: Points, slopes, free: Sequence[str], scales: Scales, keep: int = 3, work=WORK_MEDIUM
+    cls,
+    block,
+    points: Points,
+    slopes,
+    free: Sequence[str],
+    scales: Scales,
+    keep: int = STARTS_KEPT,
+    work=WORK_MEDIUM,
 ) -> tuple[list, bool]:
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 
