@@ -20,7 +20,15 @@ from .exact.fate import Explorer
 from .exact.orbit import NoOrbit, Orbit, Try
 from .exact.poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch
 from .exact.shrinking import Merged, trace
-from .exact.thresholds import COURSE_RTOL, CROSSINGS, CROSSINGS_AVERAGED, PIECES, RECENT_CLOSED, REPEATS_LEAST
+from .exact.thresholds import (
+    COURSE_RTOL,
+    CROSSINGS,
+    CROSSINGS_AVERAGED,
+    PIECES,
+    RECENT_CLOSED,
+    REPEATS_LEAST,
+    STEPS_A_PERIOD,
+)
 from .forced_start import harmonic_start, path_starts
 from .pieces import by_pieces
 from .predicted.answer import responder
@@ -29,14 +37,17 @@ from .predicted.path import End, Path, corrected_near, follow_path
 from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
+    AVERAGED_LEAST,
     ENOUGH,
     EVENTS_KEPT,
+    LAPS,
     NEAR_MISS,
     NOTHING,
     RETURN_GONE,
     RETURN_NEAR,
     RETURN_POINTS,
     RETURN_RTOL,
+    RETURNS,
     SAME_AS_PATH,
     SAME_CYCLE,
 )
@@ -217,9 +228,9 @@ class OrbitFinder:
                 return orbit
         return self._simulated(attempts, x0, "a simulation from the state given")[0]
 
-    def _returns(self, x0, most=4):
+    def _returns(self, x0, most=RETURNS):
         """Return times after which a simulation from a state comes near it again, nearest first."""
-        course = self.poincare.iterate(x0, 4, until_repeated=False)
+        course = self.poincare.iterate(x0, RETURNS, until_repeated=False)
         span = course.crossings[-1].time if course.crossings else self.poincare.stride
         times = np.linspace(0.0, span, RETURN_POINTS)
         run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
@@ -356,7 +367,7 @@ class OrbitFinder:
         recent = crossings[-RECENT_CLOSED:]
         least = REPEATS_LEAST * self.poincare.units
         size = np.maximum(np.max(np.abs([crossing.state for crossing in recent]), axis=0), least)
-        for laps_per_period in range(1, 5):
+        for laps_per_period in range(1, LAPS + 1):
             apart = [
                 float(np.max(np.abs(recent[k].state - recent[k - laps_per_period].state) / size))
                 for k in range(laps_per_period, len(recent))
@@ -411,13 +422,13 @@ class OrbitFinder:
         begin = self.engine.run(self.poincare.start(x0), crossings[-1].time, rtol=COURSE_RTOL, log=1).state
         later = self.poincare.iterate(begin, min(swings, len(crossings)), until_repeated=False).crossings
         count = len(later) - 1
-        if count < 4:
+        if count < AVERAGED_LEAST:
             return None
         period = (later[-1].time - later[0].time) / count
         omega = 2 * np.pi / period
         t0, span = begin.time, count * period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
-        times = t0 + np.linspace(0, min(4, count) * period, AVERAGE_POINTS)
+        times = t0 + np.linspace(0, min(AVERAGED_LEAST, count) * period, AVERAGE_POINTS)
         run = self.engine.run(
             begin,
             t0 + span,
@@ -425,7 +436,7 @@ class OrbitFinder:
             rtol=COURSE_RTOL,
             spectrum=spectrum,
             omega=omega,
-            max_step=period / 8,
+            max_step=period / STEPS_A_PERIOD,
         )
         if not run.status.ok:
             return None

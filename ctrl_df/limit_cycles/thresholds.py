@@ -72,3 +72,10 @@ shifted."""
 
 LEFT_ALONE = (0.2, 5)
 """Amplitude of a simulation beside an orbit, over the orbit's, that has not left it."""
+
+RETURNS, LAPS, AVERAGED_LEAST = 4, 4, 4
+"""Returns of a course that are tried as periods, passages that one period may have, and periods of an average
+that are shown, and needed."""
+
+MET_LEAST = 8
+"""Passages of a verifying simulation at least."""

@@ -68,7 +68,7 @@ CORRELATED = 3.0
 """Standard errors of a correlation beyond which it is one."""
 
 REGION_LEAST, BANDS_LEAST, BAND_LOWEST = 8, 6, 2.5
-"""Samples of a region, and bands of a spectrum, at least; lowest frequency of a band, cycles of the record."""
+"""Samples of a region, and bands of a spectrum, at least; its lowest frequency, in cycles of the record."""
 
 LAGS_TESTED, LAGS_SHARE, LAGS_FORGOTTEN = 20, (5, 10, 4), 5
 """Lags of a test for traces of the input; parts of a record that its lags are at most (whiteness, input,

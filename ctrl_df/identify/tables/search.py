@@ -193,7 +193,8 @@ class TableSearch(Search):
         kind = tried.block.effects[-1]
         fitted = fit_either(
             tried.block, self.inside, tried.fitted.names, self.scales,
-            iterations=STEPS_COSTLY if kind.costly else STEPS_CONFIRMED, budget=TABLE_BUDGET, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
+            iterations=STEPS_COSTLY if kind.costly else STEPS_CONFIRMED,
+            budget=TABLE_BUDGET, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
         )  # fmt: skip
         return self._trial(tried.key, fitted, tried.extra, confirmed=True)
 

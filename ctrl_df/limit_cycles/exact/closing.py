@@ -28,6 +28,7 @@ from .thresholds import (
     REPEATED,
     STALLED,
     STALLS,
+    STEPS_A_PERIOD,
     STILL,
     STRETCH,
 )
@@ -209,7 +210,13 @@ class Closing:
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         run = self.engine.run(
-            start, period, times=times, rtol=PERIOD_RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
+            start,
+            period,
+            times=times,
+            rtol=PERIOD_RTOL,
+            spectrum=spectrum,
+            omega=omega,
+            max_step=period / STEPS_A_PERIOD,
         )
         if np.max(np.ptp(run.states, axis=0) / size) < STILL:
             raise NoClosure("Newton ended at rest")  # an equilibrium, periodic with any period

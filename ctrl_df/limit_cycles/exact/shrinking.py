@@ -28,6 +28,7 @@ from .thresholds import (
     SHRINK_FIRST,
     SHRINK_LONGER,
     SHRINK_LONGEST,
+    SHRINK_NEWTON,
     SHRINK_SHORTEST,
     SHRINK_STEPS,
 )
@@ -137,7 +138,7 @@ class _Curve:
         """Newton onto the curve within the plane through y across `border`; (y, J), or None."""
         offset = border @ y
         try:
-            for _ in range(8):
+            for _ in range(SHRINK_NEWTON):
                 r, J = self.equations(y)
                 if np.max(np.abs(r)) < SHRINK_CLOSED * self.scale:
                     return y, J

@@ -191,3 +191,10 @@ it is that near; passages in a row that come nearer."""
 
 ORBIT_SIZE = 1e-9
 """Size of a state of an orbit at least, over what it is measured in."""
+
+STEPS_A_PERIOD = 8
+"""Steps of a period at least, four of a half wave."""
+
+PIECE_HALVINGS, SHRINK_NEWTON = 6, 8
+"""Times that a step of Newton's method is halved while pieces come apart; its steps on the way that a
+mismatch shrinks."""

@@ -183,3 +183,8 @@ WINDOWS, BOUND_POINTS = (0.1, 0.4, 1.2), 161
 BESIDE_CORNER = 0.37
 """Distance from a corner, over its place and one, at which a law is asked whether it is odd: no symmetry
 meets it."""
+
+SHOWS_BY, STRAYED, APART, LINE_HALVINGS = 8, 6, 3, 5
+"""Steps by which quadratic convergence shows; how far from its start, in steps of the grid, a search has
+strayed; how near a crossing another one owns it; halvings of a step that
+does not come nearer."""
