@@ -321,7 +321,7 @@ def fit_segments(
     error_filter: NoiseModel | None = None,
     begins: str = FREE,
     hopeless: float = math.inf,
-    outlook: int = 0,
+    steps_left: int = 0,
     rtol: float = RTOL,
     followed: int = 0,
 ) -> FitResult:
@@ -353,7 +353,7 @@ def fit_segments(
     hopeless : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
-    outlook : int
+    steps_left : int
         Iterations that are to follow in other fits.
     rtol : float
         Relative tolerance of the simulations.
@@ -365,7 +365,7 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, UNCOUNTED, limits, error_filter, begins, (hopeless, outlook), about,
+        model, records, names, UNCOUNTED, limits, error_filter, begins, (hopeless, steps_left), about,
         followed,
     )  # fmt: skip
     stage = Stage(problem, list(segments), thin, starts, rtol)

@@ -250,7 +250,7 @@ class SegmentedData:
         iterations=ITERATIONS,
         tolerance=TOLERANCE,
         hopeless=math.inf,
-        outlook=0,
+        steps_left=0,
         followed=0,
     ) -> FitResult:
         """Fit the named parameters over the segments fitted (or those of `view`)."""
@@ -258,7 +258,7 @@ class SegmentedData:
         return fit_segments(
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
-            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
+            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, steps_left=steps_left,
             robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 

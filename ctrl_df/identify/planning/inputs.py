@@ -145,7 +145,7 @@ class _Loop:
         self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]
         self.thin = max(1, len(t) // PLAN_SAMPLES)
         # The controller passes the noise of the sensor on to the drive.
-        self.tremor = PLAN_PEAK * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
+        self.noise_peak = PLAN_PEAK * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 
     def __call__(self, u):
         from ...simulate.response import event_response
@@ -170,7 +170,7 @@ class _Loop:
             played = _played(self.record, self.t, force, ys[i]).replaced(input_hold="linear")
             runs = [free_run(m, played, position=self.centre) for m in self.models]
             gaps += [_apart(self.record, self.t, y - runs[i]) for k, y in enumerate(runs) if k != i]
-        return ys, max(float(np.max(np.abs(f))) for f in forces) + self.tremor, gaps
+        return ys, max(float(np.max(np.abs(f))) for f in forces) + self.noise_peak, gaps
 
 
 def _played(record, t, u, place):

@@ -371,7 +371,7 @@ def _first(job) -> Attempt:
 def _on(attempt: Attempt, steps, hopeless) -> Attempt:
     fit = attempt.data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
-        hopeless=hopeless, outlook=attempt.steps if steps < attempt.steps else 0,
+        hopeless=hopeless, steps_left=attempt.steps if steps < attempt.steps else 0,
     )  # fmt: skip
     left = 0 if fit.converged else attempt.steps
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)

@@ -96,7 +96,7 @@ class Stage(SegmentOutputs):
             found = self._descend(found.theta, states, again, tolerance, robust, slopes=found.slopes)
         if (
             problem.nonsmooth
-            and not problem.outlook
+            and not problem.steps_left
             and self._worth_restarting(found)
             and problem.nfev < problem.budget
             and any(t.min() < 0.5 for t in self.trusts(found))
@@ -107,7 +107,9 @@ class Stage(SegmentOutputs):
     def _past_events(self, found: Solution, iterations, tolerance, robust) -> Solution:
         """Let a fit whose begins are followed go on past events, while that leads to better minima."""
         problem = self.problem
-        for _ in range(TURNS_PAST if problem.followed and problem.nonsmooth and not problem.outlook else 0):
+        for _ in range(
+            TURNS_PAST if problem.followed and problem.nonsmooth and not problem.steps_left else 0
+        ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             at_noise = squares <= (FLOOR * problem.noise) ** 2 * count
             beyond = None if at_noise or problem.nfev >= problem.budget else step_past_events(self, found)
@@ -199,7 +201,7 @@ class Stage(SegmentOutputs):
                     break
             ended = found is start or gain < tolerance
             found = replace(found, slopes=(jp, js), converged=ended)
-            left = iterations - iteration - 1 + problem.outlook
+            left = iterations - iteration - 1 + problem.steps_left
             if ended or self.too_far(found.residual, 1 - max(gain, before), left):
                 break
             before = gain
