@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..prediction.values import feasible
 from ..shooting.thresholds import BETTER
 from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE

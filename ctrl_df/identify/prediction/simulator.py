@@ -10,10 +10,10 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Lag, Ramp
 from ...cached import cached_property
-from ...simulate.crew import require_compiled
 from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped
 from ...simulate.kernel.many import Drives
+from ...simulate.parallel import require_compiled
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..thresholds import RTOL

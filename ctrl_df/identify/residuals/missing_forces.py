@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...blocks.coordinates import moving_in
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.per_record import begun_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.multistart import (
     all_restarted,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import check
+from ...simulate.parallel import check
 from ..prediction.segments import Segments
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
