@@ -71,7 +71,7 @@ def _side_by_side():
 
     Each goes on with step after step: what functions have in common it types and lowers once.
     """
-    from .simulate.crew import processors
+    from .simulate.parallel import processors
 
     waiting, done, workers, free = list(STEPS), set(), [], []
     told: queue.Queue = queue.Queue()

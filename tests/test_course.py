@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 
 import ctrl_df as cdf
 from ctrl_df.identify.course import Course
-from ctrl_df.simulate import crew
+from ctrl_df.simulate import parallel
 
 RIG = rigs.draw("linear_spring", 11, snr_db=60, n=4000)
 TRAIN, HELD = RIG.train[0].measurement(), RIG.holdout[0].measurement()
@@ -144,8 +144,8 @@ def test_a_stage_that_lasts_tells_that_it_goes_on(monkeypatch):
     lines = []
     course = Course("improve", lines.append)
     course.stage("four rests")
-    with crew.watched(course):
-        crew.side_by_side(time.sleep, [0.3, 0.1, 0.1, 0.1])
+    with parallel.watched(course):
+        parallel.side_by_side(time.sleep, [0.3, 0.1, 0.1, 0.1])
     assert len(lines) > 3 and all("s, four rests" in line for line in lines)
     assert "jobs done" in lines[1]
 

@@ -8,6 +8,8 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.blocks.coordinates import AXIS, LINE, moving_in
 from ctrl_df.blocks.effect import stated_parameters
+from ctrl_df.identify.arguments import check_limits, limit_units
+from ctrl_df.identify.experiment import next_experiment
 from ctrl_df.units import dimension, over, si_unit, turning
 
 EFFECTS = [
@@ -184,3 +186,40 @@ def test_what_nothing_explains_is_said_in_torques():
     line, axis = data.values()
     assert line.verdict == axis.verdict == "unknown"
     assert "acts like a force" in line.remains and "acts like a torque" in axis.remains
+
+
+def test_limits_of_an_experiment_are_those_of_the_motion():
+    turning, driven = cdf.Inertia(0.02), cdf.Inertia(0.02, [cdf.TorqueConstant(0.1)])
+    assert limit_units(cdf.Mass(1.0)) == {"force": "N", "stroke": "m"}
+    assert (
+        limit_units(turning) == limit_units(cdf.TwoInertias(0.01, 0.02)) == {"torque": "N m", "angle": "rad"}
+    )
+    assert limit_units(driven) == {"current": "A", "angle": "rad"}
+    assert check_limits("diagnose", turning, {"torque": 2, "angle": 0.5}) == {"torque": 2.0, "angle": 0.5}
+    assert check_limits("diagnose", turning, None) == {}
+    with pytest.raises(ValueError, match=r"limits out of torque, angle; got 'force'"):
+        check_limits("diagnose", turning, {"force": 2})
+    with pytest.raises(ValueError, match=r"torque > 0 .*N m"):
+        check_limits("diagnose", turning, {"torque": -2})
+    with pytest.raises(ValueError, match=r"limits out of force, stroke; got 'angle'"):
+        check_limits("diagnose", cdf.Mass(1.0), {"angle": 2})
+
+
+def test_an_experiment_keeps_limits_of_rotation():
+    t = np.arange(0, 4, 8e-3)
+    u = sum(0.3 * np.sin(w * t + w) for w in (2.1, 5.3, 9.7, 17.0))
+    true = cdf.Inertia(0.02, [cdf.Coulomb(0.05), cdf.Viscous(0.03), cdf.LinearSpring(0.4)])
+    y = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
+    noise = 1e-3 * y.std() * np.random.default_rng(0).normal(size=t.size)
+    record = cdf.Measurement(t, u, y + noise, input_unit="N m", output_unit="rad")
+    model = cdf.Inertia(0.022, [cdf.Coulomb(0.04), cdf.Viscous(0.04)])
+    limits = {"torque": 0.5, "angle": 0.5}
+    found = cdf.diagnose(model, record, candidates=["linear_spring"], limits=limits)
+    for given, expected in ((dict(), 0.5), (dict(torque=0.3), 0.3)):
+        plan = next_experiment(found, **given)
+        assert plan.force <= expected and plan.stroke <= 0.5
+        assert "N m" in plan.reason and " rad " in plan.reason
+    with pytest.raises(ValueError, match=r"leaves the range of ±1e-09 rad \(angle\).* N m"):
+        next_experiment(found, angle=1e-9)
+    with pytest.raises(ValueError, match="next_experiment needs limits out of torque, angle"):
+        next_experiment(found, stroke=1.0)

@@ -183,3 +183,24 @@ def test_every_tuned_number_of_a_package_has_its_place_and_its_reason(package):
     assert all(named.values()), [name for name, told in named.items() if not told]
     words = collections.Counter(w for p in files.values() for w in re.findall(r"\w+", p.read_text()))
     assert not [name for name in named if words[name] < 2], "nobody asks for it"
+
+
+LEFT = {"identify": 76, "df": 129, "limit_cycles": 20, "gains": 13, "simulate": 184}
+"""Numbers from three on that stand in formulas, tables and defaults; a choice among them has to be named."""
+
+
+@pytest.mark.parametrize("package", LEFT)
+def test_no_more_bare_numbers(package):
+    files = [p for p in sorted((PACKAGE / package).rglob("*.py")) if p.name != "thresholds.py"]
+    assert sum(sum(1 for _ in bare(parsed(p))) for p in files) <= LEFT[package]
+
+
+def bare(tree):
+    """Yield numbers that are neither small and plain, nor indices, nor parts of texts."""
+    no_choice = (ast.JoinedStr, ast.Subscript)
+    inside = {id(n) for node in ast.walk(tree) if isinstance(node, no_choice) for n in ast.walk(node)}
+    for node in ast.walk(tree):
+        value = getattr(node, "value", None)
+        if isinstance(node, ast.Constant) and type(value) in (int, float) and id(node) not in inside:
+            if value not in (0, 0.25, 0.5, 1, 1.5, 2, 100):
+                yield value

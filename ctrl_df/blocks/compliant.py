@@ -170,7 +170,7 @@ def _joint(core, t, x, dx):
         closed = bend != 0 or core.gap == 0
         force = _called(core.coupling, t, bend, rate if closed else 0.0, x, dx)
         return force if closed else 0.0
-    return _contact(bend, rate, core.masses[0] * core.masses[1] / sum(core.masses), core.restitution)
+    return _contact(bend, rate, core.reduced_mass, core.restitution)
 
 
 def _stops(core, t, x, dx, force):

@@ -17,6 +17,8 @@ class Coordinates:
     ----------
     position, velocity, force, inertia, stroke : str
         What the quantities are called.
+    reach : str
+        What a limit of the distance from the start is called.
     unit : str
         Of the position.
     names : dict
@@ -28,6 +30,7 @@ class Coordinates:
     force: str
     inertia: str
     stroke: str
+    reach: str
     unit: str
     names: dict[str, str] = field(default_factory=dict, hash=False)
 
@@ -76,10 +79,11 @@ def either(unit: str, turns: bool) -> str:
     return unit if unit == other else (other if turns else f"{unit} on a line, {other} about an axis")
 
 
-LINE = Coordinates("position", "velocity", "force", "mass", "stroke", "m")
+LINE = Coordinates("position", "velocity", "force", "mass", "stroke", "stroke", "m")
 AXIS = Coordinates(
-    "angle", "speed", "torque", "inertia", "travel", "rad", {"x": "angle", "v": "speed", "F": "torque"}
-)
+    "angle", "speed", "torque", "inertia", "travel", "angle", "rad",
+    {"x": "angle", "v": "speed", "F": "torque"},
+)  # fmt: skip
 
 
 def moving_in(unit: str) -> Coordinates:

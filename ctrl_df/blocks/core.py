@@ -57,6 +57,11 @@ class Core:
         return len(self.masses)
 
     @property
+    def reduced_mass(self) -> float:
+        """Mass with which two bodies move against each other."""
+        return self.masses[0] * self.masses[-1] / sum(self.masses)
+
+    @property
     def motions(self) -> tuple[str, ...]:
         """Names of the positions and speeds, the first states."""
         return ("x", "v", "x_motor", "v_motor")[: 2 * self.bodies]

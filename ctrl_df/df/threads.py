@@ -6,7 +6,7 @@ import os
 import threading
 from concurrent.futures import CancelledError, Future
 
-from ..simulate.crew import pool
+from ..simulate.parallel import pool
 
 _here = threading.local()
 

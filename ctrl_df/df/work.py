@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..checks import executor as checked_executor
-from ..simulate.crew import processors
+from ..simulate.parallel import processors
 from .executors import by_executor, check_picklable
 from .family import Family
 from .family_file import FORMAT, place_for, read_arrays, write_arrays

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..limit_cycles.thresholds import LOEB
+from ..limit_cycles.predicted.thresholds import LOEB
 from .controller import GAINS
 from .plane import Plane
 from .thresholds import JUMP, POLISH_STEPS, POLISHED, SINGULAR

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from ..limit_cycles.exact.fate import Fate
 from ..limit_cycles.exact.orbit import Orbit
 from ..limit_cycles.finder import OrbitFinder
-from ..simulate.crew import require_compiled, side_by_side
+from ..simulate.parallel import require_compiled, side_by_side
 from .controller import Structure
 from .thresholds import ORDER
 

@@ -17,7 +17,7 @@ from ..df.work import progress_bar
 from ..limit_cycles.check import Check
 from ..limit_cycles.predicted.predict import describing_function_response
 from ..limit_cycles.verify import verify
-from ..simulate.crew import side_by_side
+from ..simulate.parallel import side_by_side
 from ..table import Table
 from .arguments import bounds, gain_units
 from .controller import GAINS, Structure

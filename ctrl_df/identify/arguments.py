@@ -250,13 +250,20 @@ def _article(word: str) -> str:
     return f"an {word}" if word[0] in "aeiou" else f"a {word}"
 
 
-def check_limits(limits) -> None:
-    """Check what the next experiment may do to the machine."""
-    if limits is None:
-        return
-    for name, value in mapping("diagnose", "limits", limits, "{'force': 40.0, 'stroke': 0.1}").items():
-        known_name("diagnose", "limits", name, ("force", "stroke"))
-        positive("diagnose", f"limits[{name!r}]", value, "N" if name == "force" else "m")
+def limit_units(block: Mechanism) -> dict[str, str]:
+    """Return the unit of each limit of an experiment: of the input, of the distance from the start."""
+    moves = block.coordinates
+    return {_driven_by(block): block.signals[block.input_labels[0]], moves.reach: moves.unit}
+
+
+def check_limits(owner: str, block: Mechanism, limits) -> dict[str, float]:
+    """Return what the next experiment may do to the machine, in the words of its motion."""
+    units = limit_units(block)
+    example = str(dict.fromkeys(units, 1.0))
+    return {
+        known_name(owner, "limits", name, units): positive(owner, name, value, units[name])
+        for name, value in mapping(owner, "limits", {} if limits is None else limits, example).items()
+    }
 
 
 def check_held_out(records, validation) -> None:

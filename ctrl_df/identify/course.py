@@ -15,7 +15,7 @@ from typing import Any
 
 from ..checks import CHECK_VALUE, positive, shown
 from ..df.work import progress_bar
-from ..simulate import crew
+from ..simulate import parallel
 from .thresholds import BEAT, SILENT_MOST
 
 COMPLETE, UNDER_WAY, BUDGET_SPENT, INTERRUPTED = "complete", "under way", "budget spent", "interrupted"
@@ -68,7 +68,7 @@ class Course:
 
     def stage(self, text: str) -> None:
         """Tell what is done from here on."""
-        crew.check()
+        parallel.check()
         self._stage, self._jobs = text, 0
         self._tell(text)
         if self._bar is not None:
@@ -92,13 +92,13 @@ class Course:
         _log.debug("%s: known so far\n%s", self.owner, answer)
         if self._callback is not None:
             self._callback(answer)
-        crew.check()
+        parallel.check()
 
     def within(self, whole: Callable[[Any], Any]) -> Course:
         """Return the course of a part: its answers count as what `whole` makes of them."""
         return _Part(self, whole)
 
-    # --- crew.Watch -----------------------------------------------------------------------------------
+    # --- parallel.Watch -----------------------------------------------------------------------------------
 
     beat = BEAT
 
@@ -131,9 +131,9 @@ class Course:
             Ctrl-C before anything was known.
         """
         try:
-            with crew.watched(self), crew.one_thread_each(), self._shown():
+            with parallel.watched(self), parallel.one_thread_each(), self._shown():
                 return work()
-        except crew.TimeUp:
+        except parallel.TimeUp:
             status = BUDGET_SPENT
         except KeyboardInterrupt:
             if self.latest is None:

@@ -68,7 +68,8 @@ def diagnose(
     executor : concurrent.futures.Executor or None
         Runs candidates side by side; None: threads of this process do.
     limits : mapping or None
-        ``force`` [N] and ``stroke`` [m] for `next_experiment`.
+        For `next_experiment`: ``force`` [N] and ``stroke`` [m]; of a machine that turns ``torque`` [N m] and
+        ``angle`` [rad]; of one driven by a motor ``voltage`` [V] or ``current`` [A] instead.
     progress : bool, callable or None
         Whether to tell on stderr what is being done (None: where that is a terminal); or a function that
         takes a line of text. The logger ``ctrl_df`` has the same lines.
@@ -104,11 +105,11 @@ def diagnose(
     ('effect', 'constant_force', 1.0)
     """
     checked_executor("diagnose", executor)
-    check_limits(limits)
     classes = effect_classes(candidates)
     course = Course("diagnose", progress, callback, budget)
     dataset = dataset_of(model, data, holdout)
     block = mechanism_of(model)
+    limits = check_limits("diagnose", block, limits)
     check_quantities(block, (*dataset.records, *dataset.validation))
     own = own_parameters(block, own)
     names = with_those(dataset.free_parameters(block, free), own)

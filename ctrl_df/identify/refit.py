@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..simulate.crew import one_thread_each
+from ..simulate.parallel import one_thread_each
 from .arguments import (
     check_fit,
     check_quantities,

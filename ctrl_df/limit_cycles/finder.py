@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import control as ct
@@ -19,6 +20,15 @@ from .exact.fate import Explorer
 from .exact.orbit import NoOrbit, Orbit, Try
 from .exact.poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch
 from .exact.shrinking import Merged, trace
+from .exact.thresholds import (
+    COURSE_RTOL,
+    CROSSINGS,
+    CROSSINGS_AVERAGED,
+    PIECES,
+    RECENT_CLOSED,
+    REPEATS_LEAST,
+    STEPS_A_PERIOD,
+)
 from .forced_start import harmonic_start, path_starts
 from .pieces import by_pieces
 from .predicted.answer import responder
@@ -27,20 +37,17 @@ from .predicted.path import End, Path, corrected_near, follow_path
 from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
-    COURSE_RTOL,
-    CROSSINGS,
-    CROSSINGS_AVERAGED,
+    AVERAGED_LEAST,
     ENOUGH,
     EVENTS_KEPT,
+    LAPS,
     NEAR_MISS,
     NOTHING,
-    PIECES,
-    RECENT_CLOSED,
-    REPEATS_LEAST,
     RETURN_GONE,
     RETURN_NEAR,
     RETURN_POINTS,
     RETURN_RTOL,
+    RETURNS,
     SAME_AS_PATH,
     SAME_CYCLE,
 )
@@ -100,17 +107,46 @@ def find_limit_cycle(
             "whose state is a whole history. Find its motion by simulation (event_response, or the rows of "
             "verify), or put a lag of the same time (input_lag) in its place."
         )
-    if guess is None:
-        found = finder.search(search_time)
-        orbit = next(iter(sorted(found, key=lambda o: o.stable is not True)), None)
-    else:
-        orbit = finder.from_guess(guess)
-    answer = orbit if orbit is not None else finder.none()
+    orbit, none = finder.search(search_time) if guess is None else finder.from_guess(guess)
+    answer = none if orbit is None else orbit
     if raise_on_failure and (not answer or not answer.status.ok):
         error = RuntimeError(str(answer) if not answer else str(answer.status))
         error.orbit = answer  # type: ignore[attr-defined]
         raise error
     return answer
+
+
+@dataclass
+class _Attempts:
+    """What was tried from one guess, or in one search, and how each try ended.
+
+    `merged`: the guess was shown to belong to no orbit; `centre`: orbits of every amplitude lie side by side.
+    """
+
+    tried: list[Try] = field(default_factory=list)
+    mismatches: list[float] = field(default_factory=list)
+    merged: bool = False
+    centre: bool = False
+
+    def tell(self, start: str, outcome: str) -> None:
+        """Take note of a try."""
+        self.tried.append(Try(start, outcome))
+
+    def failed(self, start: str, why: NoClosure) -> None:
+        """Take note of a try that closed no orbit."""
+        self.centre = self.centre or isinstance(why, Centre)
+        self.merged = self.merged or isinstance(why, Merged)
+        self.mismatches.append(why.mismatch)
+        self.tell(start, str(why))
+
+    def none(self) -> NoOrbit:
+        """Return what the answer is where nothing was found, with all that was tried."""
+        status = Status.NOT_FOUND
+        if self.merged:
+            status = Status.NO_SUCH_ORBIT
+        elif self.centre:
+            status = Status.CENTRE
+        return NoOrbit(status, tuple(self.tried))
 
 
 class OrbitFinder:
@@ -119,12 +155,11 @@ class OrbitFinder:
     A sampled loop has no period of its own, one with a pure delay no finite state: both are followed until
     they repeat or the bound on work is hit, and averaged.
 
-    Attributes
+    Parameters
     ----------
-    tried : list of Try
-        What was tried since the last guess or search, and how each try ended.
-    merged : bool
-        Whether the last guess was shown to belong to no orbit.
+    loop : ct.NonlinearIOSystem
+    max_iterations : int
+        Bound on Newton steps.
     """
 
     def __init__(self, loop, max_iterations=40):
@@ -139,73 +174,63 @@ class OrbitFinder:
         self.by_simulation = self.sampled or self.engine.delayed
         self.closing: Any = None if self.engine.delayed else Closing(loop, self.engine, max_iterations)
         self.poincare = PoincareSearch(loop, self.engine)
-        self.explorer = Explorer(self.poincare, self._closed_from)
-        self.tried: list[Try] = []
-        self.merged = False
-        self.centre = False
-        self.missed = np.inf
-
-    def none(self) -> NoOrbit:
-        """Return the answer that nothing was found, with all that was tried."""
-        status = Status.NOT_FOUND
-        if self.merged:
-            status = Status.NO_SUCH_ORBIT
-        elif self.centre:
-            status = Status.CENTRE
-        return NoOrbit(status, tuple(self.tried))
+        self.explorer = Explorer(self.poincare, partial(self._closed_from, _Attempts()))
 
     # --- from a guess -------------------------------------------------------------------------------------
 
-    def from_guess(self, guess) -> Orbit | None:
-        """Return the orbit that a guess leads to, as `checked_guess` returns it; None if to none."""
-        self.tried, self.merged, self.centre = [], False, False
+    def from_guess(self, guess) -> tuple[Orbit | None, NoOrbit]:
+        """Return the orbit that a guess, as `checked_guess` returns it, leads to, and what was tried."""
+        attempts = _Attempts()
+        return self._from_guess(attempts, guess), attempts.none()
+
+    def _from_guess(self, attempts, guess) -> Orbit | None:
         if isinstance(guess, Orbit):
-            return self._from_orbit(guess)
+            return self._from_orbit(attempts, guess)
         if isinstance(guess, np.ndarray):
-            return self._from_state(guess)
+            return self._from_state(attempts, guess)
         amplitude, omega = (guess.amplitude, guess.omega) if hasattr(guess, "amplitude") else guess
         told = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
         if self.by_simulation:
-            return self._simulated(self._start(guess, amplitude, omega), "the prediction")[0]
+            return self._simulated(attempts, self._start(guess, amplitude, omega), "the prediction")[0]
         others: list[Orbit] = []
         # the path's own orbit is the guess's, however far its harmonics have moved it
         for name, path in self._paths(guess, amplitude, omega):
-            orbit = self._closed_path(path, name)
+            orbit = self._closed_path(attempts, path, name)
             if orbit is not None and self._belongs(orbit, path):
                 return self._noted(orbit, amplitude, omega, told)
             others += [orbit] if orbit is not None else []
-        if self.merged and not any(_near(o, amplitude, omega) for o in others):
+        if attempts.merged and not any(_near(o, amplitude, omega) for o in others):
             return None
         start = self._start(guess, amplitude, omega)
-        orbit = self._closed(start, 2 * np.pi / omega, "the block's forced motion")
+        orbit = self._closed(attempts, start, 2 * np.pi / omega, "the block's forced motion")
         others += [orbit] if orbit is not None else []
         if not any(_near(o, amplitude, omega) for o in others):
-            orbit = self._simulated(start, "a simulation from there")[0]
+            orbit = self._simulated(attempts, start, "a simulation from there")[0]
             others += [orbit] if orbit is not None else []
         if not others:
             return None
         return self._noted(min(others, key=lambda o: _distance(o, amplitude, omega)), amplitude, omega, told)
 
-    def _from_orbit(self, guess):
+    def _from_orbit(self, attempts, guess):
         start = guess.states[:, 0]
         if self.by_simulation:
-            return self._simulated(start, "the orbit given")[0]
-        orbit = self._closed(start, guess.period, "the orbit given")
-        return orbit if orbit is not None else self._simulated(start, "a simulation from it")[0]
+            return self._simulated(attempts, start, "the orbit given")[0]
+        orbit = self._closed(attempts, start, guess.period, "the orbit given")
+        return orbit if orbit is not None else self._simulated(attempts, start, "a simulation from it")[0]
 
-    def _from_state(self, x0):
+    def _from_state(self, attempts, x0):
         """Close the orbit that a state stands on or near; else what a simulation from it comes to."""
         if self.by_simulation:
-            return self._simulated(x0, "the state given")[0]
+            return self._simulated(attempts, x0, "the state given")[0]
         for period in self._returns(x0):
-            orbit = self._closed(x0, period, f"the state given, period {period:.5g} s")
+            orbit = self._closed(attempts, x0, period, f"the state given, period {period:.5g} s")
             if orbit is not None:
                 return orbit
-        return self._simulated(x0, "a simulation from the state given")[0]
+        return self._simulated(attempts, x0, "a simulation from the state given")[0]
 
-    def _returns(self, x0, most=4):
+    def _returns(self, x0, most=RETURNS):
         """Return times after which a simulation from a state comes near it again, nearest first."""
-        course = self.poincare.iterate(x0, 4, until_repeated=False)
+        course = self.poincare.iterate(x0, RETURNS, until_repeated=False)
         span = course.crossings[-1].time if course.crossings else self.poincare.stride
         times = np.linspace(0.0, span, RETURN_POINTS)
         run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
@@ -241,34 +266,43 @@ class OrbitFinder:
         output = fed_back if fed_back in getattr(block, "output_labels", ()) else None
         return responder(block, method_for(block, output)), LinearPart(self.parts.controller)
 
-    def _closed_path(self, path: Path, name):
+    def _closed_path(self, attempts, path: Path, name):
         if path.end is End.MERGED:
-            self.merged = True
+            attempts.merged = True
             a, w = path.solution
-            self.tried.append(
-                Try(name, f"it merges with the prediction at {a:.5g} @ {w:.5g} rad/s once {path.share:.0%} "
-                    "of the harmonics are fed back")
-            )  # fmt: skip
+            attempts.tell(
+                name,
+                f"it merges with the prediction at {a:.5g} @ {w:.5g} rad/s once {path.share:.0%} of the "
+                "harmonics are fed back",
+            )
             return None
         if path.end is not End.REACHED:
-            self.tried.append(Try(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)"))
+            attempts.tell(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)")
             return None
-        self.missed = np.inf
+        earlier = len(attempts.mismatches)
         (start,), period = path_starts(self.loop, path, 1), 2 * np.pi / path.omega
-        orbit = self._closed(start, period, name)
+        orbit = self._closed(attempts, start, period, name)
         if orbit is None:
             along = np.array(path_starts(self.loop, path, PIECES))
-            orbit = self._closed(along, period, "states all along it", self.closing.close_along)
+            orbit = self._closed(attempts, along, period, "states all along it", self.closing.close_along)
         if orbit is None or _distance(orbit, *path.solution) > AT_ITS_END:
             at = by_pieces(self.loop, path)
-            exact = None if at is None else self._closed(*at, "the pieces it runs through", self._close_here)
+            exact = (
+                None
+                if at is None
+                else self._closed(attempts, *at, "the pieces it runs through", self._close_here)
+            )
             if exact is not None and (
                 orbit is None or _distance(exact, *path.solution) < _distance(orbit, *path.solution)
             ):
                 orbit = exact
-        if orbit is None and self.missed < NEAR_MISS:
+        if orbit is None and min(attempts.mismatches[earlier:], default=np.inf) < NEAR_MISS:
             orbit = self._closed(
-                start, period, "the mismatch after a period, let shrink", lambda *at: trace(self.closing, *at)
+                attempts,
+                start,
+                period,
+                "the mismatch after a period, let shrink",
+                lambda *at: trace(self.closing, *at),
             )
         return orbit
 
@@ -298,18 +332,21 @@ class OrbitFinder:
 
     # --- without a guess ----------------------------------------------------------------------------------
 
-    def search(self, search_time=None) -> list[Orbit]:
-        """Orbits that simulations from starts of many sizes end on, and those between different fates."""
-        self.tried, self.merged, self.centre = [], False, False
-        fate = self.explorer.explore(search_time, edges=not self.by_simulation)
-        self.tried += [
-            Try(f"rest, displaced: {row.size:.3g} {self.poincare.kicks.unit}", row.told) for row in fate
-        ]
-        found = [o for o in fate.orbits if o.status.ok]
-        # averages over irregular motion are an answer only where nothing repeats
-        return found or fate.orbits[:1]
+    def search(self, search_time=None) -> tuple[Orbit | None, NoOrbit]:
+        """Return an orbit that simulations from starts of many sizes end on, or that parts their fates.
 
-    def _closed_from(self, x0, course, complete=True) -> Orbit | None:
+        And what was tried. Stable ones come first; averages over irregular motion are an answer only where
+        nothing repeats.
+        """
+        attempts = _Attempts()
+        explorer = Explorer(self.poincare, partial(self._closed_from, attempts))
+        fate = explorer.explore(search_time, edges=not self.by_simulation)
+        for row in fate:
+            attempts.tell(f"rest, displaced: {row.size:.3g} {self.poincare.kicks.unit}", row.told)
+        found = [o for o in fate.orbits if o.status.ok] or fate.orbits[:1]
+        return min(found, key=lambda o: o.stable is not True, default=None), attempts.none()
+
+    def _closed_from(self, attempts, x0, course, complete=True) -> Orbit | None:
         """Orbit that a course comes near: closed where it can be, else an average where it is sustained."""
         crossings = course.crossings
         if len(crossings) < ENOUGH or course.fate in (RESTS, DIVERGES):
@@ -318,19 +355,19 @@ class OrbitFinder:
             return None
         if self.by_simulation:
             return self._averaged(x0, crossings, self.poincare.repeats(crossings))
-        orbit = self._closed_crossings(crossings)
+        orbit = self._closed_crossings(attempts, crossings)
         if complete and course.fate == UNDECIDED and orbit is not None and orbit.stable is False:
             orbit = None  # one of many that an irregular motion passes: rounding tells which
         if orbit is None and complete and course.fate == UNDECIDED and len(crossings) >= CROSSINGS:
             return self._averaged(x0, crossings, False)
         return orbit
 
-    def _closed_crossings(self, crossings):
+    def _closed_crossings(self, attempts, crossings):
         """Close the orbit that a course's passages come nearest to repeating, after one period or a few."""
         recent = crossings[-RECENT_CLOSED:]
         least = REPEATS_LEAST * self.poincare.units
         size = np.maximum(np.max(np.abs([crossing.state for crossing in recent]), axis=0), least)
-        for laps_per_period in range(1, 5):
+        for laps_per_period in range(1, LAPS + 1):
             apart = [
                 float(np.max(np.abs(recent[k].state - recent[k - laps_per_period].state) / size))
                 for k in range(laps_per_period, len(recent))
@@ -343,33 +380,30 @@ class OrbitFinder:
             try:
                 return self.closing.close(recent[k].state, recent[k].time - recent[k - laps_per_period].time)
             except Centre:
-                self.centre = True
+                attempts.centre = True
             except NoClosure:
                 pass
         return None
 
-    def _simulated(self, x0, name, search_time=None):
+    def _simulated(self, attempts, x0, name, search_time=None):
         """Follow the loop from a start; close what it comes to. Returns (orbit or None, course)."""
         course = self.poincare.iterate(x0, CROSSINGS, search_time)
-        orbit = self._closed_from(x0, course)
+        orbit = self._closed_from(attempts, x0, course)
         words = {RESTS: "comes to rest", DIVERGES: "diverges", CYCLES: "repeats"}.get(
             course.fate, "no period"
         )
         if orbit is not None:
             words = f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s"
-        self.tried.append(Try(name, words))
+        attempts.tell(name, words)
         return orbit, course
 
-    def _closed(self, start, period, name, close=None) -> Orbit | None:
+    def _closed(self, attempts, start, period, name, close=None) -> Orbit | None:
         try:
             orbit = (close or self.closing.close)(start, period)
         except NoClosure as why:
-            self.centre = self.centre or isinstance(why, Centre)
-            self.merged = self.merged or isinstance(why, Merged)
-            self.missed = min(self.missed, why.mismatch)
-            self.tried.append(Try(name, str(why)))
+            attempts.failed(name, why)
             return None
-        self.tried.append(Try(name, f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s"))
+        attempts.tell(name, f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s")
         return orbit
 
     def feasible(self, x):
@@ -388,13 +422,13 @@ class OrbitFinder:
         begin = self.engine.run(self.poincare.start(x0), crossings[-1].time, rtol=COURSE_RTOL, log=1).state
         later = self.poincare.iterate(begin, min(swings, len(crossings)), until_repeated=False).crossings
         count = len(later) - 1
-        if count < 4:
+        if count < AVERAGED_LEAST:
             return None
         period = (later[-1].time - later[0].time) / count
         omega = 2 * np.pi / period
         t0, span = begin.time, count * period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
-        times = t0 + np.linspace(0, min(4, count) * period, AVERAGE_POINTS)
+        times = t0 + np.linspace(0, min(AVERAGED_LEAST, count) * period, AVERAGE_POINTS)
         run = self.engine.run(
             begin,
             t0 + span,
@@ -402,7 +436,7 @@ class OrbitFinder:
             rtol=COURSE_RTOL,
             spectrum=spectrum,
             omega=omega,
-            max_step=period / 8,
+            max_step=period / STEPS_A_PERIOD,
         )
         if not run.status.ok:
             return None

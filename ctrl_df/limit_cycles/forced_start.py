@@ -11,9 +11,10 @@ from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
+from .exact.thresholds import COURSE_RTOL, STEPS_A_PERIOD
 from .predicted.answer import responder
 from .predicted.path import Path
-from .thresholds import COURSE_RTOL, FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
+from .thresholds import FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
 
 
 def harmonic_start(loop: Any, amplitude, omega: float, output_amplitude=None, motion=None) -> np.ndarray:
@@ -127,7 +128,12 @@ def _forced_from(engine, core, row, x0, U, omega):
 
 
 def _options(period, U) -> dict[str, Any]:
-    return dict(rtol=COURSE_RTOL, max_step=period / 8 / (len(U) - 1) ** 0.5, log=1, max_steps=FORCED_STEPS)
+    return dict(
+        rtol=COURSE_RTOL,
+        max_step=period / STEPS_A_PERIOD / (len(U) - 1) ** 0.5,
+        log=1,
+        max_steps=FORCED_STEPS,
+    )
 
 
 def _measured(engine, core, row, state, U, omega):

@@ -12,9 +12,10 @@ from .check import Check, Row, in_band
 from .exact.fate import Fate
 from .exact.known import KnownOrbits
 from .exact.orbit import NoOrbit, Orbit
+from .exact.thresholds import COURSE_RTOL, CROSSINGS_VERIFIED, STEPS_A_PERIOD
 from .finder import OrbitFinder
 from .predicted.grade import LimitCycle
-from .thresholds import CONFIRMED_WITHIN, COURSE_RTOL, CROSSINGS_VERIFIED, LEFT_ALONE, SAME_CYCLE
+from .thresholds import CONFIRMED_WITHIN, LEFT_ALONE, MET_LEAST, SAME_CYCLE
 
 CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
@@ -81,9 +82,8 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     sought: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
     for cycle in cycles if finder.parts is not None else []:
-        found = finder.from_guess(cycle)
+        found, sought[id(cycle)] = finder.from_guess(cycle)
         orbit = known.kept(found)
-        sought[id(cycle)] = finder.none()
         if found is not None and orbit is not None and not found.note:
             led[id(cycle)] = orbit
     fate = Fate()
@@ -184,7 +184,7 @@ def simulated(
     if orbit.stable is None:
         return orbit.omega, orbit.output_amplitude
     met = finder.poincare.iterate(finder.feasible(orbit.states[:, 0] * (1 + kick)), crossings).crossings
-    if len(met) < 8:
+    if len(met) < MET_LEAST:
         return None
     t = np.array([s[0] for s in met])
     span = t[-1] - t[len(t) // 2]
@@ -199,7 +199,7 @@ def simulated(
         engine.start(met[-1][1]),
         period,
         rtol=COURSE_RTOL,
-        max_step=period / 8,
+        max_step=period / STEPS_A_PERIOD,
         spectrum=spectrum,
         omega=omega,
     )

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks.core import Core
-from .crew import Elsewhere, Stopped, flag
 from .kernel.imposed import answer, room
+from .parallel import Elsewhere, Stopped, flag
 from .program.imposed import laws_of
 from .program.pointers import raise_kept
 from .thresholds import IMPOSED_RTOL, PLACE_GRAIN, TURN_INSIDE

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from ..status import Status
-from . import crew
-from .crew import processors
+from . import parallel
 from .engine import STATUS
 from .groups import Group
 from .kernel import driver, many
 from .kernel.many import Drives, How, Rows
 from .kernel.space import lent_space
+from .parallel import processors
 from .program import pointers
 from .program.layout import H_AFFINE
 from .thresholds import FAR, HEIGHT, MAX_STEPS, RTOL, STEPS_ALONE, TOGETHER_RUNS
@@ -124,10 +124,10 @@ def run_many(
     ------
     KeyboardInterrupt
         Ctrl-C, within a fraction of a second.
-    crew.Stopped, crew.TimeUp
+    parallel.Stopped, parallel.TimeUp
         Nobody waits for these runs any more.
     """
-    crew.check()
+    parallel.check()
     runs = sum(len(g.runs) for g in groups)
     engine = groups[0].engine
     rows = _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, engine)
@@ -201,7 +201,7 @@ class _Work:
 
     def on_threads(self, threads: int) -> None:
         """Make all runs, so many at once; a job makes its own, with the processors that have no job."""
-        flag = crew.flag()
+        flag = parallel.flag()
         if flag is not None:
             self._as_job(flag, threads)
             return
@@ -217,11 +217,13 @@ class _Work:
                 self._run(self._desk(self.groups[0], lent), self.groups[0], np.zeros(0, np.int64))
             _ready.add(curved)
         # this thread only waits: it is the one that hears Ctrl-C
-        workers = [crew.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)]
+        workers = [
+            parallel.pool(os.getpid(), threads, "runs").submit(self._work, todo) for _ in range(threads)
+        ]
         try:
             for worker in workers:
-                if not wait([worker], crew.left()).done:
-                    raise crew.TimeUp
+                if not wait([worker], parallel.left()).done:
+                    raise parallel.TimeUp
                 worker.result()
         except BaseException:
             self.stop[0] = 1
@@ -230,9 +232,9 @@ class _Work:
 
     def _as_job(self, flag, threads: int) -> None:
         """Make all runs in this thread, and in those of processors that have no job."""
-        self.stop, others = flag, 0 if self.small else min(crew.spare(), threads - 1)
+        self.stop, others = flag, 0 if self.small else min(parallel.spare(), threads - 1)
         todo = deque(self._parts(1 + others) if others else self._whole())
-        pool = crew.pool(os.getpid(), crew.processors(), "runs")
+        pool = parallel.pool(os.getpid(), parallel.processors(), "runs")
         helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
         try:
             self._work(todo)
@@ -243,7 +245,7 @@ class _Work:
         for helper in begun:
             helper.result()
         if flag[0]:
-            raise crew.Stopped
+            raise parallel.Stopped
 
     def one_by_one(self) -> None:
         """Make all runs in this thread: they call functions back that nobody knows to be safe elsewhere."""

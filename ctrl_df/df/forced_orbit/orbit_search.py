@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 import control as ct
 import numpy as np
@@ -43,11 +44,23 @@ from ..thresholds import (
     WITHIN,
 )
 from . import shooting
-from .linear_orbit import linear_orbit
+from .linear_orbit import LinearOrbit, linear_orbit
 from .newton import differentiate_of
-from .period_map import apply, iterate, make_period_map, set_state
+from .period_map import PeriodMap, apply, iterate, make_period_map, set_state
 from .shooting import CLOSED, SPENT, UNSTABLE, solve_periodic
-from .symmetries import Probe, Sizes, find_symmetries
+from .symmetries import Probe, Sizes, Symmetries, find_symmetries
+
+
+@dataclass(frozen=True, eq=False)
+class _Laws:
+    """What the laws say for motions of some size."""
+
+    sizes: Sizes
+    symmetries: Symmetries
+    shot: PeriodMap
+    free_row: bool
+    linear: LinearOrbit | None
+
 
 BIT = {name: 1 << i for i, name in enumerate(EVENT_KINDS)}
 TOUCH = BIT["impact"] | BIT["contact"] | BIT["release"]
@@ -106,19 +119,42 @@ class OrbitSearch:
         self.atol = 0.0
         self.mirrored = self.repels = False
         self._about: tuple | None = None
-        self._answers: dict[tuple, tuple] = {}
-        self.sizes = Sizes.ones(self.engine.nstates)
-        self._ask(self.sizes)
+        self._answers: dict[tuple, _Laws] = {}
+        self._laws = self._asked(Sizes.ones(self.engine.nstates))
         self.forget()
 
-    def _ask(self, sizes: Sizes):
+    def _asked(self, sizes: Sizes) -> _Laws:
         """Find the symmetries of the laws for motions of such sizes, and what follows from them."""
-        self.symmetries = s = find_symmetries(self.engine, self.block, sizes)
+        s = find_symmetries(self.engine, self.block, sizes)
         self._check(s)
-        self.symmetric = s.odd
-        self.shot = make_period_map(self.engine, s, self.row + 1)
-        self.free_row = self._row_is_free(s, sizes)
-        self.linear = linear_orbit(self.engine, s, self.row, self.free_row)
+        shot = make_period_map(self.engine, s, self.row + 1)
+        free_row = self._row_is_free(s, sizes)
+        return _Laws(sizes, s, shot, free_row, linear_orbit(self.engine, s, self.row, free_row))
+
+    @property
+    def symmetries(self) -> Symmetries:
+        """Those of the laws for motions of the size aimed at."""
+        return self._laws.symmetries
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the laws are odd there."""
+        return self.symmetries.odd
+
+    @property
+    def shot(self) -> PeriodMap:
+        """The map over a period, or half of one."""
+        return self._laws.shot
+
+    @property
+    def free_row(self) -> bool:
+        """Whether the output described shifts with a free position."""
+        return self._laws.free_row
+
+    @property
+    def linear(self) -> LinearOrbit | None:
+        """The orbit in closed form, where the laws are linear."""
+        return self._laws.linear
 
     def acquaint(self, A, omega, whatever_before=False) -> bool:
         """Ask the laws about motions of this size, unless they were asked about ones not far from it.
@@ -126,12 +162,11 @@ class OrbitSearch:
         With `whatever_before` what they were asked before makes no difference: answers do not depend on it.
         Returns whether they were asked: what is known of orbits is then forgotten.
         """
-        if not whatever_before and self.sizes.near(Sizes(self._motion(A, omega), A, omega), FAMILIAR):
+        if not whatever_before and self._laws.sizes.near(Sizes(self._motion(A, omega), A, omega), FAMILIAR):
             return False
         about = tuple(BINS * round(math.log10(max(size, NOTHING)) / BINS) for size in (A, omega))
         if about == self._about:
             return False
-        self._about = about
         if about not in self._answers:
             force, rate = (float(10.0**x) for x in about)
             states = self._motion(force, rate)
@@ -146,18 +181,16 @@ class OrbitSearch:
             pointers.raised.clear()
             if np.all(np.isfinite(seen)):
                 states = np.where((self.symmetries.power == 0) & (seen > 0), seen, states)
-            self._ask(Sizes(states, force, rate))
-            kept = (self.symmetries, self.symmetric, self.shot, self.free_row, self.linear)
-            self._answers[about] = (Sizes(self._motion(force, rate), force, rate), *kept)
-        self.sizes, self.symmetries, self.symmetric, self.shot, self.free_row, self.linear = self._answers[
-            about
-        ]
+            laws = self._asked(Sizes(states, force, rate))
+            power = laws.symmetries.power
+            self._answers[about] = replace(laws, sizes=Sizes(self._motion(force, rate, power), force, rate))
+        self._about, self._laws = about, self._answers[about]
         self.forget()
         return True
 
-    def _motion(self, A, omega):
+    def _motion(self, A, omega, power=None):
         """Return the size of each state in the motion of a free inertia under the force."""
-        power = self.symmetries.power
+        power = self.symmetries.power if power is None else power
         return A / (np.where(power > 0, self.inertia, 1.0) * omega**power)
 
     def _check(self, s):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...checks import is_number, shown
 from .derivatives import grain, step_of
-from .thresholds import BESIDE, FAST, LEAP, MINIMUM, SINGLE, USUAL_STEPS
+from .thresholds import BESIDE, FAST, LEAP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -103,9 +103,9 @@ def holes(t: np.ndarray) -> np.ndarray:
     steps = np.diff(t)
     middle = float(np.median(steps))
     low, high = np.quantile(steps, USUAL_STEPS)
-    if high > 1.5 * low:
+    if high > MISSING * low:
         return np.zeros(0, int)  # irregular on purpose: every interval is as good as another
-    return np.flatnonzero(steps > max(1.5 * middle, 1.5 * high))
+    return np.flatnonzero(steps > max(MISSING * middle, MISSING * high))
 
 
 def check_input(owner: str, u: np.ndarray) -> None:

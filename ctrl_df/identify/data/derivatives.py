@@ -9,16 +9,25 @@ import numpy as np
 from ...checks import number
 from ..thresholds import ON_SAMPLE, QUARTILE
 from .thresholds import (
+    ABOVE_NOISE,
+    BEYOND_EDGE,
     CUTOFF_HIGHEST,
     CUTOFF_LOWEST,
+    CUTOFF_PERIODS,
     FEW_VALUES,
     FLOOR_LEAST,
+    LOW_PASS_MEMORY,
+    LOW_PASS_ORDER,
     ON_STEP,
     ON_STEPS,
     PADDING,
     REGULAR,
+    SEGMENTS,
+    SEGMENTS_CUTOFF,
     SPECTRUM_LENGTH,
     THINNED_BAND,
+    THINNED_MEMORY,
+    THINNED_ORDER,
     THINNED_RIPPLE,
     WHITE_BAND,
 )
@@ -55,7 +64,7 @@ def step_of(y: np.ndarray) -> float:
     return quantum if np.mean(off < ON_STEP + ON_SAMPLE * len(y)) > ON_STEPS else 0.0
 
 
-def spectrum(y: np.ndarray, dt: float, segments: int = 12) -> tuple[np.ndarray, np.ndarray]:
+def spectrum(y: np.ndarray, dt: float, segments: int = SEGMENTS) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies [Hz] and one-sided spectral density of a signal (averaged, Hann window)."""
     from scipy.signal import welch
 
@@ -95,11 +104,11 @@ def usual_noise(y: np.ndarray) -> float:
 
 def automatic_cutoff(y: np.ndarray, dt: float) -> float:
     """Return the frequency [Hz] above which the signal is no more than ten times its noise floor in power."""
-    f, p = spectrum(y, dt, 24)
+    f, p = spectrum(y, dt, SEGMENTS_CUTOFF)
     floor = max(white_level(f, p), FLOOR_LEAST * float(np.max(p)))
-    above = np.flatnonzero(p > 10 * floor)
-    cutoff = 1.5 * f[above[-1]] if len(above) else CUTOFF_LOWEST * f[-1]
-    return float(min(max(cutoff, 4 / (len(y) * dt), f[1]), CUTOFF_HIGHEST / dt))
+    above = np.flatnonzero(p > ABOVE_NOISE * floor)
+    cutoff = BEYOND_EDGE * f[above[-1]] if len(above) else CUTOFF_LOWEST * f[-1]
+    return float(min(max(cutoff, CUTOFF_PERIODS / (len(y) * dt), f[1]), CUTOFF_HIGHEST / dt))
 
 
 def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -> np.ndarray:
@@ -117,8 +126,8 @@ def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -
     # Removing the mean slope first keeps the ends quiet.
     slope = (values[-1] - values[0]) / (grid[-1] - grid[0])
     rest = values - values[0] - slope * (grid - grid[0])
-    sos = butter(4, cutoff * 2 * dt, output="sos")
-    pad = int(min(len(rest) - 1, max(3 / (cutoff * dt), PADDING)))
+    sos = butter(LOW_PASS_ORDER, cutoff * 2 * dt, output="sos")
+    pad = int(min(len(rest) - 1, max(LOW_PASS_MEMORY / (cutoff * dt), PADDING)))
     d = sosfiltfilt(sos, rest, padtype="odd", padlen=pad)
     for _ in range(order):
         d = np.gradient(d, dt, edge_order=2)
@@ -132,8 +141,8 @@ def thinned(y: np.ndarray, factor: int) -> np.ndarray:
 
     # Flat within 1e-4 (odd order: exact at 0 Hz), 49 dB down at the new Nyquist frequency, both ways
     # together.
-    sos = cheby1(9, THINNED_RIPPLE, THINNED_BAND / factor, output="sos")
-    pad = min(len(y) - 1, 40 * factor)
+    sos = cheby1(THINNED_ORDER, THINNED_RIPPLE, THINNED_BAND / factor, output="sos")
+    pad = min(len(y) - 1, THINNED_MEMORY * factor)
     return sosfiltfilt(sos, y, padtype="odd", padlen=pad)[::factor]
 
 

@@ -19,7 +19,7 @@ from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
-from .thresholds import MINIMUM, REGULAR, THINNED_BAND
+from .thresholds import MINIMUM, REGULAR, THINNED_BAND, WINDOW_LEAST
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
 
@@ -406,9 +406,10 @@ class Measurement:
         length, overlap = number("windows", "length", length, "s"), number("windows", "overlap", overlap)
         if not 0 <= overlap < 1:
             raise ValueError(f"windows needs 0 <= overlap < 1 (share of a window); got overlap={overlap!r}.")
-        if not length > 9 * self.dt:
+        if not length > WINDOW_LEAST * self.dt:
             raise ValueError(
-                f"windows needs a length over 9 samples ({9 * self.dt:g} s); got length={length!r}."
+                f"windows needs a length over {WINDOW_LEAST} samples ({WINDOW_LEAST * self.dt:g} s); got "
+                f"length={length!r}."
             )
         if not length * (1 - overlap) > 0.5 * self.dt:
             raise ValueError(

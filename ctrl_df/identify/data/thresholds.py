@@ -69,3 +69,24 @@ reach beyond it, two octaves lower in a position for every one above."""
 STILL, SLOW = 6.0, 3.0
 """Standard deviations of the smoothed position's noise, three to either side, up to which a way back is none;
 of the speed's, up to which its direction is not known."""
+
+MISSING = 1.5
+"""Over the usual interval: a longer one lacks a sample, half way to two intervals."""
+
+SEGMENTS, SEGMENTS_CUTOFF = 12, 24
+"""Segments of a spectrum, known to 0.3 of its level then, one over the root of them; of one whose edge is
+sought."""
+
+ABOVE_NOISE, BEYOND_EDGE, CUTOFF_PERIODS = 10.0, 1.5, 4
+"""Power over the noise floor that is signal; cutoff over its highest frequency; periods of a cutoff in a
+record, at least."""
+
+LOW_PASS_ORDER, LOW_PASS_MEMORY = 4, 3
+"""Order of the low-pass before derivatives, twice for both ways; periods of its cutoff after which it has
+forgotten."""
+
+THINNED_ORDER, THINNED_MEMORY = 9, 40
+"""Order of the low-pass before thinning, odd: exact at 0 Hz; new samples after which it has forgotten."""
+
+WINDOW_LEAST = 9
+"""Samples that a window of a record has to be longer than: a record has ten (`MINIMUM`)."""

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from ..arguments import check_window
 from ..estimation.fit import segment_lengths
 from ..estimation.refit_records import blurred, doubts, refit_records
-from ..estimation.thresholds import RESTARTS_KEPT
+from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
 from ..prediction.prepared import REFERENCE
 from ..prediction.segments import make_segments
@@ -56,7 +56,7 @@ class TimeDataset(Dataset):
         self.check_segments(mode, window)
         mode = "windows" if mode == "auto" and window is not None else mode
         lengths = segment_lengths(model, self.records, mode, window)
-        problem = Problem(model, self.records, (), 10_000, followed=RESTARTS_KEPT)
+        problem = Problem(model, self.records, (), UNCOUNTED, followed=RESTARTS_KEPT)
         cut = [make_segments(r, n) for r, n in zip(self.records, lengths, strict=True)]
         return self._comparison(model, cut, find_states(Stage(problem, cut, 1)))
 

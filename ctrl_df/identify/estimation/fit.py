@@ -17,7 +17,7 @@ from ..prediction.decimated import thinnable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
-from ..prediction.thresholds import SEGMENT_LEAST
+from ..prediction.thresholds import USUAL_SEGMENT_LEAST
 from ..prediction.values import block_of, with_values
 from ..shooting.multiple_shooting import Solution, Stage
 from ..shooting.noise_model import NoiseModel
@@ -29,7 +29,20 @@ from .covariance import covariance_of
 from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_of, weights_of
 from .sensitivity import OutputSensitivity
 from .sigma_points import sigma_points
-from .thresholds import EFFORT_SHORT, RESTARTS_KEPT
+from .thresholds import (
+    EFFORT_SHORT,
+    FIRST_PERIODS,
+    FIRST_STROKES,
+    FREE_UP_TO,
+    ITERATIONS,
+    RESTARTS_KEPT,
+    STAGE_FACTOR,
+    STAGE_LEAST,
+    STAGES,
+    THIN,
+    TOLERANCE,
+    UNCOUNTED,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +232,7 @@ def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=N
         usual = float(window) if window is not None else usual_segment(record)
         free = mode == "free" or simulator.closed
         if mode == "auto" and window is None:
-            free = free or simulator.restoring or record.duration < 1.5 * usual
+            free = free or simulator.restoring or record.duration < FREE_UP_TO * usual
         lengths.append(None if free else usual)
     return lengths
 
@@ -233,14 +246,14 @@ def fit_records(
     budget: int = 120,
     mode: str = "auto",
     window: float | None = None,
-    thin: int = 4,
+    thin: int = THIN,
     polish: int = 2,
     coarse: bool | None = None,
     robust: bool = True,
     starts: Sequence[np.ndarray] | None = None,
-    tolerance: float = 1e-3,
+    tolerance: float = TOLERANCE,
     central: bool = False,
-    iterations: int = 12,
+    iterations: int = ITERATIONS,
     prior: Mapping[str, tuple[float, float]] | None = None,
 ) -> FitResult:
     """Fit a model to records, fast.
@@ -308,10 +321,10 @@ def fit_segments(
     segments: Sequence[Segments],
     names: Sequence[str],
     *,
-    thin: int = 4,
+    thin: int = THIN,
     starts: Sequence[np.ndarray] | None = None,
-    iterations: int = 12,
-    tolerance: float = 1e-3,
+    iterations: int = ITERATIONS,
+    tolerance: float = TOLERANCE,
     robust: bool = False,
     limits: Mapping[str, tuple[float, float]] | None = None,
     about: Mapping[str, Prior] | None = None,
@@ -319,7 +332,7 @@ def fit_segments(
     error_filter: NoiseModel | None = None,
     begins: str = FREE,
     hopeless: float = math.inf,
-    outlook: int = 0,
+    steps_left: int = 0,
     rtol: float = RTOL,
     followed: int = 0,
 ) -> FitResult:
@@ -351,7 +364,7 @@ def fit_segments(
     hopeless : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
-    outlook : int
+    steps_left : int
         Iterations that are to follow in other fits.
     rtol : float
         Relative tolerance of the simulations.
@@ -363,7 +376,7 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, 100_000, limits, error_filter, begins, (hopeless, outlook), about,
+        model, records, names, UNCOUNTED, limits, error_filter, begins, (hopeless, steps_left), about,
         followed,
     )  # fmt: skip
     stage = Stage(problem, list(segments), thin, starts, rtol)
@@ -388,21 +401,26 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
     rings faster than the drive turns: there a few periods of it come first, then more of them.
     """
     spans = [r.duration if n is None else n for r, n in zip(records, lengths, strict=True)]
-    first = [0.5 * facts(r).swing for r in records]
+    first = [FIRST_STROKES * facts(r).swing for r in records]
     core = simulator.block.core if simulator.mechanism else None
     joint = None if core is None or core.coupling is None else core.coupling.effect
     if core is not None and joint is not None:
-        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         stiff = stiffness(joint, simulator.facts.force)
-        first = [min(f, 4 * 2 * math.pi * math.sqrt(mass / max(stiff, NOTHING))) for f in first]
-    first = [max(f, SEGMENT_LEAST * facts(r).dt) for f, r in zip(first, records, strict=True)]
+        first = [
+            min(f, FIRST_PERIODS * 2 * math.pi * math.sqrt(core.reduced_mass / max(stiff, NOTHING)))
+            for f in first
+        ]
+    first = [max(f, USUAL_SEGMENT_LEAST * facts(r).dt) for f, r in zip(first, records, strict=True)]
     stages: list[list[float | None]] = []
     factor = 1.0
-    while any(1.5 * factor * f < span for f, span in zip(first, spans, strict=True)) and len(stages) < 4:
+    while (
+        any(STAGE_LEAST * factor * f < span for f, span in zip(first, spans, strict=True))
+        and len(stages) < STAGES
+    ):
         stages.append([min(factor * f, span) for f, span in zip(first, spans, strict=True)])
         if joint is None:
             break
-        factor *= 4
+        factor *= STAGE_FACTOR
     return stages
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..prediction.values import feasible
 from ..shooting.thresholds import BETTER
 from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE
@@ -25,6 +25,7 @@ from .segmented import CandidateFit, SegmentedData
 from .thresholds import (
     GLANCE,
     GLANCED_ON,
+    LEVELS_BETWEEN,
     MOTOR_LEAST,
     NEAR,
     NEAR_STATES,
@@ -222,7 +223,7 @@ def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit
         least = 2 * OPEN_RANGE[0] * tried.train.parameters[name]
         spreads[name] = max(high - low, least) / math.sqrt(12)
         for _ in range(2 if high > low else 0):
-            values = np.geomspace(low, high, 7)
+            values = np.geomspace(low, high, LEVELS_BETWEEN)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
             i = min(range(len(runs)), key=lambda k: runs[k].validation_rmse)
             if runs[i].validation_rmse < tried.validation_rmse:

@@ -14,14 +14,14 @@ from ..data.derivatives import step_of
 from ..data.measurement import Measurement
 from ..prediction.segments import facts, make_segments
 from ..prediction.values import block_of, with_values
-from ..shooting.thresholds import SEGMENT_LEAST
+from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments
 from .multistart import nonsmooth_names, restarted
 from .per_record import begun_with_angles, unknown_angles
 from .segmented import prepare
-from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS
+from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, POLISH
 
 
 def refit_records(
@@ -50,7 +50,7 @@ def refit_records(
         robust=robust,
         tolerance=tolerance,
         central=True,
-        polish=6,
+        polish=POLISH,
         prior=prior,
     )
     model = _with_angles(model, records, names)
@@ -84,7 +84,7 @@ def _with_angles(model, records: Sequence[Measurement], names):
     """Return the model with the angles that every record has for itself, sought over half strokes."""
     if not unknown_angles(model, names, records):
         return model
-    segments = [make_segments(r, max(0.5 * facts(r).swing, SEGMENT_LEAST * facts(r).dt)) for r in records]
+    segments = [make_segments(r, max(0.5 * facts(r).swing, SHORTEST_SEGMENT * facts(r).dt)) for r in records]
 
     def fit(trial, moved, starts, iterations) -> FitResult:
         return fit_segments(trial, records, segments, moved, starts=starts, iterations=iterations)
@@ -97,7 +97,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
 
     Not for models of which something is hidden, nor for records too short to tell.
     """
-    if min(map(len, records)) < HOLDOUT_PARTS * SEGMENT_LEAST or any(facts(r).imposed for r in records):
+    if min(map(len, records)) < HOLDOUT_PARTS * SHORTEST_SEGMENT or any(facts(r).imposed for r in records):
         return None
     data = prepare(model, records, records)
     near, disturbed = (

@@ -29,10 +29,12 @@ from .per_record import own_values_of, reestimated
 from .starts import carried, least_begins, same_begins
 from .thresholds import (
     BRIEF,
+    EFFORT_MOVED_ON,
     EFFORT_OWN,
     EFFORT_STATES,
     FILTERED,
     HOLDOUT_PARTS,
+    ITERATIONS,
     LEVELS,
     PARAMETER_RANGE,
     RESTARTS_KEPT,
@@ -43,6 +45,8 @@ from .thresholds import (
     SEGMENT_USUAL,
     SEGMENTS,
     SHORTEST,
+    STROKE_SAMPLES,
+    TOLERANCE,
 )
 
 
@@ -243,10 +247,10 @@ class SegmentedData:
         *,
         view=None,
         starts=None,
-        iterations=12,
-        tolerance=1e-3,
+        iterations=ITERATIONS,
+        tolerance=TOLERANCE,
         hopeless=math.inf,
-        outlook=0,
+        steps_left=0,
         followed=0,
     ) -> FitResult:
         """Fit the named parameters over the segments fitted (or those of `view`)."""
@@ -254,7 +258,7 @@ class SegmentedData:
         return fit_segments(
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
-            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, outlook=outlook,
+            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, steps_left=steps_left,
             robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
@@ -283,7 +287,9 @@ class SegmentedData:
                 limits[f"{key}.{name}"] = span
         return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
-    def moved(self, found: FitResult, iterations=6, tolerance=5e-3, hopeless=math.inf) -> FitResult:
+    def moved(
+        self, found: FitResult, iterations=EFFORT_MOVED_ON[0], tolerance=EFFORT_MOVED_ON[1], hopeless=math.inf
+    ) -> FitResult:
         """Fit a model found over other segments to these; those that begin at one sample share states."""
         starts = same_begins(found, self.train.segments)
         if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
@@ -387,7 +393,7 @@ def prepare(
         learn = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
-    thin = min(thin, *(max(1, int(facts(r).swing / (60 * facts(r).dt))) for r in records))
+    thin = min(thin, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records))
     step, thin = thin, thinnable((*records, *validation), thin)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}

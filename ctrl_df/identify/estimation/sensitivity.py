@@ -121,15 +121,13 @@ class OutputSensitivity:
             if all(w.outputs == 1 for w in self.segments):
                 return [slice(0, sum(map(len, self.states)))]
             lengths = [b.stop - b.start for w in self.segments for b in w.blocks]
-            ends = np.cumsum([0, *lengths])
-            return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+            return _end_to_end(lengths)
         lengths = [
             (w.stop - w.start) // self.error_filter.step - self.error_filter.order
             for segments in self.segments
             for w in segments.slices
         ]
-        ends = np.cumsum([0, *lengths])
-        return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
+        return _end_to_end(lengths)
 
     def project(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Return what fits see of signals, one array for all records, less what refitting could explain."""
@@ -137,6 +135,12 @@ class OutputSensitivity:
             [self._without_starts(k, np.reshape(e, (-1, 1)))[:, 0] for k, e in enumerate(signals)]
         )
         return joined - self._basis @ (self._basis.T @ joined)
+
+
+def _end_to_end(lengths) -> list[slice]:
+    """Return the places of parts of these lengths, one after another."""
+    ends = np.cumsum([0, *lengths])
+    return [slice(int(i), int(j)) for i, j in zip(ends[:-1], ends[1:], strict=True)]
 
 
 def _orthonormal(states, segments) -> sparse.csr_array:

@@ -123,3 +123,34 @@ of all. It is near its minimum, or it is dropped."""
 NEXT_TO_NOTHING = 1e-3
 """Share of its size with which an effect is next to nothing: what it changes, a few hundred times the noise
 at most, is then below it."""
+
+ITERATIONS, TOLERANCE = 12, 1e-3
+"""Steps of a fit and relative gain of the cost at which it ends, unless told otherwise."""
+
+THIN = 4
+"""Samples to a step of the input before the full rate, unless told otherwise."""
+
+EFFORT_MOVED_ON = (6, 5e-3)
+"""Of a fit that goes on over other segments."""
+
+UNCOUNTED = 100000
+"""Simulations allowed to fits that their steps bound."""
+
+FREE_UP_TO = 1.5
+"""Usual segments up to which a record is left whole."""
+
+FIRST_STROKES, FIRST_PERIODS, STAGES, STAGE_FACTOR = 0.5, 4, 4, 4
+"""Segments of the first stage of a fit: strokes; periods of an elastic joint. Stages before the last at most,
+and how much longer each is."""
+
+STAGE_LEAST = 1.5
+"""Length of the last stage over that of one before, at least."""
+
+LEVELS_BETWEEN = 7
+"""Static levels tried over an open range: neighbours differ by less than one sample lets see."""
+
+STROKE_SAMPLES = 60
+"""Samples of a to-and-fro motion that thinning leaves at least."""
+
+POLISH = 6
+"""Steps at the full rate of a fit over whole records."""

@@ -31,7 +31,7 @@ from ..thresholds import FLOOR
 from .neighbours import Around, Look
 from .revision import Revision, revised
 from .structure import Structure, plainness
-from .thresholds import BRANCHES
+from .thresholds import BRANCHES, STEPS_COMPARED
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +132,6 @@ class Climb:
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
         self.rungs: dict[tuple[str, ...], Rung] = {}
-        self.best: Study | None = None  # what is known, while something else is tried
 
     def to_the_end(self) -> Study:
         """Return the end of the ladder and its neighbours."""
@@ -140,9 +139,7 @@ class Climb:
         for rung, effect in islice(self._rivals(end), BRANCHES):
             if end.found.verdict != UNKNOWN:
                 break
-            self.best = self._study(end.steps, end.search, UNDER_WAY, around)
-            other = self._again(end, rung, effect)
-            self.best = None
+            other = self._again(end, rung, effect, self._study(end.steps, end.search, UNDER_WAY, around))
             if other is not None:
                 end, around = self._settled(self._on(other))
         steps = self._in_full(end)
@@ -194,8 +191,18 @@ class Climb:
             rung = ahead
         return rung
 
-    def _rung(self, structure: Structure, before: Rung | None, how: dict, step: Step | None = None) -> Rung:
-        """Ask of a structure what it misses; `step`: what is told of it until that is known."""
+    def _rung(
+        self,
+        structure: Structure,
+        before: Rung | None,
+        how: dict,
+        step: Step | None = None,
+        best: Study | None = None,
+    ) -> Rung:
+        """Ask of a structure what it misses.
+
+        `step`: what is told of it until that is known; `best`: what is known of a better one meanwhile.
+        """
         steps = before.steps if before else ()
         self.course.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
@@ -208,7 +215,7 @@ class Climb:
             return _step(found, found.model, errors, how)
 
         def so_far(known: Diagnosed) -> Study:
-            return self.best or self._study((*steps, told(known.diagnosis)), known.search, UNDER_WAY)
+            return best or self._study((*steps, told(known.diagnosis)), known.search, UNDER_WAY)
 
         room = len(structure.added) < self.max_effects
         known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
@@ -313,8 +320,11 @@ class Climb:
             if key not in self.rungs:
                 yield rung, c
 
-    def _again(self, end: Rung, rung: Rung, effect: CandidateEffect) -> Rung | None:
-        """Ask of the model with a rival of an earlier step; return it if it, or what follows, is better."""
+    def _again(self, end: Rung, rung: Rung, effect: CandidateEffect, best: Study) -> Rung | None:
+        """Ask of the model with a rival of an earlier step; return it if it, or what follows, is better.
+
+        `best`: what is known meanwhile.
+        """
         structure = self._beside(rung, effect).structure
         if structure.key in self.rungs:
             return None
@@ -324,7 +334,7 @@ class Climb:
             "instead": tuple(e for e in new if e not in gone),
             "evidence": effect.evidence - max(rung.found.ranking[0].evidence, 0.0),
         }
-        other = self._rung(structure, end, how)
+        other = self._rung(structure, end, how, best=best)
         return other if self._beats(_reached(other), end.structure.block, other.search) else None
 
     def _beats(self, block, end, search: Search) -> bool:
@@ -334,14 +344,14 @@ class Climb:
 
     def _compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
         """Return the evidence for a model over another on the data of a search, and both errors held out."""
-        old, new = (search.fitted(b, self.free(b), 6) for b in (other, block))
-        judged = search.ranked(old, [replace(new, extra=new.extra - old.extra)])[0]
+        old, new = (search.fitted(b, self.free(b), STEPS_COMPARED) for b in (other, block))
+        judged = search.ranked_over(old, [new])[0]
         return judged.evidence, (search.errors(new)[1], search.errors(old)[1])
 
     # --- what is known --------------------------------------------------------------------------------
 
     def _known(self, steps, search: Search, neighbours: Neighbours | None = None) -> None:
-        self.course.known(self.best or self._study(steps, search, UNDER_WAY, neighbours))
+        self.course.known(self._study(steps, search, UNDER_WAY, neighbours))
 
     def _study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
         return Study(

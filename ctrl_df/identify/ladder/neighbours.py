@@ -12,7 +12,7 @@ from ..selection.search import Search
 from ..selection.verdict import worth
 from ..thresholds import RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
-from .thresholds import RIVALS
+from .thresholds import RIVALS, STEPS_NEIGHBOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Around:
 
     def __init__(self, structure: Structure, search: Search, free: Callable):
         self.structure, self.search, self.free = structure, search, free
-        self.own = self._fitted(structure.block, 8)
+        self.own = self._fitted(structure.block, STEPS_NEIGHBOUR)
         self.near: list[tuple[Trial, Any]] = []
         self.far: list[Neighbour] = []
 
@@ -69,8 +69,7 @@ class Around:
 
     def fit(self, trial: Trial) -> None:
         """Fit one to the data that judge the model."""
-        found = self._fitted(trial.structure.block, 8)
-        self.near.append((trial, replace(found, extra=found.extra - self.own.extra)))
+        self.near.append((trial, self._fitted(trial.structure.block, STEPS_NEIGHBOUR)))
 
     # --- an effect less -------------------------------------------------------------------------------
 
@@ -141,7 +140,7 @@ class Around:
     # --- what they come to ----------------------------------------------------------------------------
 
     def _judged(self) -> list[tuple[Trial, Any]]:
-        ranked = self.search.ranked(self.own, [t for _, t in self.near])
+        ranked = self.search.ranked_over(self.own, [t for _, t in self.near])
         by_block = {id(t.block): t for t in ranked}
         return [(trial, by_block[id(t.block)]) for trial, t in self.near]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ..selection.search import Search
 from .structure import Structure, exchanged
-from .thresholds import RIVALS
+from .thresholds import RIVALS, STEPS_NEIGHBOUR, STEPS_SAME
 
 
 @dataclass(frozen=True)
@@ -49,15 +49,13 @@ def revised(structure: Structure, search: Search, free: Callable) -> Revision:
     place = 0
     for _ in structure.added[:-1]:
         old, rivals = structure.added[place], structure.rivals[place]
-        less = fitted(structure.without(place).block, 8)
-        own, tried = fitted(structure.block, 4), []
+        less = fitted(structure.without(place).block, STEPS_NEIGHBOUR)
+        own, tried = fitted(structure.block, STEPS_SAME), []
         for effect in rivals[:RIVALS]:
             other = exchanged(less.block, effect)
             if other is not None:
-                tried.append((effect, fitted(other, 8)))
-        judged = search.ranked(
-            less, [replace(t, extra=t.extra - less.extra) for t in (own, *(t for _, t in tried))]
-        )
+                tried.append((effect, fitted(other, STEPS_NEIGHBOUR)))
+        judged = search.ranked_over(less, [own, *(t for _, t in tried)])
         own = next(t for t in judged if t.block is own.block)
         best = judged[0]
         if best.evidence < search.significant:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...numerals import digits
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
@@ -18,10 +19,12 @@ from .thresholds import (
     PLAN_LEAST,
     PLAN_MARGIN,
     PLAN_MOVES,
+    PLAN_PEAK,
     PLAN_SAMPLES,
     PLAN_SINES,
     PLAN_SIZES,
     PLAN_SLACK,
+    PLAN_SMOOTH,
     PLAN_STEP_RATE,
     PLAN_STEP_SIZES,
     PLAN_STEPS,
@@ -42,21 +45,25 @@ def input_that_separates(
         Two or more.
     names : tuple of str
         What is separated.
-    force, stroke, duration, dt, loop
+    force, stroke : float or None
+        Largest input, and largest distance from the start; None: what the records reached, and twice the
+        stroke of the first.
+    duration, dt, loop
         As for `next_experiment`.
     """
     record = diagnosis.train[0]
-    given, long, strong = diagnosis.limits, place_unit(record), record.input_unit
+    long, strong = place_unit(record), record.input_unit
+    words = moving_in(long)
     noise = facts(record).noise  # of the output; what remained may be of accelerations
-    force = float(force or given.get("force") or np.max(np.abs(record.u)))
+    force = float(force or np.max(np.abs(record.u)))
     place = facts(record).place
     centre = float(place[0])
-    reach = float(stroke or given.get("stroke") or 2 * np.max(np.abs(place - centre)))
+    reach = float(stroke or 2 * np.max(np.abs(place - centre)))
     duration, dt = float(duration or record.duration), float(dt or record.dt)
     if not (force > 0 and reach > 0 and duration > PLAN_LEAST * dt):
         raise ValueError(
-            f"next_experiment needs force > 0, stroke > 0 and duration > {PLAN_LEAST} dt; got {force}, "
-            f"{reach}, {duration}, {dt}."
+            f"next_experiment needs {words.force} > 0, {words.reach} > 0 and duration > {PLAN_LEAST} dt; got "
+            f"{force}, {reach}, {duration}, {dt}."
         )
     t = dt * np.arange(int(round(duration / dt)))
     play = (
@@ -89,9 +96,9 @@ def input_that_separates(
         )
     if best is None:
         raise ValueError(
-            f"every input tried leaves the range of ±{reach:g} {long} (stroke), asks more than {force:g} "
-            f"{strong} or moves nothing. Allow more of either, or give loop= (a closed_loop whose controller "
-            "holds the drive in place)."
+            f"every input tried leaves the range of ±{reach:g} {long} ({words.reach}), asks more than "
+            f"{force:g} {strong} or moves nothing. Allow more of either, or give loop= (a closed_loop whose "
+            "controller holds the drive in place)."
         )
     what = (
         f"{best.kind} of up to {digits(best.force)} {strong}"
@@ -144,7 +151,7 @@ class _Loop:
         self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]
         self.thin = max(1, len(t) // PLAN_SAMPLES)
         # The controller passes the noise of the sensor on to the drive.
-        self.tremor = 4 * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
+        self.noise_peak = PLAN_PEAK * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 
     def __call__(self, u):
         from ...simulate.response import event_response
@@ -169,7 +176,7 @@ class _Loop:
             played = _played(self.record, self.t, force, ys[i]).replaced(input_hold="linear")
             runs = [free_run(m, played, position=self.centre) for m in self.models]
             gaps += [_apart(self.record, self.t, y - runs[i]) for k, y in enumerate(runs) if k != i]
-        return ys, max(float(np.max(np.abs(f))) for f in forces) + self.tremor, gaps
+        return ys, max(float(np.max(np.abs(f))) for f in forces) + self.noise_peak, gaps
 
 
 def _played(record, t, u, place):
@@ -207,7 +214,7 @@ def _rms(values) -> float:
 def _references(t, record):
     """Return references of peak one that begin at rest and turn no faster than the records did."""
     swing = max(facts(record).swing, PLAN_SWING[0] * (t[1] - t[0]))
-    half = max(int(round(0.25 * swing / (t[1] - t[0]))), 1)
+    half = max(int(round(PLAN_SMOOTH * swing / (t[1] - t[0]))), 1)
     window = np.hanning(2 * half + 1)
     fade = np.sin(0.5 * math.pi * np.clip((t - t[0]) / swing, 0, 1)) ** 2
     found = {}

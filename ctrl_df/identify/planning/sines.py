@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ...blocks.coordinates import moving_in
 from ...numerals import digits
 from ..results.experiment import Experiment, separated
 from ..tables.thresholds import WORK_MEDIUM
 from ..thresholds import NOTHING
-from .thresholds import COUNTED, SETTLE, SIGMA_LEAST, SINES
+from .thresholds import COUNTED, PLANE, PLANE_BEYOND, SETTLE, SIGMA_LEAST, SINE_SAMPLES, SINES
 
 
 def stepped_sines(
@@ -28,7 +29,7 @@ def stepped_sines(
     names : tuple of str
         What is separated.
     force, stroke : float or None
-        Limits [N], [m]; None: the largest of the tables; no limit.
+        Largest amplitude, and largest distance from the start; None: the largest of the tables; no limit.
     duration, dt : float or None
         [s]; None: what twenty periods of each sine need; a hundred samples of the fastest period.
     loop
@@ -41,15 +42,22 @@ def stepped_sines(
     from ...df.describing import quiet_describing_function as describing_function
     from ...df.dispatch import method_for
 
-    tables, given = diagnosis.train, diagnosis.limits
+    tables = diagnosis.train
     long, strong = tables[0].output_unit, tables[0].input_unit
-    force = float(force or given.get("force") or max(float(r.A[-1]) for r in tables))
-    reach = float(stroke or given.get("stroke") or math.inf)
+    moves = moving_in(long)
+    force = float(force or max(float(r.A[-1]) for r in tables))
+    reach = float(stroke or math.inf)
     if not (force > 0 and reach > 0):
-        raise ValueError(f"next_experiment needs force > 0 and stroke > 0; got {force}, {reach}.")
+        raise ValueError(
+            f"next_experiment needs {moves.force} > 0 and {moves.reach} > 0; got {force}, {reach}."
+        )
     low = min(float(r.A[0]) for r in tables)
-    A = np.geomspace(min(low, force), force, 9)
-    omega = np.geomspace(0.5 * min(r.omega[0] for r in tables), 2 * max(r.omega[-1] for r in tables), 11)
+    A = np.geomspace(min(low, force), force, PLANE[0])
+    omega = np.geomspace(
+        PLANE_BEYOND[0] * min(r.omega[0] for r in tables),
+        PLANE_BEYOND[1] * max(r.omega[-1] for r in tables),
+        PLANE[1],
+    )
     found = []
     for m in models:
         options: dict[str, Any] = dict(WORK_MEDIUM) if method_for(m).takes_options else {}
@@ -67,12 +75,12 @@ def stepped_sines(
     if len(i) == 0:
         raise ValueError(
             f"no sine of up to {force:g} {strong} within {reach:g} {long} separates {' and '.join(names)}. "
-            "Allow more force or stroke, or record a run over time."
+            f"Allow more {moves.force} or {moves.reach}, or record a run over time."
         )
     chosen = sorted(zip(A[i].tolist(), omega[k].tolist(), strict=True), key=lambda p: (p[1], p[0]))
     needed = sum((SETTLE + COUNTED) * 2 * math.pi / w for _, w in chosen)
     factor = 1.0 if duration is None else float(duration) / needed
-    dt = float(dt or 2 * math.pi / (100 * max(w for _, w in chosen)))
+    dt = float(dt or 2 * math.pi / (SINE_SAMPLES * max(w for _, w in chosen)))
     parts = []
     for a, w in chosen:
         periods = max(int(round((SETTLE + COUNTED) * factor)), 2)
@@ -85,7 +93,7 @@ def stepped_sines(
     reason = (
         f"sines of {points}: there {separated(names)} differ by {digits(least, 2)} to "
         f"{digits(float(separation[i, k].max()), 2)} times the scatter, within {digits(stroke_used)} {long} "
-        "of swing."
+        "of the centre."
     )
     return Experiment(
         dt * np.arange(len(u)), u, "stepped sine", names, least, stroke_used, reason, tuple(chosen), max(a for

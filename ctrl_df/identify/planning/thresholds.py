@@ -37,3 +37,13 @@ PLAN_LEAST = 20
 
 PLAN_SWING = (40, 10)
 """Samples of a swing at least: of a reference, which a controller has to follow, and of an input."""
+
+PLAN_PEAK = 4
+"""Standard deviations of noise that its peaks reach."""
+
+PLAN_SMOOTH = 0.25
+"""Of a to-and-fro motion, over which a reference is smoothed to either side."""
+
+PLANE, PLANE_BEYOND, SINE_SAMPLES = (9, 11), (0.5, 2.0), 100
+"""Amplitudes and frequencies among which sines are chosen; lowest and highest frequency, over those of the
+tables; samples of the fastest period."""

@@ -13,7 +13,7 @@ from ..data.imposed import imposed_motion
 from . import initial_states
 from .segments import Segments
 from .simulator import Simulator
-from .thresholds import HIDDEN_RTOL
+from .thresholds import FAR_OUT, HIDDEN_RTOL
 from .values import with_values
 
 
@@ -70,7 +70,7 @@ class ImposedSimulator(Simulator):
         forces[:, at] = np.clip(self.record.y[at], *between)
         if self._extra is not None:
             forces = forces + self._extra
-        away = float(np.mean(self.record.y)) + 10 * self.facts.spread
+        away = float(np.mean(self.record.y)) + FAR_OUT * self.facts.spread
         return [
             np.where(np.isfinite(f), f, away)[w.samples] for f, (w, _, _) in zip(forces, asked, strict=True)
         ]

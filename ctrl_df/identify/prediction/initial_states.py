@@ -16,7 +16,7 @@ import numpy as np
 from ...blocks.core import ELASTIC, IMPACT, level
 from ...blocks.probing import deflection, states_at, stiffness
 from ..thresholds import NOTHING
-from .thresholds import BEND_REACH, PLACE_REACH, RATE_REACH, SPEED_REACH
+from .thresholds import BEND_REACH, FRICTION_SLOPE, PLACE_REACH, RATE_REACH, SPEED_REACH
 
 SEEN: tuple[str, ...] = ("x", "v")
 """Names of those that the record tells of; all others are hidden."""
@@ -72,11 +72,10 @@ def reach(which, core, known, segments) -> np.ndarray:
     } | {name: 0.5 * one for name, _, _ in _inner(core)}
     if core.joint == ELASTIC:
         stiff = stiffness(core.coupling.effect, known.force)
-        mass = core.masses[0] * core.masses[-1] / sum(core.masses)
         bend, rate = known.position, known.speed  # of a joint that nothing holds together
         if stiff > NOTHING:
             bend = known.force / stiff
-            rate = bend * math.sqrt(stiff / mass)
+            rate = bend * math.sqrt(stiff / core.reduced_mass)
         table["stretch"], table["stretch_rate"] = BEND_REACH * bend * one, BEND_REACH * rate * one
     return np.column_stack([table[name] for name in which])
 
@@ -116,7 +115,7 @@ def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
             row[first : first + joint.states] = states_at(joint, bent)
     for name, term, at in _inner(core):
         slip, full = np.array([_settled(row, core, term, at) for row in states]).T
-        share = np.tanh(3 * slip / speed) + given.get(name, 0.0)
+        share = np.tanh(FRICTION_SLOPE * slip / speed) + given.get(name, 0.0)
         states[:, term.state + at] = np.clip(share, -1.0, 1.0) * full
 
 
@@ -132,7 +131,7 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     for name, term, at in _inner(core):
         slip, full = _settled(states, core, term, at)
         share = states[term.state + at] / full if full > 0 else 0.0
-        found[name] = share - math.tanh(3 * slip / speed)
+        found[name] = share - math.tanh(FRICTION_SLOPE * slip / speed)
     return found
 
 

@@ -14,7 +14,7 @@ from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
 from ..thresholds import NOISE_FREE, NOTHING, UNPLACED
 from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
-from .thresholds import SEGMENT_LEAST, TURNS_SAMPLES
+from .thresholds import HALF_LEAST, HALF_MOST, HALF_PERIOD, PART_LEAST, TURNS_SAMPLES, USUAL_SEGMENT_LEAST
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def facts(record: Measurement) -> Facts:
         place = np.asarray(record.y) if held.columns[0] == POSITION else _integral(record.t, record.y)
         speed = max(float(np.sqrt(np.mean(velocity**2))), NOTHING)
         swing = min(2 * record.duration / max(_turns(values), 1), record.duration)
-        half = int(np.clip(0.25 / (cutoff * dt), 4, max(len(record) // 8, 4)))
+        half = _half(record, cutoff, dt)
         known = Facts(
             dt, max(float(np.std(record.y)), NOTHING), speed, max(float(np.std(record.u)), NOTHING),
             held.noise, swing, half, velocity, max(float(np.std(place)), NOTHING), place, record.u,
@@ -93,10 +93,15 @@ def _of_imposed(record: Measurement) -> Facts:
         dt, force, max(float(np.sqrt(np.mean(motion.v**2))), NOTHING), force,
         max(noise, NOISE_FREE * force),
         min(2 * record.duration / max(_turns(values), 1), record.duration),
-        int(np.clip(0.25 / (motion.cutoff * dt), 4, max(len(record) // 8, 4))), motion.v,
+        _half(record, motion.cutoff, dt), motion.v,
         max(float(np.std(motion.x)), NOTHING), motion.x, record.y, (record.input_unit, record.output_unit),
         imposed=True,
     )  # fmt: skip
+
+
+def _half(record, cutoff, dt) -> int:
+    """Return half of the samples over which a state is read off."""
+    return int(np.clip(HALF_PERIOD / (cutoff * dt), HALF_LEAST, max(len(record) // HALF_MOST, HALF_LEAST)))
 
 
 def _turns(y) -> int:
@@ -217,7 +222,7 @@ class Segments:
 def usual_segment(record: Measurement) -> float:
     """Return a length of segment [s] that shows two to-and-fro motions, 40 samples at least."""
     known = facts(record)
-    return max(2 * known.swing, SEGMENT_LEAST * known.dt)
+    return max(2 * known.swing, USUAL_SEGMENT_LEAST * known.dt)
 
 
 def make_segments(record: Measurement, length: float | None = None) -> Segments:
@@ -228,7 +233,7 @@ def make_segments(record: Measurement, length: float | None = None) -> Segments:
 def cut(record: Measurement, count: int) -> Segments:
     """Cut a record into `count` segments of equal time, of 20 samples at least."""
     n = len(record)
-    count = max(min(count, n // 20), 1)
+    count = max(min(count, n // PART_LEAST), 1)
     edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
     edges[0], edges[-1] = 0, n
     edges = np.unique(edges)

@@ -18,6 +18,7 @@ from ..data import derivatives
 from ..data.measurement import Measurement
 from ..data.quantities import leading
 from ..thresholds import NOISE_FREE, NOTHING
+from .thresholds import FAR_OUT
 
 OUTPUT_COLUMNS: Mapping[str, int] = {"position": 0, "velocity": 1}
 """Where an engine puts out the quantities that records may hold, of the body that is measured; and how often
@@ -52,7 +53,7 @@ class Sensed:
     @cached_property
     def spans(self) -> list[tuple[float, float]]:
         """Mean of each output, and ten times its spread: what stands for a model that ran away."""
-        return [(float(np.mean(y)), 10 * max(float(np.std(y)), NOTHING)) for y in self.values]
+        return [(float(np.mean(y)), FAR_OUT * max(float(np.std(y)), NOTHING)) for y in self.values]
 
     def within(self, samples) -> np.ndarray:
         """Return the weighted values at some samples, (outputs times samples,)."""

@@ -10,10 +10,10 @@ import numpy as np
 from ...blocks.mechanism import Mechanism
 from ...blocks.primitives import Lag, Ramp
 from ...cached import cached_property
-from ...simulate.crew import require_compiled
 from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped
 from ...simulate.kernel.many import Drives
+from ...simulate.parallel import require_compiled
 from ...simulate.runs import run_many, sampled_drives
 from ..data.measurement import Measurement
 from ..thresholds import RTOL
@@ -21,7 +21,7 @@ from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
-from .thresholds import FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
+from .thresholds import FAR_LIMIT, FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
 from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
@@ -326,7 +326,7 @@ class Simulator:
                     x += primitive.offset + primitive.rate * (record.t[inside] - later)
                 elif rounded:
                     x = primitive.value(x)
-            low, high = centre - 100 * limit, centre + 100 * limit
+            low, high = centre - FAR_LIMIT * limit, centre + FAR_LIMIT * limit
             if not (x.min() >= low and x.max() <= high):  # NaN fails both
                 with np.errstate(invalid="ignore"):
                     x = np.where(np.isfinite(x), np.clip(x, low, high), centre + limit)

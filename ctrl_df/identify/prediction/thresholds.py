@@ -38,5 +38,21 @@ record) is of no use to a fit, and is given up before it holds up the others."""
 TURNS_SAMPLES = 2000
 """Samples among which turning points are counted: a record of a hundred swings has twenty in each."""
 
-SEGMENT_LEAST = 40
+USUAL_SEGMENT_LEAST = 40
 """Samples of a segment of usual length at least: a few of them go to its initial state."""
+
+HALF_PERIOD, HALF_LEAST, HALF_MOST = 0.25, 4, 8
+"""Half of the span over which a state is read off: periods of the cutoff, samples at least, parts of the
+record at most."""
+
+PART_LEAST = 20
+"""Samples of a part of a record at least: states and a few errors."""
+
+FRICTION_SLOPE = 3.0
+"""Slope of the hyperbolic tangent that a presliding force follows over the typical speed: 0.995 there."""
+
+FAR_OUT, FAR_LIMIT = 10.0, 100.0
+"""Spreads of an output from its mean that stand for a run that failed; typical sizes beyond which one has."""
+
+MOST_SAMPLES = 0.75
+"""Quantile of the distances from a thinned input: see `ROUGH`."""

@@ -19,7 +19,16 @@ from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..thresholds import FULL_SAMPLES, NOTHING
-from .thresholds import HORIZON_TOLERANCE, HORIZONS, SHORTEST_HORIZON
+from .thresholds import (
+    HORIZON_FIRST,
+    HORIZON_LAST,
+    HORIZON_LEAST,
+    HORIZON_ON,
+    HORIZON_THIN,
+    HORIZON_TOLERANCE,
+    HORIZONS,
+    SHORTEST_HORIZON,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +110,7 @@ def _ladder(model, records, most) -> list[FitResult]:
     thin = max(1, round(max(map(len, records)) / FULL_SAMPLES))
     first, found = simulator_of(model, records[0]), []
     if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
-        least = [max(SHORTEST_HORIZON * facts(r).swing, 50 * facts(r).dt) for r in records]
+        least = [max(SHORTEST_HORIZON * facts(r).swing, HORIZON_LEAST * facts(r).dt) for r in records]
         halvings = min(int(math.log2(max(r.duration / s, 1.0))) for r, s in zip(records, least, strict=True))
         for k in range(min(halvings, most - 1), 0, -1):
             found.append(_fitted(model, records, 2**k, thin, CONTINUED, found))
@@ -112,7 +121,10 @@ def _fitted(model, records, parts, thin, begins, shorter) -> FitResult:
     """Fit where stretches begin: roughly from those of shorter ones, then once at the full rate."""
     segments = [cut(r, parts) for r in records]
     near: Any = same_begins(shorter[-1], segments) if shorter else None
-    for rate, iterations in ((4 * thin, 3 if shorter else 8), (thin, 2)):
+    for rate, iterations in (
+        (HORIZON_THIN * thin, HORIZON_ON if shorter else HORIZON_FIRST),
+        (thin, HORIZON_LAST),
+    ):
         found = fit_segments(
             model, records, segments, (), thin=rate, starts=near, iterations=iterations,
             tolerance=HORIZON_TOLERANCE, begins=begins,

@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...blocks.coordinates import moving_in
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs
 from ..shooting.thresholds import NOISE_ORDER
 from ..thresholds import DEPENDENT, NOTHING, SLOWLY
-from .thresholds import FINER, FREE_STEPS, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
+from .thresholds import FINER, FREE_STEPS, HUM_FINER, HUM_LEAST, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
 
 
 @dataclass(frozen=True)
@@ -190,10 +190,10 @@ class _Scene:
         dt, count = float(np.median(np.diff(t))), len(e)
         # fine enough that a line between two bins is not lost
         e = np.diff(e, 0 if facts(record).imposed else 2 - sensed(record).columns[0])
-        power = np.abs(np.fft.rfft(e * np.hanning(len(e)), 4 * count)) ** 2
+        power = np.abs(np.fft.rfft(e * np.hanning(len(e)), HUM_FINER * count)) ** 2
         ratio = power / (median_filter(power, HUM_WINDOW, mode="nearest") + NOTHING)
-        ratio[:12] = 0.0
-        return float(np.argmax(ratio)) / (4 * count * dt)
+        ratio[: HUM_LEAST * HUM_FINER] = 0.0
+        return float(np.argmax(ratio)) / (HUM_FINER * count * dt)
 
 
 def _motion(record, segments, y):

@@ -9,7 +9,7 @@ thing, and count as few. All are adjusted for the number of regions looked at.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -21,7 +21,19 @@ from ..data.quantities import word_of
 from ..thresholds import LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
-from .thresholds import AFTER_REVERSAL, EDGE_ZERO, FAINT, FASTEST, LOW_SPEED, MEDIUM_SPEED, REGION_SAMPLES
+from .thresholds import (
+    AFTER_REVERSAL,
+    BAND_LOWEST,
+    BANDS_LEAST,
+    CORRELATED,
+    EDGE_ZERO,
+    FAINT,
+    FASTEST,
+    LOW_SPEED,
+    MEDIUM_SPEED,
+    REGION_LEAST,
+    REGION_SAMPLES,
+)
 
 KINDS = ("time", "direction", "low_speed", "after_reversal", "position", "load", "amplitude", "frequency")
 
@@ -152,12 +164,10 @@ def error_regions(
     found = [null.region(*part) for part in _parts(t, bins, units, **signals)]
     found += _bands(t, r, signals.values())
     found.sort(key=lambda region: region.p_value)
-    count, worst, worst_bias = len(found), 0.0, 0.0
-    adjusted = []
-    for i, region in enumerate(found):  # Holm's step-down adjustment
-        worst = max(worst, min(region.p_value * (count - i), 1.0))
-        worst_bias = min(region.bias_p_value * count, 1.0)
-        adjusted.append(replace(region, p_value=worst, bias_p_value=worst_bias))
+    adjusted = [
+        replace(region, p_value=float(p), bias_p_value=min(region.bias_p_value * len(found), 1.0))
+        for region, p in zip(found, holm([region.p_value for region in found]), strict=True)
+    ]
     adjusted.sort(key=lambda region: (region.p_value >= LEVEL, -region.excess))
     words = {"position": moving_in(units[0]).position, "load": word_of(units[1], "force")}
     return Regions(replace(region, sentence=_sentence(region, words)) for region in adjusted)
@@ -243,7 +253,7 @@ class _Null:
     def _colour(self, r):
         rho = autocorrelation(r, self.lags)
         # Lags whose correlation is within three standard errors of none add noise only.
-        rho = np.where(rho**2 > 9 / self.n, rho, 0.0)
+        rho = np.where(rho**2 > CORRELATED**2 / self.n, rho, 0.0)
         rho[0] = 1.0
         return rho
 
@@ -255,17 +265,15 @@ class _Null:
         return pairs
 
     def region(self, kind, label, mask, span) -> Region:
-        from scipy.stats import f as f_distribution
         from scipy.stats import t as t_distribution
 
         count = int(mask.sum())
         share, expected = float(np.sum(self.r[mask] ** 2)) / (self.n * self.power), count / self.n
-        if count < 8 or self.n - count < 8:
+        if count < REGION_LEAST or self.n - count < REGION_LEAST:
             return Region(kind, label, share, expected, 1.0, 0.0, 1.0, span)
         inside, outside = self._pairs(mask), self._pairs(~mask)
         squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
-        ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
-        p = float(f_distribution.sf(ratio, *squares))
+        p = chance_of(share, expected, *squares)
         # A step between the region and the rest colours the residual by itself: without it the test is
         # sharper, where enough independent samples remain to know the two means.
         mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
@@ -282,6 +290,23 @@ class _Null:
         return Region(kind, label, share, expected, p, mean_in / math.sqrt(self.power), bias_p, span)
 
 
+def chance_of(share: float, expected: float, inside: float, outside: float) -> float:
+    """Return the probability of a share of the squared error as large as this by chance: an F test.
+
+    `inside`, `outside`: independent squares in the region and in the rest.
+    """
+    from scipy.stats import f as f_distribution
+
+    ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
+    return float(f_distribution.sf(ratio, inside, outside))
+
+
+def holm(p_values: Sequence[float]) -> np.ndarray:
+    """Return probabilities, in ascending order, adjusted for how many there are: Holm's step-down method."""
+    count = len(p_values)
+    return np.maximum.accumulate([min(p * (count - i), 1.0) for i, p in enumerate(p_values)])
+
+
 def _independent(pairs, correlation) -> float:
     """Effective number of samples of a region: its size over the correlated samples that come with each."""
     count = float(pairs[0])
@@ -294,14 +319,14 @@ def _bands(t, r, signals) -> list[Region]:
 
     n, dt = len(r), (t[-1] - t[0]) / (len(r) - 1)
     f = np.fft.rfftfreq(n, dt)
-    edges = [2.5 / (n * dt)]
+    edges = [BAND_LOWEST / (n * dt)]
     while edges[-1] < f[-1]:
         edges.append(edges[-1] * 2 ** (1 / 3))
     where = np.searchsorted(f, edges)
     bands = [(a, b) for a, b in zip(where[:-1], where[1:], strict=True) if b - a >= 2]
     power = _periodogram(r)
     total = float(power[1:].sum())
-    if total == 0 or len(bands) < 6:
+    if total == 0 or len(bands) < BANDS_LEAST:
         return []
     density = np.array([power[a:b].mean() for a, b in bands]) + FAINT * total
     references = [np.array([_periodogram(x)[a:b].mean() for a, b in bands]) for x in signals]

@@ -13,7 +13,15 @@ import numpy as np
 
 from ..shooting.noise_model import noise_model
 from ..thresholds import NOTHING
-from .thresholds import DECORRELATED, INPUT_LAGS, TWO_SIDED, WHITENESS_LAGS
+from .thresholds import (
+    DECORRELATED,
+    INPUT_LAGS,
+    LAGS_FORGOTTEN,
+    LAGS_SHARE,
+    LAGS_TESTED,
+    TWO_SIDED,
+    WHITENESS_LAGS,
+)
 
 
 def rmse(residual) -> float:
@@ -103,7 +111,7 @@ def whiteness(
     if band < 1.0:
         r = np.asarray(resample(r, int(band * len(r))))
     n = len(r)
-    lags = min(WHITENESS_LAGS, max(n // 5, 1)) if lags is None else int(lags)
+    lags = min(WHITENESS_LAGS, max(n // LAGS_SHARE[0], 1)) if lags is None else int(lags)
     if not 0 < lags < n or fitted >= lags:
         raise ValueError(
             f"whiteness needs 0 <= fitted < lags < {n} (the samples); got lags={lags}, fitted={fitted}."
@@ -196,11 +204,11 @@ def input_residual_test(u, residual, lags=None, *, alpha: float = 0.01, fitted: 
     return InputTest(statistic, rank, dof, p, p >= alpha, lags, correlation, band)
 
 
-def _spread_lags(u, count=20):
-    top = max(min(len(u) // 10, INPUT_LAGS), 1)
+def _spread_lags(u, count=LAGS_TESTED):
+    top = max(min(len(u) // LAGS_SHARE[1], INPUT_LAGS), 1)
     rho = autocorrelation(u, top)
     below = np.flatnonzero(rho < DECORRELATED)
-    reach = min(max(5 * int(below[0]) if len(below) else top, count), len(u) // 4)
+    reach = min(max(LAGS_FORGOTTEN * int(below[0]) if len(below) else top, count), len(u) // LAGS_SHARE[2])
     return np.unique(np.linspace(0, reach, count).round().astype(int))
 
 

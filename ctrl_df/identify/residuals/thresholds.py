@@ -56,3 +56,23 @@ HUM_WINDOW = 161
 
 HORIZON_TOLERANCE = 1e-2
 """Relative gain at which initial states of a stretch are found."""
+
+HORIZON_LEAST = 50
+"""Samples of the shortest horizon at least."""
+
+HORIZON_THIN, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
+"""Initial states for a horizon: thinning of the first fit, its steps, those where a shorter horizon is known,
+and those at the full rate."""
+
+CORRELATED = 3.0
+"""Standard errors of a correlation beyond which it is one."""
+
+REGION_LEAST, BANDS_LEAST, BAND_LOWEST = 8, 6, 2.5
+"""Samples of a region, and bands of a spectrum, at least; its lowest frequency, in cycles of the record."""
+
+LAGS_TESTED, LAGS_SHARE, LAGS_FORGOTTEN = 20, (5, 10, 4), 5
+"""Lags of a test for traces of the input; parts of a record that its lags are at most (whiteness, input,
+spread); times after which the input has forgotten, in those of a first-order signal."""
+
+HUM_FINER, HUM_LEAST = 4, 3
+"""Parts of a line of a spectrum into which it is divided; periods of a hum in a record at least."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from ...blocks.core import level
 from ...blocks.stated import static_levels
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.multistart import cross_started
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..shooting.noise_model import NoiseModel, whitened_power

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.per_record import begun_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
@@ -372,7 +372,7 @@ def _first(job) -> Attempt:
 def _on(attempt: Attempt, steps, hopeless) -> Attempt:
     fit = attempt.data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
-        hopeless=hopeless, outlook=attempt.steps if steps < attempt.steps else 0,
+        hopeless=hopeless, steps_left=attempt.steps if steps < attempt.steps else 0,
     )  # fmt: skip
     left = 0 if fit.converged else attempt.steps
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)

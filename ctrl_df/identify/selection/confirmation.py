@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.multistart import (
     all_restarted,
@@ -38,6 +38,7 @@ from .thresholds import (
     EXPLAINS_LITTLE,
     LITTLE_LUCK,
     PROMISING,
+    STEPS_LONGER,
     STOPPED_EARLY,
     STRUCTURE_LEAST,
 )
@@ -261,7 +262,8 @@ def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> Fi
     )
     begun = sorted(begun, key=lambda f: f.rmse)[:RESTARTS_KEPT]
     ended = side_by_side(
-        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=6, hopeless=far.rmse), begun
+        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=STEPS_LONGER, hopeless=far.rmse),
+        begun,
     )
     return min([far, *ended], key=lambda f: f.rmse)
 

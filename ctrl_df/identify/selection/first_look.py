@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..prediction.segments import facts
 from ..results.diagnosis import Baseline, CandidateEffect
 from ..thresholds import GROWTH, UNMOVED

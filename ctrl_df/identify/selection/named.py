@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..estimation.refit_records import blurred, refit_records
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import feasible

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .thresholds import COARSE, FINEST, STRAY
+from .thresholds import COARSE, FINEST, ROUNDING_SPREAD, STRAY
 
 
 def rounding_evidence(measured, simulated, step: float) -> float:
@@ -42,7 +42,9 @@ def rounding_evidence(measured, simulated, step: float) -> float:
     spread = max(float(np.sqrt(np.mean((y / step - line) ** 2))), FINEST)
     about = -len(y) * math.log(spread * step * math.sqrt(2 * math.pi * math.e))
     distance = line - x / step
-    found = minimize_scalar(lambda s: -_lines(distance, math.exp(s)), bounds=(-5.0, 0.0), method="bounded")
+    found = minimize_scalar(
+        lambda s: -_lines(distance, math.exp(s)), bounds=ROUNDING_SPREAD, method="bounded"
+    )
     return about - float(found.fun)  # pyright: ignore[reportAttributeAccessIssue]
 
 

@@ -221,6 +221,10 @@ class Search(ABC):
     def ranked(self, base, judged: Sequence) -> list[Any]:
         """Return models with their evidence over `base`, best first."""
 
+    def ranked_over(self, base, judged: Sequence) -> list[Any]:
+        """Return models with their evidence over one that was fitted as they were, best first."""
+        return self.ranked(base, [replace(t, extra=t.extra - base.extra) for t in judged])
+
     def final(self, models: Sequence, free) -> list[tuple[Any, float, float]] | None:
         """Return the models of a ladder with their two errors, all over the same data; None: as they are.
 

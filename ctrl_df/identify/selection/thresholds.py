@@ -142,3 +142,9 @@ it, so that it goes on for twice as long as a candidate does at first."""
 
 RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
 """Steps of the models among which rivals of one more effect are sought: their errors are compared only."""
+
+STEPS_LONGER = 6
+"""Steps over longer segments of fits that have begun there."""
+
+ROUNDING_SPREAD = (-5.0, 0.0)
+"""Logarithms between which the error of a model lies that rounding hides, over the step."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import side_by_side
+from ...simulate.parallel import side_by_side
 from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import (
     AMBIGUOUS,

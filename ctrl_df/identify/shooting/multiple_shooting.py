@@ -26,12 +26,17 @@ from .past_events import step_past_events
 from .restarts import restarted_segments, scanned_gap_states
 from .states import descend, find_states
 from .thresholds import (
+    AGAIN_LEAST,
+    DAMPED_BY,
     DAMPING,
     DAMPING_LEAST,
     DAMPING_MOST,
     EFFORT_FOLLOWED,
     GOOD,
+    GROSS_ERROR,
     ON_BOUND,
+    RESTART_ROUNDS,
+    TRIES,
     TURNS_PAST,
 )
 
@@ -79,9 +84,9 @@ class Stage(SegmentOutputs):
         found = self._descend(theta, states, iterations, tolerance, robust)
         if not restarts:
             return found
-        again = max(iterations // 2, 3)
+        again = max(iterations // 2, AGAIN_LEAST)
         # without parameters a segment found lets the next one go on where it ends
-        for _ in range(1 if problem.names else 4):
+        for _ in range(1 if problem.names else RESTART_ROUNDS):
             if not self._worth_restarting(found):
                 break
             states, any_better = restarted_segments(self, found)
@@ -91,7 +96,7 @@ class Stage(SegmentOutputs):
             found = self._descend(found.theta, states, again, tolerance, robust, slopes=found.slopes)
         if (
             problem.nonsmooth
-            and not problem.outlook
+            and not problem.steps_left
             and self._worth_restarting(found)
             and problem.nfev < problem.budget
             and any(t.min() < 0.5 for t in self.trusts(found))
@@ -102,7 +107,9 @@ class Stage(SegmentOutputs):
     def _past_events(self, found: Solution, iterations, tolerance, robust) -> Solution:
         """Let a fit whose begins are followed go on past events, while that leads to better minima."""
         problem = self.problem
-        for _ in range(TURNS_PAST if problem.followed and problem.nonsmooth and not problem.outlook else 0):
+        for _ in range(
+            TURNS_PAST if problem.followed and problem.nonsmooth and not problem.steps_left else 0
+        ):
             squares, count = power(found.residual), sum(map(len, found.residual))
             at_noise = squares <= (FLOOR * problem.noise) ** 2 * count
             beyond = None if at_noise or problem.nfev >= problem.budget else step_past_events(self, found)
@@ -178,7 +185,7 @@ class Stage(SegmentOutputs):
             base = [m - e for m, e in zip(self.measured, found.residual, strict=True)]
             jp, js = self.jacobian(found.theta, found.states, base)
             gain = 0.0
-            for _attempt in range(6):
+            for _attempt in range(TRIES):
                 h, g, back = self.normal(jp, js, start.residual, weights, start.states, damping)
                 pull = known * (start.theta - problem.about)
                 trial, trial_cost = self._tried(
@@ -187,14 +194,14 @@ class Stage(SegmentOutputs):
                 )  # fmt: skip
                 if trial_cost < cost:
                     gain, found = 1 - trial_cost / cost, trial
-                    damping = max(damping / 10, DAMPING_LEAST)
+                    damping = max(damping / DAMPED_BY, DAMPING_LEAST)
                     break
-                damping *= 10
+                damping *= DAMPED_BY
                 if problem.nfev >= problem.budget or damping > DAMPING_MOST:
                     break
             ended = found is start or gain < tolerance
             found = replace(found, slopes=(jp, js), converged=ended)
-            left = iterations - iteration - 1 + problem.outlook
+            left = iterations - iteration - 1 + problem.steps_left
             if ended or self.too_far(found.residual, 1 - max(gain, before), left):
                 break
             before = gain
@@ -226,7 +233,7 @@ class Stage(SegmentOutputs):
             return [np.ones(len(r)) for r in residual]
         everything = np.concatenate(residual)
         sigma = max(float(np.median(np.abs(everything))) / QUARTILE, self.problem.noise)
-        return [np.minimum(1.0, 4 * sigma / np.maximum(np.abs(r), NOTHING)) for r in residual]
+        return [np.minimum(1.0, GROSS_ERROR * sigma / np.maximum(np.abs(r), NOTHING)) for r in residual]
 
     def step(self, h, g, theta, damping):
         """Solve the damped equations; parameters held by a bound stay there."""

@@ -15,7 +15,14 @@ import numpy as np
 from scipy import sparse
 
 from ..thresholds import NOTHING
-from .thresholds import IMPULSE_GONE, NOISE_ORDER
+from .thresholds import (
+    IMPULSE_FIRST,
+    IMPULSE_GONE,
+    IMPULSE_LONGEST,
+    NOISE_ORDER,
+    NOISE_ORDER_LEFT,
+    NOISE_ORDER_MOST,
+)
 
 Pieces = Sequence[np.ndarray]
 
@@ -117,10 +124,10 @@ class NoiseModel:
     def _impulse(self):
         from scipy.signal import lfilter
 
-        n, b = 4096, [1.0]
+        n, b = IMPULSE_FIRST, [1.0]
         while True:
             h = np.asarray(lfilter(b, np.concatenate(([1.0], -self.a)), np.r_[1.0, np.zeros(n - 1)]))
-            if n >= 1 << 18 or np.max(np.abs(h[-n // 8 :])) < IMPULSE_GONE * np.max(np.abs(h)):
+            if n >= IMPULSE_LONGEST or np.max(np.abs(h[-n // 8 :])) < IMPULSE_GONE * np.max(np.abs(h)):
                 return h
             n *= 4
 
@@ -150,13 +157,13 @@ class OutputNoise(NoiseModel):
         return model.filtered(x, [slice(0, len(x))]) * (self.sigma / max(model.sigma, NOTHING))
 
 
-def noise_of_outputs(pieces: Pieces, outputs: int, max_order: int = 30) -> NoiseModel:
+def noise_of_outputs(pieces: Pieces, outputs: int, max_order: int = NOISE_ORDER_MOST) -> NoiseModel:
     """Fit a noise model to pieces of records of one output, or of several in turn."""
     first, *others = [noise_model(pieces[i::outputs], max_order) for i in range(outputs)]
     return OutputNoise(first.a, first.sigma, first.step, tuple(others)) if others else first
 
 
-def noise_model(residual: np.ndarray | Pieces, max_order: int = 30) -> NoiseModel:
+def noise_model(residual: np.ndarray | Pieces, max_order: int = NOISE_ORDER_MOST) -> NoiseModel:
     """Fit an autoregressive model by Burg's method, its order chosen by Schwarz's criterion.
 
     Parameters
@@ -230,7 +237,7 @@ def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None, out
     if plain is None:
         longest = int(np.argmax([len(r) for r in pieces])) // outputs * outputs
         return noise_of_outputs(pieces[longest : longest + outputs], outputs, max_order=NOISE_ORDER)
-    left = noise_model([plain.filtered(r, [slice(0, len(r))]) for r in pieces], max_order=4)
+    left = noise_model([plain.filtered(r, [slice(0, len(r))]) for r in pieces], max_order=NOISE_ORDER_LEFT)
     both = np.convolve(np.append(1.0, -plain.a), np.append(1.0, -left.a))
     return NoiseModel(-both[1:], left.sigma, plain.step)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...simulate.crew import check
+from ...simulate.parallel import check
 from ..prediction.segments import Segments
 from ..prediction.sensed import sensed
 from ..prediction.simulator import Simulator
@@ -19,12 +19,14 @@ from .noise_model import power
 from .problem import Problem
 from .thresholds import (
     HIDDEN_NUDGE,
+    LONGER_NUDGE,
     NUDGE_FALLS,
     NUDGE_LEAST,
     NUDGE_MOST,
     OUTPUT_MOVES,
     SLACK_TURNED,
     STATE_NUDGE,
+    WIDEST,
 )
 
 Signals = list[np.ndarray]
@@ -77,7 +79,7 @@ class SegmentOutputs:
         self.fresh = starts is None or any(a.shape != p.shape for a, p in zip(starts, reach, strict=True))
         begun = [np.zeros_like(p) for p in reach] if self.fresh else [np.array(a) for a in starts or ()]
         self.begun = States(begun, reach).widened
-        self.widest = [3 * p for p in self.begun.reach]  # where a start was far off
+        self.widest = [WIDEST * p for p in self.begun.reach]  # where a start was far off
 
     # --- how far it is off ----------------------------------------------------------------------------
 
@@ -141,7 +143,7 @@ class SegmentOutputs:
         """
         names = self.simulators[k].nuisances
         means = np.array([0.5 if name == "slack" else 0.0 for name in names])
-        values = np.clip(values, means - 3 * reach, means + 3 * reach)
+        values = np.clip(values, means - WIDEST * reach, means + WIDEST * reach)
         if "slack" in names:
             j = names.index("slack")
             values[:, j] = np.clip(values[:, j], 0.0, 1.0)
@@ -207,7 +209,7 @@ class SegmentOutputs:
             power.setdefault(i, []).append(np.mean((a - b) ** 2))
         for i, squares in power.items():
             change, h = math.sqrt(float(np.mean(squares))), abs(problem.steps[i])
-            wanted = h * OUTPUT_MOVES * problem.noise / change if change > 0 else 10 * h
+            wanted = h * OUTPUT_MOVES * problem.noise / change if change > 0 else LONGER_NUDGE * h
             most = NUDGE_MOST[problem.variables[i].log]
             problem.steps[i] = min(max(wanted, NUDGE_LEAST, NUDGE_FALLS * h), most)
         return [(a - b) / float(widths[i]) for i, a, b in zip(which, moved, other, strict=True)]

@@ -40,7 +40,7 @@ class Problem:
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
-        self.hopeless, self.outlook = hopeless
+        self.hopeless, self.steps_left = hopeless
         self.followed = followed
         self.block = block_of(model)
         self.blocks = [for_record(self.block, r.name) for r in self.records]
@@ -115,7 +115,7 @@ class Problem:
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
         model = self.model_at(theta)
-        hopeless, records = (self.hopeless, self.outlook), self.records[which]
+        hopeless, records = (self.hopeless, self.steps_left), self.records[which]
         return Problem(
             model, records, (), self.budget, None, self.error_filter, self.begins, hopeless,
             followed=self.followed,

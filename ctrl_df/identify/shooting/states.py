@@ -14,7 +14,7 @@ from ..thresholds import NOTHING
 from .elimination import states_for
 from .noise_model import power
 from .segmented_records import SegmentedRecords
-from .thresholds import DAMPED, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN
+from .thresholds import DAMPED, DAMPED_BY, DAMPING, DAMPING_LEAST, EFFORT_ALONE, EFFORT_BEGUN
 
 
 def find_states(stage) -> list[np.ndarray]:
@@ -59,7 +59,7 @@ def descend(stage, begun, iterations: int, tolerance: float):
         for r in records:
             r.step(tolerance)
         pace = power(residual) / max(before, NOTHING)
-        if stage.too_far(residual, pace, iterations - i - 1 + problem.outlook):
+        if stage.too_far(residual, pace, iterations - i - 1 + problem.steps_left):
             break
     states = begun.states.at([r.starts for r in records])
     converged = not any(r.open.any() for r in records)
@@ -113,9 +113,9 @@ class _Record:
             self.open[gained[cost[better] > (1 - tolerance) * self.cost[gained]]] = False
             self.cost[gained], self.starts[gained] = cost[better], trial[better]
             self.residual[self._signal(gained)[1]] = residual[some.spread(better)]
-            self.damping[gained] = np.maximum(self.damping[gained] / 10, DAMPING_LEAST)
+            self.damping[gained] = np.maximum(self.damping[gained] / DAMPED_BY, DAMPING_LEAST)
             rows, products = rows[~better], products[~better]
-            self.damping[rows] *= 10
+            self.damping[rows] *= DAMPED_BY
             if not rows.size:
                 return
         self.open[rows] = False

@@ -17,7 +17,7 @@ SIZE_PRIOR = 3.0
 """Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
 and a quarter lies `PARAMETER_RANGE`."""
 
-SEGMENT_LEAST = 50
+SHORTEST_SEGMENT = 50
 """Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
 
 DAMPING, DAMPING_LEAST, DAMPING_MOST = 1e-3, 1e-7, 1e4
@@ -82,3 +82,25 @@ NOISE_ORDER = 12
 
 IMPULSE_GONE = 1e-6
 """Over its peak, an impulse response that has died out."""
+
+TRIES, DAMPED_BY = 6, 10
+"""Tries of a step, each damped more by this factor."""
+
+AGAIN_LEAST, RESTART_ROUNDS = 3, 4
+"""Steps after segments have begun anew, at least; rounds of that where no parameter moves."""
+
+GROSS_ERROR = 4.0
+"""Standard deviations of the usual error beyond which a sample counts less: one of 16,000 of normal noise."""
+
+NOISE_ORDER_MOST, NOISE_ORDER_LEFT = 30, 4
+"""Largest order of a noise model, and of one of what another has left."""
+
+IMPULSE_FIRST, IMPULSE_LONGEST = 4096, 1 << 18
+"""Samples of an impulse response: at first, and at most."""
+
+WIDEST, LONGER_NUDGE = 3, 10
+"""Reaches of an initial state that it ends at (see `../prediction/thresholds.py`); factor of a step of a
+parameter over which the output did not move."""
+
+TIME_SAMPLES, PLACE_NOISE = 5, 4
+"""Samples from which a time is seen; standard deviations of the noise that the largest position may hold."""

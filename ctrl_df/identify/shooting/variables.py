@@ -15,7 +15,7 @@ from ...units import dimension, size
 from ..prediction.segments import Facts, facts
 from ..prediction.sensed import POSITION, sensed
 from ..prediction.values import in_record
-from .thresholds import LOG_MOST, NATURAL, OPEN_BOUND, SIZE_PRIOR
+from .thresholds import LOG_MOST, NATURAL, OPEN_BOUND, PLACE_NOISE, SIZE_PRIOR, TIME_SAMPLES
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class RecordScales:
 
 def seen_by(block, records, known: Facts) -> RecordScales:
     """Return what the records show of the effects of a block."""
-    off = 0.0 if known.imposed else 4 * known.noise
+    off = 0.0 if known.imposed else PLACE_NOISE * known.noise
     reach = max(float(np.max(np.abs(facts(r).place))) for r in records) - off
     placed = known.imposed or all(POSITION in sensed(r).columns for r in records)
     shifted = any(isinstance(p, Ramp) for e in block.effects if e.role == "output" for p in e.channel())
@@ -54,9 +54,14 @@ def seen_by(block, records, known: Facts) -> RecordScales:
     )  # fmt: skip
 
 
+def total_inertia(block) -> float:
+    """Return the mass of all bodies of a block; 0 of one without."""
+    return sum(p.value for k, p in block.parameters.items() if "." not in k)
+
+
 def typical_mass(block, force: float, position: float, speed: float) -> float:
     """Return the mass of a block; of one without, that whose inertia the force is [kg]."""
-    return sum(p.value for k, p in block.parameters.items() if "." not in k) or force * position / speed**2
+    return total_inertia(block) or force * position / speed**2
 
 
 def default_free(block) -> tuple[str, ...]:
@@ -181,7 +186,7 @@ def natural_scale(unit: str, known: Facts) -> float:
     """Return the size a parameter of this unit has when it matters on a record with these facts."""
     powers = dimension(unit)
     if powers == {"s": 1}:
-        return 5 * known.dt  # times are seen from a few samples on
+        return TIME_SAMPLES * known.dt  # times are seen from a few samples on
     if powers.keys() <= {"rad"}:
         return 1.0
     time = known.position / known.speed

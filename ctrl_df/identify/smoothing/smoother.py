@@ -30,6 +30,8 @@ from .thresholds import (
     SMOOTHER_EVALUATIONS,
     SMOOTHER_JITTER,
     SMOOTHER_LEAK,
+    SMOOTHER_PRIOR,
+    SMOOTHER_RANGE,
     SMOOTHER_ROUNDS,
     SMOOTHER_SPREADS,
     SMOOTHER_STEPS,
@@ -150,7 +152,7 @@ class _Told:
 
     def smoothed(self, sizes, back=True):
         """Return means, covariances and evidence with log size [force], log time [s], log noise."""
-        size, memory, noise = np.exp(np.clip(sizes, -40, 40))
+        size, memory, noise = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
         weight = np.where(self.has, 1.0 / (noise**2 + self.r), 0.0)
         n = self.b.shape[1]
         info, told = np.zeros((len(self.b) + 1, n, n)), np.zeros((len(self.b) + 1, n))
@@ -182,6 +184,6 @@ class _Told:
         force, time = SMOOTHER_USUAL
         usual = np.log([force, time * self.known.swing, self.known.noise])
         value = self.smoothed(sizes, back=False)[2] - 0.5 * float(
-            np.sum(((sizes - usual) / [4.0, 1.5, 1.0]) ** 2)
+            np.sum(((sizes - usual) / SMOOTHER_PRIOR) ** 2)
         )
         return value if math.isfinite(value) else UNLIKELY

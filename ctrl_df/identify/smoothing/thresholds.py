@@ -61,3 +61,7 @@ HELD_BACK = 0.1
 
 MADE_LEAST = 0.01
 """Share of a missing force's square that is worth a word: a tenth of its size."""
+
+SMOOTHER_PRIOR, SMOOTHER_RANGE = (4.0, 1.5, 1.0), 40.0
+"""Standard deviations of the logarithms of a missing force's size and time and of the noise, about the usual
+ones: factors of 55, 4.5 and 2.7; logarithms beyond which they are not tried."""

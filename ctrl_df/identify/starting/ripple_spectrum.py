@@ -26,8 +26,14 @@ from ...values.per_record import PerRecord
 from ..prediction.segments import facts
 from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING, SLOWLY
 from .thresholds import (
+    AROUND,
+    AROUND_WIDTH,
+    RIPPLE_BAND,
     RIPPLE_COARSEST,
     RIPPLE_LONGEST,
+    RIPPLE_NEAR,
+    RIPPLE_ROUNDS,
+    RIPPLE_RUN,
     RIPPLE_STEP,
     RIPPLE_TURNS,
     RUN_LEAST,
@@ -69,13 +75,13 @@ class RippleSpectrum:
         self.places = [_smoothed(r) for r in records]
         self.span = max(float(np.ptp(x)) for x in self.places)
         # the band of the motion and some of the noise above it
-        band = min(facts(r).half for r in records) // 4
+        band = min(facts(r).half for r in records) // RIPPLE_BAND
         moving = [_moving(r) for r in records]
         if not any(_runs(w, 1, m) for w, m in zip(segments, moving, strict=True)):
             moving = [np.ones(len(r), bool) for r in records]
         longest = max(j - i for w, m in zip(segments, moving, strict=True) for i, j in _runs(w, 1, m))
         self._size = max(band, math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
-        self._size = max(min(self._size, longest // 32), 1)
+        self._size = max(min(self._size, longest // RIPPLE_RUN), 1)
         self._runs = [_runs(w, self._size, m) for w, m in zip(segments, moving, strict=True)]
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
         base = [self._response(column) for column in zip(*forces, strict=True)]
@@ -86,7 +92,7 @@ class RippleSpectrum:
         self._base = [self._parts(given), *base]
         self._y = self._parts([facts(r).place for r in records])
         self._weights = [np.ones(_length(y) // 2 + 1) for y in self._y]
-        for _ in range(3):
+        for _ in range(RIPPLE_ROUNDS):
             w = self._regressed(self._base)
             left = [
                 y - sum(c * b[i] for c, b in zip(w, self._base, strict=True)) for i, y in enumerate(self._y)
@@ -106,7 +112,7 @@ class RippleSpectrum:
         found: list[Wave] = []
         while len(found) < count and np.max(gains) > 0:
             i = int(np.argmax(gains))
-            near = turns[i] + np.linspace(-RIPPLE_STEP, RIPPLE_STEP, 13)
+            near = turns[i] + np.linspace(-RIPPLE_STEP, RIPPLE_STEP, RIPPLE_NEAR)
             wave = self.wave(2 * math.pi * near[int(np.argmax(self._scan(near)))] / self.span)
             if wave is not None:
                 found.append(wave)
@@ -267,8 +273,11 @@ def _weights(left) -> np.ndarray:
     """Return one over the rms that is left around each frequency: medians, which single lines leave alone."""
     power = np.abs(np.fft.rfft(left, _length(left))) ** 2
     n = len(power)
-    middles = np.unique(np.geomspace(2, n - 1, 40).astype(int))
-    level = [np.median(power[max(int(m / 1.4) - 2, 1) : int(m * 1.4) + 3]) / math.log(2) for m in middles]
+    middles = np.unique(np.geomspace(2, n - 1, AROUND).astype(int))
+    level = [
+        np.median(power[max(int(m / AROUND_WIDTH) - 2, 1) : int(m * AROUND_WIDTH) + 3]) / math.log(2)
+        for m in middles
+    ]
     logs = np.interp(np.log(np.arange(1, n)), np.log(middles), np.log(np.array(level) + NOTHING))
     return np.append(0.0, np.exp(-0.5 * logs))
 

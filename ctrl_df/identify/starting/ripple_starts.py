@@ -11,7 +11,7 @@ from ...values.per_record import PerRecord
 from .extend import extended
 from .regression import own_values
 from .ripple_spectrum import RippleSpectrum, Wave, apart
-from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, WAVE_TRIED
+from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, RIPPLES, WAVE_TRIED
 
 
 def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
@@ -73,7 +73,7 @@ def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, floa
     search = RippleSpectrum(view.records, view.segments, [2 * math.pi / length for length in known])
     # where friction drifts the fit over segments knows the mass better than whitened forces do
     plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
-    for wave in search.best(3):
+    for wave in search.best(RIPPLES):
         weights = (wave.mass, wave.coulomb, wave.viscous)
         yield wave, (own_values(screen.block, weights, screen.scales) if plain else None) or {}
 

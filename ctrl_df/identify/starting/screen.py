@@ -22,7 +22,7 @@ from .extend import extended
 from .regression import ForceFit, Start, force_fit, motion_of, regressed
 from .ripple_spectrum import Wave
 from .ripple_starts import long_wave, long_waves, waves
-from .thresholds import AS_IT_IS, FACTOR_MOST
+from .thresholds import AS_IT_IS, FACTOR_MOST, STARTS_APART
 from .value_grid import value_grid
 
 
@@ -165,5 +165,6 @@ def _scaled(effect, factor):
 
 def _apart(a, b):
     return any(
-        abs(x - y) > 0.25 * max(abs(x), abs(y), NOTHING) for x, y in zip(a.values, b.values, strict=True)
+        abs(x - y) > STARTS_APART * max(abs(x), abs(y), NOTHING)
+        for x, y in zip(a.values, b.values, strict=True)
     )

@@ -61,3 +61,19 @@ tried (and samples asked), at least and at most; contrast over the largest from 
 LIKE_LEFT, LIKE_SAMPLES = 0.1, 300
 """Share of the power of one law's force that another may leave to begin a fit in its place: beyond, its error
 is no longer near the other's. Samples of a motion that tell it: more than enough for a few parameters."""
+
+RIPPLE_BAND, RIPPLE_RUN, RIPPLE_NEAR, RIPPLE_ROUNDS = 4, 32, 13, 3
+"""Part of the span of a state within which means are taken; parts of the longest run at least; ripples about
+the best one; rounds in which frequencies are weighted."""
+
+AROUND, AROUND_WIDTH = 40, 1.4
+"""Frequencies at which the power around them is taken, and how far around, as a factor."""
+
+RIPPLES = 3
+"""Ripples of the spectrum that fits begin with."""
+
+STARTS_APART = 0.25
+"""Relative difference of a value up to which two starts are one."""
+
+GRID_PER_TURN, GRID_FINE = 6, 201
+"""Steps tried to a value more over the span; steps about the best one."""

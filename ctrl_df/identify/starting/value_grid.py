@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .thresholds import GRID_CONTRAST, GRID_RANGE, GRID_STEPS
+from .thresholds import GRID_CONTRAST, GRID_FINE, GRID_PER_TURN, GRID_RANGE, GRID_STEPS
 
 
 def value_grid(y, noise: float) -> float:
@@ -26,7 +26,7 @@ def value_grid(y, noise: float) -> float:
     guess = math.sqrt(12) * noise
     low, high = GRID_RANGE[0] * guess, min(GRID_RANGE[1] * guess, 2 * span)
     fewest, most = GRID_STEPS
-    count = int(min(max((1 / low - 1 / high) * span * 6, fewest), most))
+    count = int(min(max((1 / low - 1 / high) * span * GRID_PER_TURN, fewest), most))
     inverse = np.linspace(1 / high, 1 / low, count)
     some = y[:: max(1, len(y) // most)]
     contrast = _contrast(some, inverse)
@@ -36,7 +36,7 @@ def value_grid(y, noise: float) -> float:
         (inner >= contrast[:-2]) & (inner >= contrast[2:]) & (inner > GRID_CONTRAST * contrast.max())
     )
     at = int(tops[0]) if len(tops) else int(np.argmax(contrast))
-    fine = np.linspace(inverse[max(at - 1, 0)], inverse[min(at + 1, count - 1)], 201)
+    fine = np.linspace(inverse[max(at - 1, 0)], inverse[min(at + 1, count - 1)], GRID_FINE)
     return float(1 / fine[int(np.argmax(_contrast(some, fine)))])
 
 

@@ -7,7 +7,7 @@ from .errors import log_density, outlying
 from .fit import FittedTable, fit_table
 from .simulated import relative_error, simulate_table
 from .starts import best_starts
-from .thresholds import TABLE_STEPS, VARIANCE_LEAST, WORK_LOW, WORK_MEDIUM
+from .thresholds import STEPS_BEGUN, STEPS_ENDED, TABLE_STEPS, VARIANCE_LEAST, WORK_LOW, WORK_MEDIUM
 
 
 def try_effect(job) -> tuple[str, FittedTable, int] | None:
@@ -29,9 +29,9 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
 
     if not hopeful:
         return cls.id, fitted(grown[0], 0), len(own)
-    begun = [fitted(g, 2) for g in grown]
+    begun = [fitted(g, STEPS_BEGUN) for g in grown]
     best = max(begun, key=_likelihood_of)
-    return cls.id, best if slow or best.converged else fitted(best.block, 8), len(own)
+    return cls.id, best if slow or best.converged else fitted(best.block, STEPS_ENDED), len(own)
 
 
 def fit_either(block, points, names, scales, *, again=True, **options) -> FittedTable:

@@ -11,11 +11,12 @@ from ...cached import cached_property
 from ...drawing import draw
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..residuals.comparison_base import ComparisonBase
-from ..residuals.regions import Region, Regions
-from ..thresholds import LEVEL, NOTHING
+from ..residuals.regions import Region, Regions, chance_of, holm
+from ..thresholds import LEVEL
 from .errors import rms
 from .points import Points, counted, points_of
 from .simulated import relative_error, simulate_table
+from .thresholds import REGION_BANDS
 
 
 @dataclass(frozen=True)
@@ -174,8 +175,6 @@ def plane_regions(points: Points, error) -> Regions:
 
     Points are taken to err independently: a band's squares beside all others' are then an F ratio.
     """
-    from scipy.stats import f as f_distribution
-
     size = np.abs(error) ** 2
     total = float(size.sum())
     if total == 0 or len(points) < 4:
@@ -190,15 +189,14 @@ def plane_regions(points: Points, error) -> Regions:
             share, expected = float(size[inside].sum()) / total, n / len(points)
             if n == len(points):
                 continue
-            ratio = share / max(1 - share, NOTHING) * (1 - expected) / expected
-            p = float(f_distribution.sf(ratio, 2 * n, 2 * (len(points) - n)))
+            p = chance_of(share, expected, 2 * n, 2 * (len(points) - n))
             label = f"{low:.3g} to {high:.3g} {unit}" if high > low else f"{low:.3g} {unit}"
             bias = float(np.mean(error[inside].real)) / math.sqrt(total / len(points))
             found.append((p, kind, label, share, expected, bias, (low * scale, high * scale)))
     found.sort(key=lambda r: r[0])
     regions = []
-    for i, (p, kind, label, share, expected, bias, span) in enumerate(found):
-        p = min(p * (len(found) - i), 1.0)
+    chances = holm([r[0] for r in found]).tolist()
+    for p, (_, kind, label, share, expected, bias, span) in zip(chances, found, strict=True):
         what = "amplitudes" if kind == "amplitude" else "frequencies"
         sentence = (
             f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the "
@@ -210,7 +208,7 @@ def plane_regions(points: Points, error) -> Regions:
     return Regions(regions)
 
 
-def _bands(axis, count=4):
+def _bands(axis, count=REGION_BANDS):
     """Yield up to `count` bands of about as many distinct values each."""
     values = np.unique(axis)
     for part in np.array_split(values, min(count, len(values))):

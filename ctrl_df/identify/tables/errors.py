@@ -42,15 +42,18 @@ def log_density(error, least: float) -> tuple[np.ndarray, float]:
     """
     size = np.abs(error) ** 2
     gross = GROSS * np.exp(-np.minimum(size, EXPONENT))
+
+    def usual(variance):
+        return (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, EXPONENT))
+
     best = (np.full(len(size), -np.inf), least)
     for variance in (float(np.mean(size)), float(np.median(size)) / math.log(2)):
         variance = max(variance, least)
         for _ in range(MIXTURE_ROUNDS):
-            usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, EXPONENT))
-            share = usual / (usual + gross)
+            scattered = usual(variance)
+            share = scattered / (scattered + gross)
             variance = max(float(share @ size) / max(float(share.sum()), NOTHING), least)
-        usual = (1 - GROSS) / variance * np.exp(-np.minimum(size / variance, EXPONENT))
-        density = np.log(usual + gross)
+        density = np.log(usual(variance) + gross)
         if density.sum() > best[0].sum():
             best = density, variance
     return best

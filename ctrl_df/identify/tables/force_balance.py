@@ -27,6 +27,7 @@ from .thresholds import (
     BALANCE_ROUNDS,
     BALANCE_RTOL,
     BALANCE_SAMPLES,
+    GROSS_BALANCE,
 )
 
 
@@ -104,7 +105,7 @@ class ForceBalance:
             return None
         usual = np.median(np.abs(missing[known]))
         trust = 1 / np.sqrt(
-            1 + (np.abs(missing[known]) / (3 * usual + NEARLY_NOTHING)) ** 2
+            1 + (np.abs(missing[known]) / (GROSS_BALANCE * usual + NEARLY_NOTHING)) ** 2
         )  # a few err grossly
         size = np.linalg.norm(slopes[:, known], axis=1)
         size[size == 0] = 1.0

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..data.frequency_measurement import FrequencyMeasurement
 from ..shooting.scales import Scales
+from ..shooting.variables import total_inertia
 from ..thresholds import NEARLY_NOTHING
 from .thresholds import SCALE_LEAST
 
@@ -120,7 +121,5 @@ def counted(record: FrequencyMeasurement) -> np.ndarray:
 def table_scales(block, points: Points) -> Scales:
     """Return typical sizes of force, position, speed and mass in the tables."""
     swing = points.A * np.abs(points.N)
-    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
-    return Scales(
-        float(np.median(points.A)), float(np.median(swing)), float(np.median(swing * points.omega)), mass
-    )
+    force, position, speed = (float(np.median(v)) for v in (points.A, swing, swing * points.omega))
+    return Scales(force, position, speed, total_inertia(block))

@@ -34,6 +34,8 @@ from .thresholds import (
     SCATTER_LEAST,
     SIGNIFICANT_TABLE,
     SIGNIFICANT_TABLE_HELD,
+    STEPS_CONFIRMED,
+    STEPS_COSTLY,
     TABLE_BUDGET,
     TABLE_ITERATIONS,
     TABLE_STEPS,
@@ -190,7 +192,8 @@ class TableSearch(Search):
     def _confirmed(self, tried: TableTrial) -> TableTrial:
         kind = tried.block.effects[-1]
         fitted = fit_either(
-            tried.block, self.inside, tried.fitted.names, self.scales, iterations=3 if kind.costly else 12,
+            tried.block, self.inside, tried.fitted.names, self.scales,
+            iterations=STEPS_COSTLY if kind.costly else STEPS_CONFIRMED,
             budget=TABLE_BUDGET, work=WORK_MEDIUM if kind.costly or kind.multimodal else None,
         )  # fmt: skip
         return self._trial(tried.key, fitted, tried.extra, confirmed=True)

@@ -19,6 +19,7 @@ import numpy as np
 from ...blocks.core import kinetic_level
 from ..estimation.common_friction import dry_level
 from ..shooting.scales import Scales
+from ..shooting.variables import total_inertia
 from ..starting.extend import extended
 from ..thresholds import NEARLY_NOTHING
 from .force_balance import ForceBalance, can_be_imposed
@@ -31,6 +32,7 @@ from .thresholds import (
     HOPELESS_START,
     START_COMMON,
     START_SAME,
+    STARTS_KEPT,
     TABLE_SIZES,
     UNKNOWN_SIZES,
     WORK_MEDIUM,
@@ -89,9 +91,8 @@ def plane_of(block, points: Points) -> Plane:
     spans = (points.A[moved], swing, swing * points.omega[moved], points.omega[moved])
     still = points.A[~moved]
     force, swings, speed, omega = (Span(float(s.min()), float(s.max())) for s in spans)
-    mass = sum(p.value for k, p in block.parameters.items() if "." not in k)
     friction, stuck = kinetic_level(block.effects), float(still.max(initial=0.0))
-    return Plane(force, swings, speed, omega, friction, mass, stuck)
+    return Plane(force, swings, speed, omega, friction, total_inertia(block), stuck)
 
 
 def _any(cls, plane: Plane):
@@ -150,7 +151,14 @@ def balanced(grown: Sequence, names: Sequence[str], points: Points, scales: Scal
 
 
 def best_starts(
-    cls, block, points: Points, slopes, free: Sequence[str], scales: Scales, keep: int = 3, work=WORK_MEDIUM
+    cls,
+    block,
+    points: Points,
+    slopes,
+    free: Sequence[str],
+    scales: Scales,
+    keep: int = STARTS_KEPT,
+    work=WORK_MEDIUM,
 ) -> tuple[list, bool]:
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 

@@ -110,3 +110,16 @@ multiples of the usual size of a parameter that has no default."""
 FLAT_SINGULAR, FLAT_COLUMN, FLAT_INVERSE = 1e-5, 1e-6, 1e-8
 """Singular value, over the largest, of a direction that a table does not determine; slope, over the largest,
 of a parameter that it does not; singular value that an inverse takes at least."""
+
+STEPS_BEGUN, STEPS_ENDED, STEPS_CONFIRMED, STEPS_COSTLY = 2, 8, 12, 3
+"""Steps of a fit to points: of every start, of the best of them; to all points, and of an effect that takes
+many times as long."""
+
+FIT_STEPS, FIT_TOLERANCE, FIT_BUDGET = 10, 1e-3, 400
+"""Steps of a fit to points, relative gain at which it ends, tables computed at most, if nothing is said."""
+
+GROSS_BALANCE = 3.0
+"""Usual errors beyond which a point counts less in a balance of forces."""
+
+STARTS_KEPT, REGION_BANDS = 3, 4
+"""Starts of an effect that are fitted; bands of amplitude and of frequency."""

@@ -9,14 +9,18 @@ import numpy as np
 from ...simulate.engine import Engine, Event
 from ...simulate.program.layout import AUX, KIND, MECHANISM, MODE
 from ...status import Status
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .monodromy import Tracer
+from .multiple_shooting import close_pieces
+from .orbit import Orbit
+from .symmetry import shift_directions, transverse
+from .thresholds import (
     ACCEPTED,
     CLOSED,
     COURSE_RTOL,
     FREE_POINTS,
     MOST_ROUNDS,
     NEWTON_LONGEST,
-    NOTHING,
     ON_CIRCLE,
     ORBIT_POINTS,
     PERIOD_RTOL,
@@ -24,13 +28,10 @@ from ..thresholds import (
     REPEATED,
     STALLED,
     STALLS,
+    STEPS_A_PERIOD,
     STILL,
     STRETCH,
 )
-from .monodromy import Tracer
-from .multiple_shooting import close_pieces
-from .orbit import Orbit
-from .symmetry import shift_directions, transverse
 
 
 class NoClosure(Exception):
@@ -76,7 +77,7 @@ class Closing:
                 raise NoClosure(_not_traced(traced))
             if beside is None:
                 # shifts that the loop does not notice: an orbit closes up to them
-                free = shift_directions(self.tracer, traced.segments, size)
+                free = shift_directions(self.tracer, traced, size)
                 beside = np.eye(self.tracer.n) - free @ free.T
             residual = beside @ ((traced.end.x - start.x) / size)
             mismatch = float(np.max(np.abs(residual)))
@@ -209,12 +210,18 @@ class Closing:
         omega = 2 * np.pi / period
         spectrum = np.zeros((self.engine.noutputs, 2), complex)
         run = self.engine.run(
-            start, period, times=times, rtol=PERIOD_RTOL, spectrum=spectrum, omega=omega, max_step=period / 8
+            start,
+            period,
+            times=times,
+            rtol=PERIOD_RTOL,
+            spectrum=spectrum,
+            omega=omega,
+            max_step=period / STEPS_A_PERIOD,
         )
         if np.max(np.ptp(run.states, axis=0) / size) < STILL:
             raise NoClosure("Newton ended at rest")  # an equilibrium, periodic with any period
         # multipliers of what the loop notices: neither those of a free position nor of states nothing reads
-        across = transverse(shift_directions(self.tracer, traced.segments, size))
+        across = transverse(shift_directions(self.tracer, traced, size))
         carried = across.T @ (traced.monodromy * size / size[:, None]) @ across
         values = np.linalg.eigvals(carried)
         trivial = int(np.argmin(np.abs(values - 1.0)))

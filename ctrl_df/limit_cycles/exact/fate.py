@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..thresholds import ASKED, CROSSINGS, FACTORS, HALVINGS, LINGERS, NOTHING, WIDTH, WOUND
+from ..thresholds import NOTHING
 from .known import KnownOrbits
 from .orbit import Orbit
 from .poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, PoincareSearch
+from .thresholds import ASKED, CROSSINGS, FACTORS, HALVINGS, LINGERS, WIDTH, WOUND
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ import numpy as np
 from ...blocks.core import level
 from ...blocks.elements.element import Element
 from ...simulate.sampled import Sampled
-from ..thresholds import (
+from ..thresholds import ROUNDED
+from .thresholds import (
     BEND_HALVINGS,
     BENT,
     DECADES,
@@ -19,7 +20,6 @@ from ..thresholds import (
     JUMPED,
     POLE_AT_ZERO,
     REAL_ROOT,
-    ROUNDED,
     SAMPLED_PACE,
     SAMPLED_POINTS,
     SAMPLED_SLOWEST,
@@ -58,7 +58,8 @@ class Kicks:
             self.scale, self.unit = self._length_scale(), self.block.coordinates.unit
         elif self.parts is not None:
             self.pace = _pole_frequency(self._controller())
-            self.scale, self.unit = self._corner(), "at the block's input"
+            self.scale, self.straight = self._corner()
+            self.unit = "at the block's input"
         else:
             self.pace, self.scale, self.unit = 1.0, 1.0, "of every state"
 
@@ -92,16 +93,19 @@ class Kicks:
     def _swung(self, size):
         """States of the linear part as a harmonic output of the block leaves them, its input that large."""
         x = np.zeros(self.engine.nstates)
-        a, b, c, dt = self._controller()
+        states, output = self._answer()
         if not isinstance(self.block, Element):
             x[self.loop.syslist[0].nstates or 0 :] = size  # nothing is known of the states of a user's system
-        if len(a):
-            z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
-            swing = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
-            seen = complex((c[:1] @ swing)[0])
-            if seen != 0:
-                x[: len(a)] = np.real(size * swing / seen)
+        if output != 0:
+            x[: len(states)] = np.real(size * states / output)
         return x
+
+    def _answer(self) -> tuple[np.ndarray, complex]:
+        """States and output of the linear part under a harmonic input of size one at the loop's pace."""
+        a, b, c, dt = self._controller()
+        z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
+        states = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
+        return states, complex((c[:1] @ states)[0])
 
     def _controller(self):
         controller = self.loop.syslist[0]
@@ -112,36 +116,32 @@ class Kicks:
             return *(np.asarray(m, float) for m in (controller.A, controller.B, controller.C)), 0.0
         return np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), 0.0
 
-    def _corner(self) -> float:
-        """Input at which an element or a law bends; of one that jumps at zero, what its jump drives."""
+    def _corner(self) -> tuple[float, float]:
+        """Input at which an element or a law bends, and `straight`.
+
+        Of one that jumps at zero the former is what its jump drives.
+        """
         primitive = getattr(self.block, "primitive", None)
         corners = [abs(corner) for corner in getattr(primitive, "corners", ())]
         step = getattr(primitive, "step", 0.0)
         size = max([*corners, step, getattr(primitive, "gap", 0.0)])
         if size > 0:
-            if not self.block.nstates:
-                self.straight = min([*corners, 0.5 * step] if step else corners)
-            return size
+            return size, 0.0 if self.block.nstates else min([*corners, 0.5 * step] if step else corners)
         if self.block.nstates:
-            return 1.0
+            return 1.0, 0.0
         least = 10.0 ** DECADES[0]
         law = self._law
         gain = self._gain()
         jump = 0.5 * abs(law(least) - law(-least))
         # over six decades any power of the argument grows by more than twofold, unless a jump hides it
         if jump > 0.5 * abs(law(JUMPED * least)):
-            return jump * gain or 1.0
+            return jump * gain or 1.0, 0.0
         bend = _bend(law, 1 / gain if gain else 0.0)
-        self.straight = bend or 0.0
-        return bend or 1.0
+        return bend or 1.0, bend or 0.0
 
     def _gain(self) -> float:
         """Gain of the linear part at the loop's pace."""
-        a, b, c, dt = self._controller()
-        z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
-        return (
-            float(np.abs(c[:1] @ np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]))[0, 0]) if len(a) else 0.0
-        )
+        return abs(self._answer()[1])
 
     def _law(self, u) -> float:
         return float(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
 from .orbit import Orbit
-from .poincare import CYCLES, Course, Crossing, PoincareSearch
+from .poincare import CYCLES, Course, Crossing, PoincareSearch, upward_crossings
+from .thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
 
 
 class KnownOrbits:
@@ -93,7 +93,7 @@ class KnownOrbits:
             states = np.asarray(orbit.states)
             size = np.maximum(np.abs(states).max(axis=1), ORBIT_SIZE * self.search.units)
             y = np.asarray(orbit.outputs)[self.search.row]
-            ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+            ups = upward_crossings(y)
             share = y[ups] / (y[ups] - y[ups + 1])
             met = states[:, ups] + share * (states[:, ups + 1] - states[:, ups])
             found = self._passages[id(orbit)] = (met.T, size)

@@ -10,7 +10,6 @@ or the loss of a velocity to sticking) and n the gradient of the event's margin 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -20,15 +19,14 @@ from ...simulate.kernel import driver
 from ...simulate.kernel.look import jump, look
 from ...simulate.program import layout
 from ...status import Status
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .thresholds import (
     EVENT_NUDGE,
     FLOW_NUDGE,
-    NOTHING,
     PERIOD_EVENTS,
     PERIOD_REACH,
     PERIOD_RTOL,
     PERIOD_STEPS,
-    REACH_AT_FIRST,
     SLOPE_NUDGE,
     TOLD,
 )
@@ -53,6 +51,7 @@ class PeriodTrace:
     monodromy: np.ndarray
     segments: tuple[Segment, ...]
     status: Status
+    reach: float  # [s] over which event margins look ahead
     grazing: float  # smallest |n f-| relative to |n||f-|: 0 at grazing
 
 
@@ -66,26 +65,26 @@ class Tracer:
         self.n = engine.nstates
         self._work, *_ = driver.workspace(engine.program)
         self._g = np.zeros(int(engine.program.ints[layout.H_NG]) + 1)
-        self._reach = REACH_AT_FIRST  # [s], set by every trace
         self._none = np.zeros(0)
 
     def settle(self, state: State) -> State:
         """Return the state with its modes in line (no time passes)."""
         return self.engine.run(state, state.time, self.drive, rtol=PERIOD_RTOL).state
 
-    def rate(self, t, x, mode, margins=False) -> Any:
-        """Rates of a state in a mode; with `margins` the event margins too."""
+    def rate(self, t, x, mode) -> np.ndarray:
+        """Rates of a state in a mode."""
+        return self.rate_and_margins(t, x, mode, 0.0)[0]
+
+    def rate_and_margins(self, t, x, mode, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rates of a state in a mode, and its event margins, which look `reach` [s] ahead."""
         dx = np.zeros(self.n)
-        look(
-            self.engine.program, self.drive, t, x, mode, self._work, dx, self._g, self._none, False,
-            self._reach if margins else 0.0,
-        )  # fmt: skip
-        return (dx, self._g.copy()) if margins else dx
+        look(self.engine.program, self.drive, t, x, mode, self._work, dx, self._g, self._none, False, reach)
+        return dx, self._g.copy()
 
     def trace(self, state: State, length: float, differentiate: bool = True, size=None) -> PeriodTrace:
         """Follow the orbit for `length` seconds from `state`."""
         t_end = state.time + length
-        self._reach = PERIOD_REACH * length
+        reach = PERIOD_REACH * length
         now = self.settle(state) if state.fresh else state.copy()
         phi = np.eye(self.n)
         segments, grazing = [], 1.0
@@ -110,12 +109,12 @@ class Tracer:
                 kind = layout.EVENT_KINDS[int(run.events[2][0])] if len(run.events[2]) else "event"
                 node = self.engine.node_names[self._owner(run.margin)]
                 if differentiate:
-                    saltation, transversal = self._saltation(run, now.mode, size)
+                    saltation, transversal = self._saltation(run, now.mode, size, reach)
                     grazing = float(min(grazing, transversal))
                     phi = saltation @ phi
             segments.append(Segment(now, span, kind, node, saltation))
             now = run.state
-        return PeriodTrace(now, phi, tuple(segments), status, grazing)
+        return PeriodTrace(now, phi, tuple(segments), status, reach, grazing)
 
     def sizes(self, state: State, length: float, largest) -> np.ndarray:
         """Sizes of the states on an orbit, none smaller than what the others could tell apart.
@@ -154,11 +153,13 @@ class Tracer:
         ends = flow(self.engine, state, np.vstack([state.x + h, state.x - h]), span, self.drive, PERIOD_RTOL)
         return ((ends[: self.n] - ends[self.n :]) / (2 * FLOW_NUDGE * size)[:, None]).T
 
-    def _saltation(self, run, mode, size):
+    def _saltation(self, run, mode, size, reach):
+        def margin_at(t, x):
+            return self.rate_and_margins(t, x, mode, reach)[1][run.margin]
+
         t, before, after = run.state.time, run.before, run.state
         f_minus = self.rate(t, before, mode)
         f_plus = self.rate(t, after.x, after.mode)
-        margin = run.margin
         normal = np.zeros(self.n)
         for j in range(self.n):
             h = EVENT_NUDGE * size[j]
@@ -166,21 +167,21 @@ class Tracer:
             for sign in (1.0, -1.0):
                 x = before.copy()
                 x[j] += sign * h
-                values.append(self.rate(t, x, mode, margins=True)[1][margin])
+                values.append(margin_at(t, x))
             normal[j] = (values[0] - values[1]) / (2 * h)
         # rate of the margin along the flow, its own dependence on time included
         h = EVENT_NUDGE / max(float(np.max(np.abs(f_minus) / size)), NOTHING)
-        ahead = self.rate(t + h, before + h * f_minus, mode, margins=True)[1][margin]
-        behind = self.rate(t - h, before - h * f_minus, mode, margins=True)[1][margin]
+        ahead = margin_at(t + h, before + h * f_minus)
+        behind = margin_at(t - h, before - h * f_minus)
         speed = (ahead - behind) / (2 * h)
-        reset = self._reset(run, mode, size)
+        reset = self._reset(run, mode, size, reach)
         scale = np.linalg.norm(normal * size) * np.linalg.norm(f_minus / size)
         transversal = abs(speed) / scale if scale > 0 else 0.0
         if speed == 0.0:
             return reset, 0.0
         return reset + np.outer(f_plus - reset @ f_minus, normal) / speed, transversal
 
-    def _reset(self, run, mode, size):
+    def _reset(self, run, mode, size, reach):
         """Differentiate the jump at the event, by differences of the engine's own event map."""
         columns = []
         for j in range(self.n):
@@ -189,15 +190,15 @@ class Tracer:
             for sign in (1.0, -1.0):
                 x = run.before.copy()
                 x[j] += sign * h
-                ends.append(self._jump(run, mode, x))
+                ends.append(self._jump(run, mode, x, reach))
             columns.append((ends[0] - ends[1]) / (2 * h))
         return np.array(columns).T
 
-    def _jump(self, run, mode, x):
+    def _jump(self, run, mode, x, reach):
         program, mode = self.engine.program, mode.copy()
         node = self._owner(run.margin)
         x = x.copy()
         dx = np.zeros(self.n)
         slot = run.margin - int(program.nodes[node, layout.G])
-        jump(program, self.drive, run.state.time, x, mode, self._work, dx, self._g, node, slot, self._reach)
+        jump(program, self.drive, run.state.time, x, mode, self._work, dx, self._g, node, slot, reach)
         return x

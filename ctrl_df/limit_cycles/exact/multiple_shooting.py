@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import NOTHING, PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
+from ..thresholds import NOTHING
+from .thresholds import PIECE_HALVINGS, PIECES_CLOSED, PIECES_ITERATIONS, PIECES_LONGEST, RANK, STALLED
 
 
 def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarray, float] | None:
@@ -49,7 +50,7 @@ def close_pieces(tracer, rebuilt, states, period: float, size) -> tuple[np.ndarr
         step = np.linalg.lstsq(J, -residual, rcond=RANK)[0]
         step *= min(1.0, PIECES_LONGEST / max(float(np.max(np.abs(step))), NOTHING))
         norm = float(np.linalg.norm(residual))
-        for _halving in range(6):  # shorter while the pieces come apart
+        for _halving in range(PIECE_HALVINGS):  # shorter while the pieces come apart
             trial = _pieces(tracer, rebuilt, z + step, m, n, period, size, differentiate=False)
             if trial is not None and np.linalg.norm(trial[0]) < norm:
                 break

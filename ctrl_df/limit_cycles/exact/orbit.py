@@ -12,7 +12,7 @@ from ...drawing import draw
 from ...simulate.engine import Event
 from ...status import Status
 from ...table import Table
-from ..thresholds import SAME_ORBIT, SAME_SIZES
+from .thresholds import SAME_ORBIT, SAME_SIZES
 
 
 @dataclass(frozen=True, eq=False)

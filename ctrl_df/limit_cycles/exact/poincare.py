@@ -9,11 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...blocks.elements.element import Element
+from ...cached import cached_property
 from ...simulate.engine import Engine, State
 from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
 from ...status import Status
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .kicks import Kicks
+from .thresholds import (
     BEYOND,
     COURSE_RTOL,
     DEAD,
@@ -27,7 +30,6 @@ from ..thresholds import (
     LOOK_POINTS,
     LOOK_RTOL,
     LOOK_WORK,
-    NOTHING,
     ON_TICK,
     PATIENCE,
     QUIET,
@@ -44,7 +46,6 @@ from ..thresholds import (
     WITHIN,
     WORK,
 )
-from .kicks import Kicks
 
 RESTS, CYCLES, DIVERGES, UNDECIDED = "rests", "cycles", "diverges", "undecided"
 
@@ -116,18 +117,19 @@ class PoincareSearch:
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
         self.kicks = Kicks(loop, engine)
         self.stride = STRIDE * np.pi / self.kicks.pace  # ten swings at the loop's own pace
-        self._units: np.ndarray | None = None
-        self._unit = 1.0
 
     @property
     def units(self) -> np.ndarray:
         """What each state is measured in: the largest it becomes in the first swing from the largest kick."""
-        self._measure()
-        return self._units  # pyright: ignore[reportReturnType]
+        return self._first_swing[0]
 
-    def _measure(self):
-        if self._units is not None:
-            return
+    @property
+    def _unit(self) -> float:
+        """What the signal watched is measured in, likewise."""
+        return self._first_swing[1]
+
+    @cached_property
+    def _first_swing(self) -> tuple[np.ndarray, float]:
         x0 = self.kicks.all()[-1][1]
         times = np.linspace(0.0, LOOK * self.stride, LOOK_POINTS)
         limits: Any = dict(rtol=LOOK_RTOL, log=1, max_steps=LOOK_WORK)
@@ -138,8 +140,8 @@ class PoincareSearch:
             return np.where(np.isfinite(seen), seen, 0.0).max(axis=0)
 
         states, swing = largest(run.states), float(largest(run.outputs)[self.row])
-        self._units = np.where(states > 0, states, max(float(states.max(initial=0.0)), NOTHING))
-        self._unit = swing if swing > 0 else 1.0
+        units = np.where(states > 0, states, max(float(states.max(initial=0.0)), NOTHING))
+        return units, swing if swing > 0 else 1.0
 
     def size(self, x) -> float:
         """Largest state in units of the loop."""
@@ -265,7 +267,7 @@ class PoincareSearch:
                 state, times[-1], times=times, rtol=COURSE_RTOL, log=1, max_steps=SAMPLED_WORK
             )
             y = run.outputs[:, self.row]
-            ups = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+            ups = upward_crossings(y)
             passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
             found = []
             for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
@@ -273,6 +275,11 @@ class PoincareSearch:
                 found.append(Crossing(float(t), np.array(x), float(np.max(swing, initial=0.0)) / self._unit))
             state = run.state
             yield _Stretch(state.time, state.x, run.steps, run.status, found)
+
+
+def upward_crossings(y) -> np.ndarray:
+    """Return the samples after which a signal passes zero upwards."""
+    return np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
 
 
 def _growth(crossings, ago: int = 0) -> float:

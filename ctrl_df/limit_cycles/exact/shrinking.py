@@ -15,22 +15,23 @@ from __future__ import annotations
 import numpy as np
 
 from ...arclength import correction, tangent
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .closing import Closing, NoClosure
+from .orbit import Orbit
+from .symmetry import shift_directions
+from .thresholds import (
     ACROSS,
     CLOSED,
-    NOTHING,
     SHRINK_BEND,
     SHRINK_CLOSED,
     SHRINK_FAR,
     SHRINK_FIRST,
     SHRINK_LONGER,
     SHRINK_LONGEST,
+    SHRINK_NEWTON,
     SHRINK_SHORTEST,
     SHRINK_STEPS,
 )
-from .closing import Closing, NoClosure
-from .orbit import Orbit
-from .symmetry import shift_directions
 
 
 class Merged(NoClosure):
@@ -104,7 +105,7 @@ class _Curve:
         self.phase = phase / max(np.linalg.norm(phase), NOTHING)
         self.beside = np.eye(self.n)
         traced = self.tracer.trace(start, period, size=self.size)
-        free = shift_directions(self.tracer, traced.segments, self.size)
+        free = shift_directions(self.tracer, traced, self.size)
         self.beside = np.eye(self.n) - free @ free.T
         self.first, _ = self._mismatch(np.zeros(self.n + 1))
         self.scale = float(np.max(np.abs(self.first)))
@@ -137,7 +138,7 @@ class _Curve:
         """Newton onto the curve within the plane through y across `border`; (y, J), or None."""
         offset = border @ y
         try:
-            for _ in range(8):
+            for _ in range(SHRINK_NEWTON):
                 r, J = self.equations(y)
                 if np.max(np.abs(r)) < SHRINK_CLOSED * self.scale:
                     return y, J

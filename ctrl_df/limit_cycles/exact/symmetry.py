@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import MODE_SAMPLES, NOTHING, NULL, SHIFT_NUDGE, SHIFT_SAME
+from ..thresholds import NOTHING
+from .monodromy import PeriodTrace, Tracer
+from .thresholds import MODE_SAMPLES, NULL, SHIFT_NUDGE, SHIFT_SAME
 
 
-def shift_directions(tracer, segments, size) -> np.ndarray:
+def shift_directions(tracer: Tracer, traced: PeriodTrace, size) -> np.ndarray:
     """Shifts of the state that change neither rates nor event margins anywhere on an orbit.
 
     Parameters
     ----------
     tracer : Tracer
         Of the loop.
-    segments : sequence of Segment
+    traced : PeriodTrace
         One period.
     size : (n,) array
         Scale of each state.
@@ -29,13 +31,17 @@ def shift_directions(tracer, segments, size) -> np.ndarray:
     (n, k) array
         Orthonormal columns in states divided by `size`; no columns, as a rule.
     """
-    points = _points(segments)
+    points = _points(traced.segments)
     if not points:
         return np.zeros((tracer.n, 0))
-    here = [_answer(tracer, p, p.x) for p in points]
+
+    def answer(point, x):
+        return np.concatenate(tracer.rate_and_margins(point.time, x, point.mode, traced.reach))
+
+    here = [answer(p, p.x) for p in points]
     scale = np.max([np.where(np.isfinite(a), np.abs(a), 0.0) for a in here], axis=0)
     # rates may all vanish where segments begin (a reversal): no smaller than the size over a period
-    scale[: tracer.n] = np.maximum(scale[: tracer.n], size / sum(s.length for s in segments))
+    scale[: tracer.n] = np.maximum(scale[: tracer.n], size / sum(s.length for s in traced.segments))
     scale[scale == 0.0] = 1.0
     slopes = []
     for p in points:
@@ -43,12 +49,12 @@ def shift_directions(tracer, segments, size) -> np.ndarray:
         for j in range(tracer.n):
             step = np.zeros(tracer.n)
             step[j] = SHIFT_NUDGE * size[j]
-            columns.append(_change(_answer(tracer, p, p.x + step), _answer(tracer, p, p.x - step)) / scale)
+            columns.append(_change(answer(p, p.x + step), answer(p, p.x - step)) / scale)
         slopes.append(np.array(columns).T / (2 * SHIFT_NUDGE))
     _, values, rows = np.linalg.svd(np.vstack(slopes), full_matrices=True)
     values = np.append(values, np.zeros(tracer.n - len(values)))
     candidates = rows[values <= NULL * max(values[0], NOTHING)]
-    kept = [d for d in candidates if _unnoticed(tracer, points, here, scale, 0.5 * d * size)]
+    kept = [d for d in candidates if _unnoticed(answer, points, here, scale, 0.5 * d * size)]
     return np.array(kept).T if kept else np.zeros((tracer.n, 0))
 
 
@@ -70,19 +76,14 @@ def _points(segments):
     return [p for starts in few for p in starts[:MODE_SAMPLES]]
 
 
-def _answer(tracer, point, x) -> np.ndarray:
-    dx, g = tracer.rate(point.time, x, point.mode, margins=True)
-    return np.append(dx, g)
-
-
 def _change(a, b) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         return np.where(np.isfinite(a) & np.isfinite(b), a - b, 0.0)
 
 
-def _unnoticed(tracer, points, here, scale, shift) -> bool:
-    for p, answer in zip(points, here, strict=True):
+def _unnoticed(answer, points, here, scale, shift) -> bool:
+    for p, before in zip(points, here, strict=True):
         for moved in (p.x + shift, p.x - shift):
-            if np.max(np.abs(_change(_answer(tracer, p, moved), answer)) / scale) > SHIFT_SAME:
+            if np.max(np.abs(_change(answer(p, moved), before)) / scale) > SHIFT_SAME:
                 return False
     return True

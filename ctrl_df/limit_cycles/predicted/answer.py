@@ -11,7 +11,7 @@ from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
 from ...df.forced_orbit.periodic_response import PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
-from ..thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
+from .thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
 
 
 def responder(F, method: Method) -> tuple[Callable, int] | None:

@@ -8,17 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...df.family import Family
-from ..thresholds import (
-    DYNAMIC_ERROR,
-    FLOOR,
-    FOLD,
-    GUESSED,
-    IRREGULAR,
-    MEMORYLESS_ERROR,
-    ROUNDED,
-    SAFETY,
-    VAGUE,
-)
+from ..thresholds import ROUNDED
 from .answer import jumps, responder
 from .bound import mees_bergen
 from .branches import BranchCrossing
@@ -26,6 +16,7 @@ from .crossings import Crossing, Scan, linear_zeros
 from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
 from .path import End, follow_path
 from .scan_grid import grid_slope, noisy
+from .thresholds import DYNAMIC_ERROR, FLOOR, FOLD, GUESSED, IRREGULAR, MEMORYLESS_ERROR, SAFETY, VAGUE
 
 
 class Assessor:

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...blocks.primitives import PiecewiseAffine
 from ...df.methods import ElementIntegrals
-from ..thresholds import BESIDE_CORNER, BOUND_HARMONICS, BOUND_POINTS, NOTHING, ROUNDED, WINDOWS
+from ..thresholds import NOTHING, ROUNDED
+from .thresholds import BESIDE_CORNER, BOUND_HARMONICS, BOUND_POINTS, WINDOWS
 
 
 def mees_bergen(method, linear, crossing, others):

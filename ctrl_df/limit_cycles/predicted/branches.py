@@ -12,7 +12,9 @@ import numpy as np
 
 from ...df.branch import Branch
 from ...df.points import points
-from ..thresholds import (
+from .crossings import Crossing, find_crossings
+from .scan_grid import refined_omega
+from .thresholds import (
     BRANCH_AGREES,
     BRANCH_FOLD,
     BRANCH_NUDGE,
@@ -22,8 +24,6 @@ from ..thresholds import (
     FAR,
     NEAR,
 )
-from .crossings import Crossing, find_crossings
-from .scan_grid import refined_omega
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..thresholds import (
+from ..thresholds import NOTHING
+from .thresholds import (
     ACCEPT,
+    APART,
     BISECTIONS,
     CELLS_AT_ONCE,
     CONVERGED,
@@ -24,14 +26,16 @@ from ..thresholds import (
     CROSSING_STEPS,
     CUTS,
     HOPELESS,
+    LINE_HALVINGS,
     MARGIN,
     MOST_PER_CELL,
     MOST_STARTS,
     NOT_REAL,
-    NOTHING,
     ON_EDGE,
     SAME,
     SETTLED,
+    SHOWS_BY,
+    STRAYED,
     TOGETHER,
 )
 
@@ -237,9 +241,9 @@ def _polish(D, p, q, reach, box, refine):
         moved = _line_search(D, x, value, active, step)
         settled = np.abs(step).max(axis=1) < SETTLED
         finished[active[settled | ~moved]] = True
-        if iteration == 8:  # quadratic convergence shows by now; what has none sits at a jump
+        if iteration == SHOWS_BY:  # quadratic convergence shows by now; what has none sits at a jump
             alive &= np.abs(value) < HOPELESS
-        far = np.abs((x - start) / reach).max(axis=1) > 6  # strayed: another start owns what is there
+        far = np.abs((x - start) / reach).max(axis=1) > STRAYED  # strayed: another start owns what is there
         alive &= ~far
         if refine:
             alive &= ~_followers(x, np.where(alive, np.abs(value), np.inf), reach)
@@ -279,7 +283,7 @@ def _neighbourhoods(x, value, reach, places):
     order = np.argsort(np.where(np.isfinite(value), np.abs(value), np.inf))
     for i in order[np.isfinite(value[order])]:
         others = places + [x[j] for j in best]
-        if not any((np.abs(x[i] - place) < 3 * reach[i]).all() for place in others):
+        if not any((np.abs(x[i] - place) < APART * reach[i]).all() for place in others):
             best.append(int(i))
     return len(best)
 
@@ -334,7 +338,7 @@ def _line_search(D, x, value, active, step):
     """Halve steps until |D| falls; updates `x` and `value` in place, returns who moved."""
     moved = np.zeros(active.size, dtype=bool)
     share = 1.0
-    for _ in range(5):
+    for _ in range(LINE_HALVINGS):
         todo = np.nonzero(~moved)[0]
         if todo.size == 0:
             break

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..thresholds import BAND, BAND_MOST, DISTORTION, LOEB, SENSITIVITY
 from .path import Path
+from .thresholds import BAND, BAND_MOST, DISTORTION, LOEB, SENSITIVITY
 
 TRUSTED, DOUBTFUL, UNRELIABLE = "trusted", "doubtful", "unreliable"
 

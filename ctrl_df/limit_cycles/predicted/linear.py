@@ -9,7 +9,8 @@ import control as ct
 import numpy as np
 
 from ...checks import is_number, number, real_array, shown
-from ..thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_SPAN, ON_EDGE, ROUGH_POLE, ROUNDED, SMOOTH_STEP
+from ..thresholds import ROUNDED
+from .thresholds import OMEGA_BEYOND, OMEGA_LEAST, OMEGA_SPAN, ON_EDGE, ROUGH_POLE, SMOOTH_STEP
 
 
 class LinearPart:

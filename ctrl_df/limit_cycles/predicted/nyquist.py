@@ -8,9 +8,9 @@ import control as ct
 import numpy as np
 
 from ...calls import unknown_keywords
-from ..thresholds import INDENT, OMEGA_POINTS, OMEGA_POINTS_DRAWN
 from .linear import LinearPart
 from .scan_grid import refined_omega
+from .thresholds import INDENT, OMEGA_POINTS, OMEGA_POINTS_DRAWN
 
 
 def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):

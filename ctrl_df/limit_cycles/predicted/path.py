@@ -23,7 +23,7 @@ import numpy as np
 
 from ...arclength import correction, tangent
 from ...simulate.engine import State
-from ..thresholds import (
+from .thresholds import (
     ASTRAY,
     NAMED,
     ODD,

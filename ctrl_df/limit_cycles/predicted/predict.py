@@ -15,7 +15,7 @@ from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
 from ...drawing import draw
 from ...table import Table, frame, without_empty
-from ..thresholds import OMEGA_POINTS, ORDERS, ROUNDED
+from ..thresholds import ROUNDED
 from .assess import Assessor
 from .branches import branch_crossings
 from .crossings import Scan, find_crossings, merged, real_crossings
@@ -23,6 +23,7 @@ from .grade import LimitCycle
 from .linear import LinearPart
 from .nyquist import nyquist_of
 from .scan_grid import defect, scan_grid
+from .thresholds import OMEGA_POINTS, ORDERS
 
 
 class DescribingFunctionResponse(_PythonControlResponse):

@@ -9,7 +9,8 @@ import numpy as np
 from ...df.family import Family
 from ...df.methods import ElementIntegrals, Method
 from ...df.points import points
-from ..thresholds import (
+from .linear import LinearPart
+from .thresholds import (
     BEYOND_CORNER,
     JUMPY,
     LEVELS,
@@ -20,7 +21,6 @@ from ..thresholds import (
     SCAN_QUICK,
     SCAN_STEP,
 )
-from .linear import LinearPart
 
 
 def defect(method: Method, linear: LinearPart, bar=None):

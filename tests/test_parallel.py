@@ -12,7 +12,7 @@ import rigs
 import ctrl_df as cdf
 from ctrl_df.identify.prediction.segments import cut
 from ctrl_df.identify.prediction.simulator import Simulator
-from ctrl_df.simulate import crew, runs
+from ctrl_df.simulate import parallel, runs
 
 T = 1e-3 * np.arange(2000)
 RECORD = cdf.Measurement(T, np.sin(9 * T), 0.01 * np.sin(9 * T) + 1e-5 * np.cos(777 * T))
@@ -21,7 +21,7 @@ BLOCK = cdf.Mass(2.0, [cdf.Coulomb(0.2), cdf.Viscous(3.0)])
 
 @pytest.fixture(autouse=True)
 def two_threads(monkeypatch):
-    monkeypatch.setattr(crew, "processors", lambda: 2)
+    monkeypatch.setattr(parallel, "processors", lambda: 2)
     monkeypatch.setattr(runs, "STEPS_ALONE", 0)  # no run is too small to be shared
 
 
@@ -32,7 +32,7 @@ def output(mass):
 
 def test_numbers_are_those_of_one_thread_and_in_order():
     masses = np.linspace(1, 3, 9)
-    first, second = (crew.side_by_side(output, masses) for _ in range(2))
+    first, second = (parallel.side_by_side(output, masses) for _ in range(2))
     for a, b, mass in zip(first, second, masses, strict=True):
         assert np.array_equal(a, b)
         assert np.array_equal(a, output(mass))
@@ -46,8 +46,8 @@ def test_a_job_that_is_the_last_has_its_runs_made_by_processors_without_one(monk
         work(self, todo)
 
     monkeypatch.setattr(runs._Work, "_work", seen)
-    monkeypatch.setattr(crew, "spare", lambda: 1)
-    many = crew.side_by_side(output, [1.5, 2.5])
+    monkeypatch.setattr(parallel, "spare", lambda: 1)
+    many = parallel.side_by_side(output, [1.5, 2.5])
     assert np.array_equal(many[0], alone) and np.array_equal(many[1], output(2.5))
     assert {name.rpartition("_")[0] for name in threads} == {"ctrl_df jobs", "ctrl_df runs"}
 
@@ -57,7 +57,7 @@ def test_a_diagnosis_repeats_itself_to_the_last_bit(monkeypatch):
     rig = rigs.draw("stiction", 5, ratio=1.0, snr_db=40, n=1500)
     record, found = rig.train[0].measurement(), []
     for threads in (2, 1):
-        monkeypatch.setattr(crew, "processors", lambda threads=threads: threads)
+        monkeypatch.setattr(parallel, "processors", lambda threads=threads: threads)
         diagnosis = cdf.diagnose(rig.baseline, record, candidates=("stiction",))
         found.append([(c.id, c.evidence, dict(c.parameters)) for c in diagnosis.ranking])
     assert found[0] == found[1]
@@ -69,9 +69,9 @@ def test_threads_without_a_job_help_with_jobs_within_jobs():
         return i, threading.get_ident()
 
     def job(i):
-        return crew.side_by_side(inner, range(4)) if i else []
+        return parallel.side_by_side(inner, range(4)) if i else []
 
-    _, found = crew.side_by_side(job, range(2))
+    _, found = parallel.side_by_side(job, range(2))
     assert [i for i, _ in found] == [0, 1, 2, 3]
     assert len({ident for _, ident in found}) == 2 and threading.get_ident() not in {t for _, t in found}
 
@@ -79,11 +79,11 @@ def test_threads_without_a_job_help_with_jobs_within_jobs():
 def test_jobs_within_jobs_within_jobs_come_to_an_end():
     def of(depth):
         def job(i):
-            return i if depth == 0 else sum(crew.side_by_side(of(depth - 1), range(3)))
+            return i if depth == 0 else sum(parallel.side_by_side(of(depth - 1), range(3)))
 
         return job
 
-    assert crew.side_by_side(of(4), range(3)) == [3**4] * 3
+    assert parallel.side_by_side(of(4), range(3)) == [3**4] * 3
 
 
 def test_the_first_failure_of_jobs_within_jobs_is_told():
@@ -93,7 +93,7 @@ def test_the_first_failure_of_jobs_within_jobs_is_told():
             raise ValueError(f"job {i}")
 
     with pytest.raises(ValueError, match="job 1"):
-        crew.side_by_side(lambda i: crew.side_by_side(inner, range(3)) if i else None, range(2))
+        parallel.side_by_side(lambda i: parallel.side_by_side(inner, range(3)) if i else None, range(2))
 
 
 def test_the_first_failure_in_order_is_told():
@@ -103,7 +103,7 @@ def test_the_first_failure_in_order_is_told():
         time.sleep(0.05)
 
     with pytest.raises(ValueError, match="job 1"):
-        crew.side_by_side(job, range(4))
+        parallel.side_by_side(job, range(4))
 
 
 def test_runs_that_call_python_back_are_done_where_ctrl_c_is_heard():
@@ -118,7 +118,7 @@ def test_runs_that_call_python_back_are_done_where_ctrl_c_is_heard():
         seen.append(threading.current_thread() is threading.main_thread())
         return y
 
-    first, second = crew.side_by_side(job, range(2))
+    first, second = parallel.side_by_side(job, range(2))
     assert seen == [True, True] and np.array_equal(first, second)
 
 
@@ -131,6 +131,6 @@ def test_ctrl_c_ends_all_jobs():
     threading.Timer(0.5, lambda: signal.pthread_kill(main, signal.SIGINT)).start()
     began = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
-        crew.side_by_side(job, range(4))
+        parallel.side_by_side(job, range(4))
     assert time.perf_counter() - began < 5
-    assert len(crew.side_by_side(output, (1.0, 2.0))) == 2
+    assert len(parallel.side_by_side(output, (1.0, 2.0))) == 2
