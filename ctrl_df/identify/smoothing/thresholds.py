@@ -61,3 +61,7 @@ HELD_BACK = 0.1
 
 MADE_LEAST = 0.01
 """Share of a missing force's square that is worth a word: a tenth of its size."""
+
+SLOPE_LEAST = 1e-3
+"""Of a step, over the time of a smooth force: what is new in it, its cube, is 1e-9 of the size, and rounding
+1e-16."""
