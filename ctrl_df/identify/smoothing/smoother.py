@@ -1,8 +1,9 @@
 """The force that would have to be added at every instant, by iterated smoothing over the model's own runs.
 
 The disturbance d is a Gaussian process with exp(-|lag| / time) as its correlation, or one that has a slope
-(Matern's class of 3/2), whichever makes the record more probable; together with the states of the block it is smoothed over the whole record. Size and time of the disturbance and the noise of the
-sensor maximize the likelihood of the record. Steps are linearized where, and as widely as, the smoother
+(Matern's class of 3/2), whichever makes the record more probable; together with the states of the block it
+is smoothed over the whole record. Size and time of the disturbance and the noise of the sensor maximize the
+likelihood of the record. Steps are linearized where, and as widely as, the smoother
 before says the states are (iterated posterior linearization), so that friction that sticks within a step is
 met from both sides. Sources: Garcia-Fernandez, Svensson & Sarkka, IEEE Trans. Automat. Contr. 62 (2017) 2056;
 Marino & Cicirello on switching latent force models of dry friction (2023).
