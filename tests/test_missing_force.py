@@ -105,9 +105,9 @@ def test_the_force_is_that_of_its_instant_within_its_errors(n, hidden):
     lead = lags[np.argmin([np.std(m.force - np.interp(m.time + lag * step, t, d)) for lag in lags])]
     # seen: 0.05 of a step (0.5 where a step's force stood at its begin)
     assert abs(lead) < 0.15
-    # seen: 1.02 and 1.03 of a random force; 0.42 and 0.46 of a smooth one, which is known better than said
+    # seen: 1.02 and 1.03 of a random force, which is rough; 0.62 of a smooth one
     off = np.sqrt(np.mean(((m.force - np.interp(m.time, t, d)) / m.std) ** 2))
-    assert off == pytest.approx(1.0, abs=0.15) if hidden == "random" else 0.3 < off < 1.0
+    assert off == pytest.approx(1.0, abs=0.15) if hidden == "random" else 0.45 < off < 1.0
 
 
 def test_nothing_missing_is_nothing():
@@ -186,11 +186,13 @@ def test_a_spring_is_one_over_position_however_it_is_driven(drive, gain, unit):
 )
 def test_a_force_is_a_curve_over_its_own_quantity(true, against):
     """And over none where the model's own parameters could make it."""
-    shares = dict(beside_plain(true).shares)
-    # seen: 0.94 and more; 0.3 at most of the others, 0.04 where nothing but parameters is wrong
-    if against is not None:
-        assert shares.pop(against) > 0.85
-    assert max(shares.values()) < (0.6 if against else 0.15)
+    m = beside_plain(true)
+    shares = dict(m.shares)
+    if against is None:
+        assert m.made[0] > 0.99 and "Of the rest" not in m.summary()  # seen: 0.998 and 0.9999
+    else:
+        # seen: 0.94 and more; 0.31 at most of the others
+        assert shares.pop(against) > 0.85 and max(shares.values()) < 0.6
 
 
 def test_text_and_picture_of_a_comparison_say_what_is_missing():

@@ -58,8 +58,7 @@ class MissingForce:
         [s]; of a record of many samples every few of them, in the middle between two.
     force, std : (n,) array
         The force (a torque, of machines that turn) and its standard deviation [`unit`]. Where the machine
-        sticks nothing is known of it, and the standard deviation says so. A force may change as roughly as
-        the record allows: one that is smooth is known to half of that.
+        sticks nothing is known of it, and the standard deviation says so.
     quantities : mapping
         position, velocity, load (the force recorded; under an imposed motion the model's) and reversal
         (distance moved since the last reversal), (n,) each.

@@ -1,8 +1,9 @@
 """The force that would have to be added at every instant, by iterated smoothing over the model's own runs.
 
-The disturbance d is a Gaussian process with exp(-|lag| / time) as its correlation; together with the states
-of the block it is smoothed over the whole record. Size and time of the disturbance and the noise of the
-sensor maximize the likelihood of the record. Steps are linearized where, and as widely as, the smoother
+The disturbance d is a Gaussian process with exp(-|lag| / time) as its correlation, or one that has a slope
+(Matern's class of 3/2), whichever makes the record more probable; together with the states of the block it
+is smoothed over the whole record. Size and time of the disturbance and the noise of the sensor maximize the
+likelihood of the record. Steps are linearized where, and as widely as, the smoother
 before says the states are (iterated posterior linearization), so that friction that sticks within a step is
 met from both sides. Sources: Garcia-Fernandez, Svensson & Sarkka, IEEE Trans. Automat. Contr. 62 (2017) 2056;
 Marino & Cicirello on switching latent force models of dry friction (2023).
@@ -23,6 +24,7 @@ from ..prediction.sensed import POSITION
 from .kalman import smoothed
 from .steps import Linearized, Steps
 from .thresholds import (
+    SLOPE_LEAST,
     SMOOTHER_BEGIN,
     SMOOTHER_DAMPED,
     SMOOTHER_DRIVEN,
@@ -81,23 +83,45 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     leak = _leak(steps, known, scale)
     first = cov[0]
     force, time = SMOOTHER_BEGIN
-    sizes = np.log([force, time * known.swing, known.noise])
-    evidence = -math.inf
-    for turn in range(SMOOTHER_ROUNDS):
-        lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
-        told = _Told(lin, steps, leak, mean[0], first, known)
-        if turn < SMOOTHER_ESTIMATED:
-            sizes = told.likeliest(sizes, SMOOTHER_DAMPED[min(turn // 2, 1)])
-        new, cov, evidence = told.smoothed(sizes)
-        moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
-        mean = new
-        if turn > 1 and moved < SMOOTHER_STILL:
-            break
+    begin = _Found(mean, cov, np.log([force, time * known.swing, known.noise]))
+    about = (steps, scale, leak, first, known)
+    # a law of friction changes at once, one of a place smoothly: the record tells which it is
+    rough = _rounds(begin, False, *about)
+    smooth = _rounds(rough, True, *about)
+    found = max((rough, smooth), key=lambda f: f.evidence)
+    mean, cov, sizes, evidence = found.mean, found.cov, found.sizes, found.evidence
     return Smoothed(
         _middles(steps.times), _middles(mean[:, :-1] * scale[:-1]), mean[:-1, -1] * scale[-1],
         np.sqrt(cov[:-1, -1, -1]) * scale[-1], steps.own(mean * scale), math.exp(sizes[0]) * scale[-1],
         math.exp(sizes[1]), math.exp(sizes[2]), evidence,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Means and covariances of states and force, the sizes they go with, and their evidence."""
+
+    mean: np.ndarray
+    cov: np.ndarray
+    sizes: np.ndarray
+    evidence: float = -math.inf
+
+
+def _rounds(begun: _Found, smooth: bool, steps: Steps, scale, leak, first, known) -> _Found:
+    """Linearize and smooth in turn, until the force stays."""
+    mean, cov, sizes, evidence = begun.mean, begun.cov, begun.sizes, begun.evidence
+    for turn in range(SMOOTHER_ROUNDS):
+        lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
+        told = _Told(lin, steps, leak, mean[0], first, known, smooth)
+        if turn < SMOOTHER_ESTIMATED:
+            sizes = told.likeliest(sizes, SMOOTHER_DAMPED[min(turn // 2, 1)])
+        new, cov, _ = told.smoothed(sizes)
+        evidence = told.evidence(sizes)
+        moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
+        mean = new
+        if turn > 1 and moved < SMOOTHER_STILL:
+            break
+    return _Found(mean, cov, sizes, evidence)
 
 
 def _middles(at_edges) -> np.ndarray:
@@ -131,8 +155,8 @@ def _scaled(lin: Linearized, scale) -> Linearized:
 class _Told:
     """What a linearized record says of the process and of the noise."""
 
-    def __init__(self, lin: Linearized, steps: Steps, leak, mean0, cov0, known):
-        self.lin, self.known = lin, known
+    def __init__(self, lin: Linearized, steps: Steps, leak, mean0, cov0, known, smooth):
+        self.lin, self.known, self.smooth = lin, known, smooth
         self.mean0, self.cov0 = mean0, cov0
         self.dt = np.diff(steps.times)
         count, n = lin.b.shape[0], lin.a.shape[2]
@@ -159,16 +183,23 @@ class _Told:
         weighted = self.c * weight[:, :, None]
         info[:-1] = weighted.swapaxes(1, 2) @ self.c
         told[:-1] = np.einsum("kmi,km->ki", weighted, self.off)
-        keep = np.exp(-self.dt / memory)
         a, q = self.a.copy(), self.q.copy()
-        a[:, -1, -1], q[:, -1, -1] = keep, size**2 * -np.expm1(-2 * self.dt / memory)
-        # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
-        apart = size**2 * -np.expm1(-self.dt / (6 * memory))
-        pushed = a[:, :-1, -1]
-        q[:, :-1, :-1] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
         cov0[-1], cov0[:, -1], cov0[-1, -1], mean0[-1] = 0.0, 0.0, size**2, 0.0
-        mean, cov, evidence = smoothed(a, self.b, q, info, told, mean0, cov0, back)
+        if self.smooth:
+            a, q, info, told, mean0, cov0 = _with_slope(
+                a, q, info, told, mean0, cov0, size, self.dt * math.sqrt(3) / memory
+            )
+        else:
+            a[:, -1, -1] = np.exp(-self.dt / memory)
+            q[:, -1, -1] = size**2 * -np.expm1(-2 * self.dt / memory)
+            # the mean over a step differs from the force at its middle: of a Brownian motion by a twelfth
+            apart = size**2 * -np.expm1(-self.dt / (6 * memory))
+            pushed = a[:, :-1, -1]
+            q[:, :-1, :-1] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
+        b = np.pad(self.b, ((0, 0), (0, len(mean0) - n)))
+        mean, cov, evidence = smoothed(a, b, q, info, told, mean0, cov0, back)
+        mean, cov = mean[:, :n], cov[:, :n, :n]
         evidence += 0.5 * float(np.sum(np.log(weight[self.has])) - np.sum(weight * self.off**2))
         return mean, cov, evidence
 
@@ -187,3 +218,20 @@ class _Told:
             np.sum(((sizes - usual) / SMOOTHER_PRIOR) ** 2)
         )
         return value if math.isfinite(value) else UNLIKELY
+
+
+def _with_slope(a, q, info, told, mean0, cov0, size, decay):
+    """Return the same with the slope of the force, over its usual size, as one more state.
+
+    Force and slope are those of a process of Matern's class, differentiable once. `decay`: of each step, over
+    the process's time. Source: Hartikainen & Sarkka, IEEE MLSP (2010) 379.
+    """
+    x = np.maximum(decay, SLOPE_LEAST)
+    kept = np.exp(-x)[:, None, None] * np.array([[1 + x, x], [-x, 1 - x]]).transpose(2, 0, 1)
+    last = np.s_[:, -2:, -2:]
+    a, q, info = (np.pad(m, ((0, 0), (0, 1), (0, 1))) for m in (a, q, info))
+    a[last] = kept
+    q[last] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
+    cov0 = np.pad(cov0, ((0, 1), (0, 1)))
+    cov0[-1, -1] = size**2
+    return a, q, info, np.pad(told, ((0, 0), (0, 1))), np.append(mean0, 0.0), cov0

@@ -65,3 +65,7 @@ MADE_LEAST = 0.01
 SMOOTHER_PRIOR, SMOOTHER_RANGE = (4.0, 1.5, 1.0), 40.0
 """Standard deviations of the logarithms of a missing force's size and time and of the noise, about the usual
 ones: factors of 55, 4.5 and 2.7; logarithms beyond which they are not tried."""
+
+SLOPE_LEAST = 1e-3
+"""Of a step, over the time of a smooth force: what is new in it, its cube, is 1e-9 of the size, and rounding
+1e-16."""
