@@ -29,7 +29,7 @@ from ..thresholds import FLOOR, GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
 from .attempts import itself
 from .evidence import misses_lines, ranked, rounds
-from .standing import Standing
+from .reference import Reference
 from .thresholds import (
     CONFIRMED,
     CONFIRMED_FORCED,
@@ -48,17 +48,17 @@ Stages = list[list[FitResult | None]]
 
 
 def confirmed(
-    at: Standing, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
-) -> tuple[Standing, list[CandidateFit]]:
+    at: Reference, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+) -> tuple[Reference, list[CandidateFit]]:
     """Refit baseline and best candidates at the full rate; return these, best first, and what judges them.
 
     Parameters
     ----------
-    at : Standing
+    at : Reference
     found : sequence of CandidateFit
         Of the first look, best first.
     staged : callable
-        ``staged(standing, fits)``, such as `stages`.
+        ``staged(at, fits)``, such as `stages`.
     told, stage : callable
         See `FirstLook.of`.
     """
@@ -77,8 +77,8 @@ def confirmed(
 
 
 def _confirmed(
-    at: Standing, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
-) -> tuple[Standing, list[CandidateFit]]:
+    at: Reference, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+) -> tuple[Reference, list[CandidateFit]]:
     """Do what `confirmed` does, whatever the effects have become."""
     stage("the best refitted over segments of every length")
     # Disturbance forces let the first look tell little.
@@ -104,7 +104,7 @@ def _confirmed(
     return replace(at, noise=noise), chosen
 
 
-def _farthest(at: Standing, fits: Sequence[FitResult | None]) -> FitResult:
+def _farthest(at: Reference, fits: Sequence[FitResult | None]) -> FitResult:
     """Return the baseline over the longest segments, begun again as the nearest model there."""
     base, *others = [CandidateFit("", f) for f in fits if f is not None]
     nearest = min([base, *others], key=lambda t: t.train.rmse)
@@ -112,7 +112,7 @@ def _farthest(at: Standing, fits: Sequence[FitResult | None]) -> FitResult:
 
 
 def _judged(
-    at: Standing, tried: Sequence[CandidateFit], stages: Stages
+    at: Reference, tried: Sequence[CandidateFit], stages: Stages
 ) -> tuple[SegmentedData, list[CandidateFit | None]]:
     """Return the data in segments of the length that suits them, and the models validated there.
 
@@ -202,7 +202,7 @@ def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits)
 # --- segments of every length -------------------------------------------------------------------------
 
 
-def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
+def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     """Return the fits in segments of every length that may judge, and their floor.
 
     The floor is the error that a fit can come down to at best: over short segments nearly every model
@@ -326,7 +326,7 @@ def _left(base, best, at) -> float:
 # --- to the end ---------------------------------------------------------------------------------------
 
 
-def _to_the_end(at: Standing, chosen: list[CandidateFit]) -> list[CandidateFit]:
+def _to_the_end(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]:
     """Tell near equals apart by fits that have come to an end, and in the right minimum."""
     chosen = _again(at, chosen, chosen[:1])
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
@@ -339,7 +339,7 @@ def _to_the_end(at: Standing, chosen: list[CandidateFit]) -> list[CandidateFit]:
     return chosen
 
 
-def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
+def _ended(at: Reference, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
     """Return a candidate in its best minimum, unless nothing better is possible.
 
     `exactly`: iterated to the end first. `least`: error of the best of all.
@@ -352,7 +352,7 @@ def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> Ca
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)
 
 
-def _again(at: Standing, chosen, those) -> list[CandidateFit]:
+def _again(at: Reference, chosen, those) -> list[CandidateFit]:
     """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
     fine = at.data.fine
     alike = alike_along(fine, at.base.block)

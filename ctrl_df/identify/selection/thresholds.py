@@ -118,7 +118,7 @@ REFUTED_MOST = 2
 """Candidates that long stretches refute, after each of which all others are looked at again without it: a
 joint and a gap, which have the hidden states that follow short segments. Each look is a whole search."""
 
-OUTLASTING = 2
+LONG_RIVALS = 2
 """Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 

@@ -24,8 +24,6 @@ from .thresholds import (
     FAINT,
     FEW,
     GONE,
-    LASTING_DECAY,
-    LASTING_GROWTH,
     LOOK,
     LOOK_POINTS,
     LOOK_RTOL,
@@ -42,6 +40,8 @@ from .thresholds import (
     STEPS,
     STRIDE,
     STRIDE_SAMPLES,
+    SUSTAINED_DECAY,
+    SUSTAINED_GROWTH,
     TENFOLD,
     WITHIN,
     WORK,
@@ -120,7 +120,7 @@ class PoincareSearch:
 
     @property
     def units(self) -> np.ndarray:
-        """What each state is measured in: the largest it becomes in the first swing from the largest start."""
+        """What each state is measured in: the largest it becomes in the first swing from the largest."""
         return self._first_swing[0]
 
     @property
@@ -337,7 +337,7 @@ def _tendency(crossings) -> str:
     now, earlier = _growth(crossings), _growth(crossings, 1)
     if not now > 0 or not earlier > 0 or max(now, 1 / now) < STEADY:
         return UNDECIDED
-    lasting = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
+    sustained = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
     if now > 1.0:
-        return DIVERGES if lasting > LASTING_GROWTH else UNDECIDED
-    return RESTS if lasting > LASTING_DECAY else UNDECIDED
+        return DIVERGES if sustained > SUSTAINED_GROWTH else UNDECIDED
+    return RESTS if sustained > SUSTAINED_DECAY else UNDECIDED

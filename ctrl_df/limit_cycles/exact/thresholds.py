@@ -171,7 +171,7 @@ BEYOND = 10.0
 GONE = 1e4
 """Times what the largest start sets in motion: a loop beyond it has run away."""
 
-STEADY, LASTING_GROWTH, LASTING_DECAY = 1.25, 0.5, 0.9
+STEADY, SUSTAINED_GROWTH, SUSTAINED_DECAY = 1.25, 0.5, 0.9
 """Change of the swings from the third to the last quarter of a course below which they keep their size, and
 the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
 quadratic)."""

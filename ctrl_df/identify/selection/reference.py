@@ -21,7 +21,7 @@ from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class Reference:
     """What models are judged by at one time of a search.
 
     Attributes
@@ -98,7 +98,7 @@ class Standing:
         left = far.sensitivity.left_by_starts(colour) / near.sensitivity.left_by_starts(colour)
         return max(GROWN, math.sqrt(left) * by_chance(far.spanned / colour.memory))
 
-    def by_accelerations(self, free: tuple[str, ...]) -> Standing:
+    def by_accelerations(self, free: tuple[str, ...]) -> Reference:
         """Return the same where disturbance forces drown all else over longer segments.
 
         `free`: parameters of the model that are refitted.
@@ -108,7 +108,7 @@ class Standing:
         base = CandidateFit("", data.fit(self.nearest.model, free))
         return replace(self, segmentations=segmentations, data=data, base=base, noise=ranked(base, ())[1])
 
-    def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Standing:
+    def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Reference:
         """Refit the model from what the best candidates say of its parameters: it may have been stuck."""
         base = self.base
         for best in found[:2]:
@@ -121,7 +121,7 @@ class Standing:
         return replace(self, base=base)
 
 
-def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Standing:
+def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Reference:
     """Fit a model from its own values and from a regression of the force; return what the better comes to."""
     shortest, data = segmentations[:2]
     begins = [block]
@@ -138,7 +138,7 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
         fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS))
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
-    return Standing(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])
+    return Reference(segmentations, data, base, shortest.moved(base.train), ranked(base, ())[1])
 
 
 def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:
