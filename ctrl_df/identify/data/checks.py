@@ -8,7 +8,7 @@ import numpy as np
 
 from ...checks import is_number, shown
 from .derivatives import grain, step_of
-from .thresholds import BESIDE, FAST, LEAP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
+from .thresholds import BESIDE, FAST, JUMP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -127,21 +127,21 @@ def check_output(owner: str, y: np.ndarray) -> None:
 
 
 def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
-    """Check that a measured place does not leap."""
-    found = leaps(x)
+    """Check that a measured place does not jump."""
+    found = jumps(x)
     if len(found):
         i = int(found[0])
         raise ValueError(
-            f"{owner} needs a position without leaps; it has {len(found)}, the first from {x[i]:.6g} to "
+            f"{owner} needs a position without jumps; it has {len(found)}, the first from {x[i]:.6g} to "
             f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s. Was the encoder reset? Give the parts as "
             "separate records: Measurement.in_parts (an angle that wraps: np.unwrap first)."
         )
 
 
-def leaps(x: np.ndarray) -> np.ndarray:
-    """Return the samples after which a place leaps, as it does where an encoder is reset or an angle wraps.
+def jumps(x: np.ndarray) -> np.ndarray:
+    """Return the samples after which a place jumps, as it does where an encoder is reset or an angle wraps.
 
-    A leap is a step between two samples that is far larger than those around it, than any other in the
+    A jump is a step between two samples that is far larger than those around it, than any other in the
     record, and than noise and rounding: no machine is that fast for one sample alone.
     """
     steps = np.abs(np.diff(x))
@@ -149,14 +149,14 @@ def leaps(x: np.ndarray) -> np.ndarray:
     for lag in range(1, BESIDE + 1):
         around[lag:] = np.maximum(around[lag:], steps[:-lag])
         around[:-lag] = np.maximum(around[:-lag], steps[lag:])
-    seen = LEAP * max(step_of(x), grain(x))
-    alone = steps > np.maximum(LEAP * around, seen)
+    seen = JUMP * max(step_of(x), grain(x))
+    alone = steps > np.maximum(JUMP * around, seen)
     found = np.flatnonzero(alone & (steps > FAST * np.max(steps[~alone], initial=0.0)))
     jumps = np.zeros(len(steps))
     jumps[found] = np.diff(x)[found]
     between = np.ptp(x[1:] - np.cumsum(jumps))
     # A coarse sensor that rounds moves by its steps alone: nothing is seen between them, or, where noise
-    # comes after it, less than half a step. After a reset the next one leaps by what the machine moved.
+    # comes after it, less than half a step. After a reset the next one jumps by what the machine moved.
     if len(found) > SINGLE and between < 0.5 * np.min(steps[found]):
         return found[:0]
     return found[np.minimum(steps[found], seen) < between]

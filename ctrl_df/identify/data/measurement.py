@@ -75,7 +75,7 @@ class Measurement:
     ------
     ValueError
         NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a position
-        that leaps (an encoder that was reset), a constant input or output, fewer than 10 samples, an unknown
+        that jumps (an encoder that was reset), a constant input or output, fewer than 10 samples, an unknown
         unit; the message gives rule, value, remedy.
 
     Examples
@@ -281,7 +281,7 @@ class Measurement:
         """Take a run that has breaks as several records, which share the parameters of a model.
 
         A break is where the recorder paused or dropped samples (a hole in a regular sampling, NaN, None or
-        masked samples in any channel), where times begin anew, and where a position leaps (an encoder was
+        masked samples in any channel), where times begin anew, and where a position jumps (an encoder was
         reset; places are then counted from elsewhere). Nothing is filled in. Parts that are too short to
         teach anything (under 10 samples, input or output constant) are left out, and a warning says how many
         samples that were.

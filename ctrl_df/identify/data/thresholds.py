@@ -7,11 +7,11 @@ from __future__ import annotations
 MINIMUM = 10
 """Samples of a record at least: fewer have no derivatives."""
 
-BESIDE, LEAP, FAST = 5, 20.0, 5.0
-"""Steps to either side that a leap stands out from, how far, and how far from all others of the record."""
+BESIDE, JUMP, FAST = 5, 20.0, 5.0
+"""Steps to either side that a jump stands out from, how far, and how far from all others of the record."""
 
 SINGLE = 2
-"""Leaps up to which none is a step of a coarse sensor: there and back again is no motion."""
+"""Jumps up to which none is a step of a coarse sensor: there and back again is no motion."""
 
 USUAL_STEPS = (0.05, 0.95)
 """Quantiles between which steps of time lie that are usual."""

@@ -141,7 +141,7 @@ def _with_step(found: FitResult, records, names, whole) -> FitResult:
     return replace(found, model=with_values(found.model, {key: float(np.median(steps))}))
 
 
-def blurred(found: FitResult) -> set[str]:
+def undetermined(found: FitResult) -> set[str]:
     """Return the parameters in a null direction, or uncertain by more than themselves.
 
     Those that every record has for itself where that holds in all records.
@@ -179,7 +179,7 @@ def doubts(found: FitResult) -> tuple[str, ...]:
         lines.append(
             f"{_of(k, [*records], found)} leaves no trace in these data: its value is the start value."
         )
-    doubtful = blurred(found)
+    doubtful = undetermined(found)
     for k in found.names:
         if k in found.own:
             open_ = [r for r, own in found.own[k].items() if not own.determined]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ...simulate.parallel import side_by_side
-from ..estimation.refit_records import blurred, refit_records
+from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..thresholds import FLOOR, GROWTH, RULED_OUT
 from .evidence import ranked
@@ -72,7 +72,7 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     if found.rmse > FLOOR * at.floor:
         # a minimum beside the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
-    if blurred(found) - blurred(tried.train):
+    if undetermined(found) - undetermined(tried.train):
         return tried
     there = data.as_it_is(found)
     there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..course import Course
-from ..estimation.refit_records import blurred
+from ..estimation.refit_records import undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -158,7 +158,7 @@ class StructureSearch(Search):
             f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.at.data.filtered)
         }
         at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
-        doubtful = (at_bound - proved) | blurred(fit)
+        doubtful = (at_bound - proved) | undetermined(fit)
         # a static level is found by trying, as single samples pass it: slopes know nothing of it
         table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
         own = [k for k in own_names(judged.block) if not table[k].threshold]
