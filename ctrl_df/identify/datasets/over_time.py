@@ -90,8 +90,8 @@ class TimeDataset(Dataset):
         )  # fmt: skip
         comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
-            self.block_of(found.model), found.standard_errors, found.at_bound, undetermined(found), doubts(found),
-            found.covariance, comparison, found.converged, found.nfev, found.own,
+            self.block_of(found.model), found.standard_errors, found.at_bound, undetermined(found),
+            doubts(found), found.covariance, comparison, found.converged, found.nfev, found.own,
         )  # fmt: skip
 
     def _tells_references(self) -> bool:

@@ -60,10 +60,10 @@ def refit_records(
     found = min(fits, key=lambda f: f.rmse)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
-        brief = _short_segment(found.model, records)
-        if brief is not None:
+        short = _short_segment(found.model, records)
+        if short is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
-            settings["window"] = brief
+            settings["window"] = short
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     if nonsmooth_names(found):
@@ -75,7 +75,7 @@ def refit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
             )
     found = _with_step(found, records, names, whole)
-    # a model that errs over brief segments of its own fit would look better than it is
+    # a model that errs over short segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
 

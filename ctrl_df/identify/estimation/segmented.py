@@ -28,7 +28,6 @@ from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import carried, least_begins, same_begins
 from .thresholds import (
-    BRIEF,
     EFFORT_MOVED_ON,
     EFFORT_OWN,
     EFFORT_STATES,
@@ -44,6 +43,7 @@ from .thresholds import (
     SEGMENT_MOTIONS,
     SEGMENT_USUAL,
     SEGMENTS,
+    SHORT,
     SHORTEST,
     STROKE_SAMPLES,
     TOLERANCE,
@@ -184,7 +184,7 @@ class SegmentedData:
         their states, fitted anew in every segment, pass for it. No limits: models of any rung of a ladder
         begin near.
         """
-        return replace(self.level(BRIEF), error_filter=None, begins=FREE, limits={})
+        return replace(self.level(SHORT), error_filter=None, begins=FREE, limits={})
 
     @property
     def continued(self) -> SegmentedData:

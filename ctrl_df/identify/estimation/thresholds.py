@@ -26,7 +26,7 @@ and a half, a sixth of one remains, over which every effect is all but linear.""
 LEVELS = (SHORTEST, 4, 1)
 """How many times as many as the longest segments are, of the three lengths that are looked at."""
 
-BRIEF = 4 * SHORTEST
+SHORT = 4 * SHORTEST
 """How many times as many they are for the parameters of a machine with disturbance forces."""
 
 FILTERED = 40
