@@ -180,5 +180,5 @@ def test_slow_noise_may_grow_from_short_segments_to_long_ones():
     for pole, conceded in ((0.5, False), (0.96, True), (1 - 0.5 / shortest, False)):
         slow = NoiseModel(np.array([pole]), at.noise.sigma)
         # what lasts longer than the shortest segments is not told from what is missing
-        assert (at.colour(slow) is slow) == (slow.memory <= shortest)
+        assert (at.coloured(slow) is slow) == (slow.memory <= shortest)
         assert (at.by_noise(fits[1], slow) > 1.01 * GROWN * at.floor) == conceded

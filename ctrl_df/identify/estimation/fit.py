@@ -59,7 +59,7 @@ class FitResult:
         The free parameters. Of those that every record has for itself (`PerRecord`) what follows is of their
         mean over the records, weighted by one over the variance where that is known.
     covariance : (p, p) array
-        Of `values`, for residuals of the colour seen.
+        Of `values`, for residuals of the spectrum seen.
     residual, simulated : list of (n,) array
         Per record, measured minus simulated.
     count : int

@@ -73,7 +73,7 @@ class Reference:
         base = self.base.train
         return self.nearest.nrmse > UNMOVED or -base.count * math.log(base.nrmse) < significant
 
-    def colour(self, noise: NoiseModel) -> NoiseModel:
+    def coloured(self, noise: NoiseModel) -> NoiseModel:
         """Return the noise if it forgets within the shortest segments, else white noise.
 
         What lasts longer is not told from something that is missing: nothing is conceded to it.
@@ -87,16 +87,16 @@ class Reference:
         return self.floor * (GROWN if self.least is None else self.grown(self.least, fit, noise))
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
-        """Return how many times larger noise alone may be over longer segments, by its colour and by chance.
+        """Return how many times larger noise alone may be over longer segments, by its memory and by chance.
 
         Of slow noise the initial states of short ones take a part, the more of them the more. `noise`: None:
         that which judges.
         """
         if near.sensitivity is None or far.sensitivity is None:
             return GROWN
-        colour = self.colour(noise or self.noise)
-        left = far.sensitivity.left_by_starts(colour) / near.sensitivity.left_by_starts(colour)
-        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / colour.memory))
+        coloured = self.coloured(noise or self.noise)
+        left = far.sensitivity.left_by_starts(coloured) / near.sensitivity.left_by_starts(coloured)
+        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / coloured.memory))
 
     def by_accelerations(self, free: tuple[str, ...]) -> Reference:
         """Return the same where disturbance forces drown all else over longer segments.

@@ -195,7 +195,7 @@ class StructureSearch(Search):
         """Return what the best model leaves."""
         noise = self._noise(best)
         left = remainder(
-            self.at.base, best, self.at.data.fine, noise, self.at.colour(noise),
+            self.at.base, best, self.at.data.fine, noise, self.at.coloured(noise),
             self.at.by_noise(best.train, noise), self.significant,
         )  # fmt: skip
         if not significant and self.at.unmoved(self.significant):
