@@ -38,7 +38,7 @@ def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
 
     def confirmed(at, found, *_):
         asked.append([t.key for t in found])
-        return replace(at, noise="theirs"), list(found[:2])  # beside the first two all others are hopeless
+        return replace(at, noise="theirs"), list(found[:2])  # beside the first two all others are give_up
 
     monkeypatch.setattr(confirmation, "_confirmed", confirmed)
     monkeypatch.setattr(confirmation, "itself", lambda t, span: real[t.key])

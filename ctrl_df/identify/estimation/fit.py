@@ -320,7 +320,7 @@ def fit_segments(
     errors: bool = False,
     error_filter: NoiseModel | None = None,
     begins: str = FREE,
-    hopeless: float = math.inf,
+    give_up: float = math.inf,
     steps_left: int = 0,
     rtol: float = RTOL,
     followed: int = 0,
@@ -350,7 +350,7 @@ def fit_segments(
         The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
         How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
-    hopeless : float
+    give_up : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
     steps_left : int
@@ -365,7 +365,7 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, UNCOUNTED, limits, error_filter, begins, (hopeless, steps_left), about,
+        model, records, names, UNCOUNTED, limits, error_filter, begins, (give_up, steps_left), about,
         followed,
     )  # fmt: skip
     stage = Stage(problem, list(segments), thin, starts, rtol)

@@ -123,10 +123,10 @@ class _Beside:
     def __init__(self, records, segments, about):
         self.records, self.segments, self.about = records, segments, about
 
-    def __call__(self, model, names, *, starts, iterations, hopeless) -> FitResult:
+    def __call__(self, model, names, *, starts, iterations, give_up) -> FitResult:
         return fit_segments(
             model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
-            hopeless=hopeless, about=self.about,
+            give_up=give_up, about=self.about,
         )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import feasible
-from ..thresholds import FLOOR, GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
+from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
 from .attempts import itself
 from .evidence import misses_lines, ranked, rounds
@@ -44,7 +44,7 @@ from .thresholds import (
 )
 
 Stages = list[list[FitResult | None]]
-"""Fits in segments of every length, short ones first: the baseline's, then of candidates; None: hopeless."""
+"""Fits in segments of every length, short ones first: the baseline's, then of candidates; None: given up."""
 
 
 def confirmed(
@@ -68,7 +68,7 @@ def confirmed(
         odd = {t.key for t in chosen if not itself(t, span)}
         if not odd or chosen[0].key not in odd:
             break
-        # beside what is not what its name says the others were hopeless
+        # beside what is not what its name says the others were give_up
         found = [t for t in found if t.key not in odd]
     if odd:
         chosen, noise = ranked(now.base, [t for t in chosen if t.key not in odd])
@@ -164,8 +164,8 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
         found[i] = t
     known = [t for t in found if t is not None]
     bounds = (
-        HOPELESS * min(t.train.rmse for t in known),
-        HOPELESS * min(t.validation_rmse for t in known),
+        GIVE_UP * min(t.train.rmse for t in known),
+        GIVE_UP * min(t.validation_rmse for t in known),
     )
     rest = [i for i in there if i not in first]
     for i, t in zip(rest, side_by_side(lambda i: at_full_rate(i, *bounds), rest), strict=True):
@@ -257,12 +257,12 @@ def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> Fi
     """Return the best of a fit in longer segments and of those begun at points about one in shorter ones."""
     models = [near.model.with_parameters(feasible(near.model, values)) for values in points]
     begun = side_by_side(
-        lambda model: longer.moved(replace(near, model=model), iterations=2, hopeless=HOPELESS * far.rmse),
+        lambda model: longer.moved(replace(near, model=model), iterations=2, give_up=GIVE_UP * far.rmse),
         models,
     )
     begun = sorted(begun, key=lambda f: f.rmse)[:RESTARTS_KEPT]
     ended = side_by_side(
-        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=STEPS_LONGER, hopeless=far.rmse),
+        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=STEPS_LONGER, give_up=far.rmse),
         begun,
     )
     return min([far, *ended], key=lambda f: f.rmse)
@@ -279,9 +279,9 @@ def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | No
     found: list[Any] = [None] * len(fits)
     for i, f in zip(ahead, side_by_side(data.reached, [fits[i] for i in ahead]), strict=True):
         found[i] = f
-    hopeless = HOPELESS * min(found[i].rmse for i in ahead)
-    others = [i for i, e in enumerate(errors) if i not in ahead and e < hopeless]
-    moved = side_by_side(lambda i: data.moved(fits[i], hopeless=hopeless), others)
+    give_up = GIVE_UP * min(found[i].rmse for i in ahead)
+    others = [i for i, e in enumerate(errors) if i not in ahead and e < give_up]
+    moved = side_by_side(lambda i: data.moved(fits[i], give_up=give_up), others)
     for i, f in zip(others, moved, strict=True):
         found[i] = f
     there = [i for i, f in enumerate(found) if f is not None]
@@ -332,7 +332,7 @@ def _to_the_end(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
     least = min(t.train.rmse for t in chosen)
     close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
-    close = [t for t in close if t.train.rmse < HOPELESS * least]
+    close = [t for t in close if t.train.rmse < GIVE_UP * least]
     ended = side_by_side(lambda t: _ended(at, t, t in near and len(near) > 1, least), close)
     if any(a is not b for a, b in zip(ended, close, strict=True)):
         chosen = _again(at, [*ended, *(t for t in chosen if t not in close)], ended)

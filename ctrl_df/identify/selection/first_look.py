@@ -153,7 +153,7 @@ class FirstLook:
         if not self.disturbs(least, at.data):
             return False
         best = sorted(found, key=lambda t: t.train.rmse)[:2]
-        moved = side_by_side(lambda t: shortest.moved(t.train, hopeless=least), best)
+        moved = side_by_side(lambda t: shortest.moved(t.train, give_up=least), best)
         return all(self.disturbs(f.rmse, at.data) and f.rmse > LEFT * least for f in moved)
 
 
