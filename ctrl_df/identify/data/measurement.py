@@ -444,11 +444,11 @@ class Measurement:
             )
         if factor == 1:
             return self
-        outputs = {k: derivatives.thinned(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
-        velocity = None if self.velocity is None else derivatives.thinned(self.velocity, factor)
-        channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
+        outputs = {k: derivatives.decimated(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
+        velocity = None if self.velocity is None else derivatives.decimated(self.velocity, factor)
+        channels = {k: _frozen(derivatives.decimated(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
         held = self.input_hold == "zoh"
-        u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
+        u = derivatives.block_means(self.u, factor) if held else derivatives.decimated(self.u, factor)
         return self.replaced(
             t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels)
         )

@@ -53,8 +53,8 @@ CUTOFF_LOWEST, CUTOFF_HIGHEST = 0.1, 0.4
 PADDING = 30
 """Samples by which a signal is continued at its ends, at least, before it is filtered."""
 
-THINNED_BAND, THINNED_RIPPLE = 0.7, 5e-4
-"""Band that thinning keeps, over the new Nyquist frequency, and its ripple [dB]: flat within 1e-4, 49 dB down
+DECIMATED_BAND, DECIMATED_RIPPLE = 0.7, 5e-4
+"""Band that decimation keeps, over the new Nyquist frequency; its ripple [dB]: flat within 1e-4, 49 dB down
 at that frequency."""
 
 LONG, CUTOFFS_KEPT = 100_000, 3.0
@@ -83,8 +83,8 @@ LOW_PASS_ORDER, LOW_PASS_MEMORY = 4, 3
 """Order of the low-pass before derivatives, twice for both ways; periods of its cutoff after which it has
 forgotten."""
 
-THINNED_ORDER, THINNED_MEMORY = 9, 40
-"""Order of the low-pass before thinning, odd: exact at 0 Hz; new samples after which it has forgotten."""
+DECIMATED_ORDER, DECIMATED_MEMORY = 9, 40
+"""Order of the low-pass before decimation, odd: exact at 0 Hz; new samples after which it has forgotten."""
 
 WINDOW_LEAST = 9
 """Samples that a window of a record has to be longer than: a record has ten (`MINIMUM`)."""

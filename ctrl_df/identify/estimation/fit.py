@@ -1,4 +1,4 @@
-"""Fit a model to records: stages from short segments and a thinned input to whole ones at full rate."""
+"""Fit a model to records: stages from short segments and a decimated input to whole ones at full rate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from ...blocks.probing import stiffness
 from ...cached import cached_property
 from ..data.measurement import Measurement
-from ..prediction.decimated import thinnable
+from ..prediction.decimated import decimable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
@@ -261,9 +261,9 @@ def fit_records(
     mode, window
         As for `compare`.
     thin : int
-        Samples a step of the input in all but the last iterations, at most; 1: never thinned.
+        Samples a step of the input in all but the last iterations, at most; 1: never decimated.
     polish : int
-        Iterations at full rate at the end; 0 leaves the fit at the thinned input.
+        Iterations at full rate at the end; 0 leaves the fit at the decimated input.
     coarse : bool or None
         Whether to begin with short segments, which converge from far off; None: unless `start` is given.
     robust : bool
@@ -280,7 +280,7 @@ def fit_records(
         Value and standard deviation of parameters known beforehand; of the others see `Prior`.
     """
     records = list(records)
-    thin = thinnable(records, thin)
+    thin = decimable(records, thin)
     model = with_values(model, start)
     first, block = simulator_of(model, records[0]), block_of(model)
     names = tuple(default_free(block) if free is None else free)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import derivatives
 from ..data.measurement import Measurement
-from ..prediction.decimated import thinnable
+from ..prediction.decimated import decimable
 from ..prediction.initial_states import CONTINUED, FREE, MEASURED
 from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
@@ -219,7 +219,7 @@ class SegmentedData:
 
     def _sampled_by(self, step: int) -> SegmentedData:
         train, validation, *whole = [
-            view.thinned(step) for view in (self.train, self.validation, *(self.whole or ()))
+            view.decimated(step) for view in (self.train, self.validation, *(self.whole or ()))
         ]
         return replace(
             self, train=train, validation=validation, whole=(whole[0], whole[1]) if whole else None
@@ -394,7 +394,7 @@ def prepare(
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records))
-    step, thin = thin, thinnable((*records, *validation), thin)
+    step, thin = thin, decimable((*records, *validation), thin)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = scales_of(block, records)

@@ -68,7 +68,7 @@ def confirmed(
         odd = {t.key for t in chosen if not itself(t, span)}
         if not odd or chosen[0].key not in odd:
             break
-        # beside what is not what its name says the others were give_up
+        # beside what is not what its name says the others were given up
         found = [t for t in found if t.key not in odd]
     if odd:
         chosen, noise = ranked(now.base, [t for t in chosen if t.key not in odd])

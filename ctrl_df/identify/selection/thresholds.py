@@ -24,7 +24,7 @@ which fits gained on the rigs when brought to their end. More costs time, less t
 
 PROMISING = 0.2
 """Share of the best one's evidence, at the first look, from which a candidate is confirmed: there records are
-thinned fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
+decimated fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
 
 FORCE_ALIKE = 0.98
 """Share of the best one's evidence that another kind of force must bring to be named beside it, but for what

@@ -149,7 +149,7 @@ class Stage(SegmentOutputs):
         return trial if power(trial.residual) < power(found.residual) else found
 
     def _worth_restarting(self, found: Solution) -> bool:
-        """Whether the error could come below where a fit is given up if all segments erred like the good ones."""
+        """Whether a fit need not be given up if all segments erred like the good ones."""
         if self.problem.error_filter is not None or math.isinf(self.problem.give_up):
             return True
         rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
@@ -222,7 +222,7 @@ class Stage(SegmentOutputs):
         return Solution(theta, states, residual), reached
 
     def too_far(self, residual, pace: float, left: int) -> bool:
-        """Whether the error is that of a fit given up still after so many steps more, its square falling at this pace."""
+        """Whether a fit is given up: so many more steps at this pace leave the error too large."""
         if math.isinf(self.problem.give_up):
             return False
         total, count = self.power(residual)

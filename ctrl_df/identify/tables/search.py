@@ -149,7 +149,7 @@ class TableSearch(Search):
             return self, []
         course = course or Course()
         size = np.abs(self.inside.weight * self.base.error[self.train])
-        few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
+        few, fewer = self.inside.selected(POINTS, size), self.inside.selected(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
         for some in (few, fewer):
             slopes[len(some)] = slopes_of(block, some, self.free, self.scales, WORK_MEDIUM)

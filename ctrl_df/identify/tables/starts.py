@@ -193,5 +193,5 @@ def best_starts(
             scored.append((lost, float(np.sum(np.log(left(table) + common))), len(scored), grown))
     scored.sort(key=lambda s: s[:3])
     bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(GIVE_UP_START)
-    hopeful = [g for _, size, _, g in scored[:keep] if size < bound]
-    return hopeful or [g for *_, g in scored[:1]], bool(hopeful)
+    promising = [g for _, size, _, g in scored[:keep] if size < bound]
+    return promising or [g for *_, g in scored[:1]], bool(promising)
