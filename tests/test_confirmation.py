@@ -41,7 +41,7 @@ def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
         return replace(at, noise="theirs"), list(found[:2])  # beside the first two all others are give_up
 
     monkeypatch.setattr(confirmation, "_confirmed", confirmed)
-    monkeypatch.setattr(confirmation, "itself", lambda t, span: real[t.key])
+    monkeypatch.setattr(confirmation, "distinct", lambda t, span: real[t.key])
     monkeypatch.setattr(confirmation, "ranked", lambda base, trials: (list(trials), "of those left"))
     found = [SimpleNamespace(key=k) for k in ("joint", "gap", "spring")]
     now, chosen = confirmation.confirmed(at, found, None, None, None)

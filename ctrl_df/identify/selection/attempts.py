@@ -234,7 +234,7 @@ class _Rounds:
         begun = self.run(_first, [(a, self.near) for a in attempts if not a.multimodal])
         least = min([best.least, *(a.error for a in begun)])
         begun += self.run(_first, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
-        begun = [a for a in begun if itself(a.trial, self.span)]
+        begun = [a for a in begun if distinct(a.trial, self.span)]
         kept = _best(begun, self.kept)
         # few steps from where the user begins tell little: the baseline may have ended in another minimum
         own = _best([a for a in begun if a.nominal], 1)
@@ -247,7 +247,7 @@ class _Rounds:
         fits = dict(best.fits)
         for t in found:
             known = fits.get(t.key)
-            if itself(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
+            if distinct(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
                 fits[t.key] = t
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
@@ -274,11 +274,11 @@ def _screened(begun, screen: Screen) -> list[CandidateFit]:
     return sorted(found, key=lambda t: -t.evidence)
 
 
-def itself(tried: CandidateFit, span) -> bool:
+def distinct(tried: CandidateFit, span) -> bool:
     """Whether the newest effect is what its name says over the stroke `span` [m]."""
     own, pairs = tried.block.newest + ".", zip(tried.train.names, tried.train.at_bound, strict=True)
     at_bound = {name.removeprefix(own) for name, bound in pairs if bound and name.startswith(own)}
-    return tried.block.effects[-1].genuine(span, at_bound)
+    return tried.block.effects[-1].distinct(span, at_bound)
 
 
 def _best(attempts, count) -> list[Attempt]:

@@ -27,7 +27,7 @@ from ..prediction.segments import facts
 from ..prediction.values import feasible
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
-from .attempts import itself
+from .attempts import distinct
 from .evidence import misses_lines, ranked, rounds
 from .reference import Reference
 from .thresholds import (
@@ -65,7 +65,7 @@ def confirmed(
     span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)
     while True:
         now, chosen = _confirmed(at, found, staged, told, stage)
-        odd = {t.key for t in chosen if not itself(t, span)}
+        odd = {t.key for t in chosen if not distinct(t, span)}
         if not odd or chosen[0].key not in odd:
             break
         # beside what is not what its name says the others were given up
