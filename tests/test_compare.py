@@ -27,7 +27,7 @@ def test_simulation_agrees_with_the_rig(hidden):
     record = rig.train[0]
     measured = record.measurement()
     y = Simulator(rig.true_block, measured).run(make_segments(measured))
-    # The start is estimated from noisy data: worst 0.3 of the noise; thinned 1.3.
+    # The start is estimated from noisy data: worst 0.3 of the noise; decimated 1.3.
     assert np.std(y - record.clean) < 0.6 * record.noise
     thin = Simulator(rig.true_block, measured, thin=4).run(make_segments(measured))
     assert np.std(thin - record.clean) < 2 * record.noise

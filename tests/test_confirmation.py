@@ -24,7 +24,7 @@ def test_a_fit_over_short_segments_errs_no_more_than_over_longer_ones():
 
 
 @dataclass
-class Standing:
+class Reference:
     data: object
     base: object = None
     noise: object = None
@@ -32,16 +32,16 @@ class Standing:
 
 def test_what_is_not_what_its_name_says_takes_no_other_with_it(monkeypatch):
     record = rigs.draw("linear_spring", 1, n=500).train[0].measurement()
-    at = Standing(SimpleNamespace(train=SimpleNamespace(records=(record,))))
+    at = Reference(SimpleNamespace(train=SimpleNamespace(records=(record,))))
     real = {"spring": True, "joint": False, "gap": False}
     asked = []
 
     def confirmed(at, found, *_):
         asked.append([t.key for t in found])
-        return replace(at, noise="theirs"), list(found[:2])  # beside the first two all others are hopeless
+        return replace(at, noise="theirs"), list(found[:2])  # beside the first two all others are give_up
 
     monkeypatch.setattr(confirmation, "_confirmed", confirmed)
-    monkeypatch.setattr(confirmation, "itself", lambda t, span: real[t.key])
+    monkeypatch.setattr(confirmation, "distinct", lambda t, span: real[t.key])
     monkeypatch.setattr(confirmation, "ranked", lambda base, trials: (list(trials), "of those left"))
     found = [SimpleNamespace(key=k) for k in ("joint", "gap", "spring")]
     now, chosen = confirmation.confirmed(at, found, None, None, None)

@@ -254,8 +254,8 @@ def test_what_every_record_has_for_itself_is_not_told_as_one_number():
 
 
 def test_a_hysteresis_that_motion_does_not_bend_is_a_spring():
-    assert cdf.Hysteresis(1.0, stroke=0.36).genuine(0.1, set())  # presliding, never saturated
-    assert not cdf.Hysteresis(3e-4, stroke=1276.0).genuine(46.0, set())
+    assert cdf.Hysteresis(1.0, stroke=0.36).distinct(0.1, set())  # presliding, never saturated
+    assert not cdf.Hysteresis(3e-4, stroke=1276.0).distinct(46.0, set())
 
 
 def test_one_record_alone():

@@ -10,7 +10,7 @@ from ctrl_df.identify.estimation.sensitivity import OutputSensitivity
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.residuals.missing_forces import _motion, missing_forces
 from ctrl_df.identify.selection.evidence import ranked
-from ctrl_df.identify.selection.standing import Standing
+from ctrl_df.identify.selection.reference import Reference
 from ctrl_df.identify.selection.thresholds import GROWN
 from ctrl_df.identify.shooting.noise_model import NoiseModel, OutputNoise
 from ctrl_df.identify.shooting.variables import default_free
@@ -173,12 +173,12 @@ def test_slow_noise_may_grow_from_short_segments_to_long_ones():
     data = prepare(TRUE, [record(0)])
     fits = [level.fit(TRUE, default_free(TRUE)) for level in (data.segmentations[0], data.segmentations[2])]
     base = CandidateFit("", fits[1])
-    at = Standing(
+    at = Reference(
         data.segmentations, data, base, fits[0], ranked(base, ())[1], fits[0].rmse, fits[0], fits[1]
     )
     shortest = int(min(np.min(w.ends - w.begins) for w in fits[0].segments))
     for pole, conceded in ((0.5, False), (0.96, True), (1 - 0.5 / shortest, False)):
         slow = NoiseModel(np.array([pole]), at.noise.sigma)
         # what lasts longer than the shortest segments is not told from what is missing
-        assert (at.colour(slow) is slow) == (slow.memory <= shortest)
+        assert (at.coloured(slow) is slow) == (slow.memory <= shortest)
         assert (at.by_noise(fits[1], slow) > 1.01 * GROWN * at.floor) == conceded

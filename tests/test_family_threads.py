@@ -48,7 +48,7 @@ def test_work_on_threads_stops_where_one_part_fails():
 def test_passages_are_those_of_single_runs():
     finder = OrbitFinder(cdf.closed_loop(cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5)))
     search, engine = finder.poincare, finder.engine
-    state = search.start(search.kicks.state(3 * search.kicks.scale))
+    state = search.start(search.starts.state(3 * search.starts.scale))
     mine = strides(engine, state, search._signal, search.row, search.stride, np.inf, 1e-8)
     before = []
     for _ in range(70):  # more than are made in one call

@@ -11,7 +11,7 @@ from ctrl_df.identify.course import Course
 from ctrl_df.identify.ladder.climb import Climb
 from ctrl_df.identify.ladder.revision import revised
 from ctrl_df.identify.ladder.structure import Structure
-from ctrl_df.identify.selection.lasting import Lasting
+from ctrl_df.identify.selection.long_prediction import LongPrediction
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
 from ctrl_df.identify.starting.extend import applicable, extended
 
@@ -256,11 +256,11 @@ def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):
     levels = {"": 0, "hysteresis": 700, "linear_spring": 500, "constant_force": 40,
               "linear_spring constant_force": 1000, "hysteresis constant_force": 720}  # fmt: skip
 
-    def lasting(ranking, base, significant):
+    def long_prediction(ranking, base, significant):
         better = ("linear_spring", "") if "linear_spring" in [c.id for c in ranking] else ()
-        return Lasting(1.0, {"hysteresis": 0.7, "linear_spring": 0.1, "": 0.3}, better)
+        return LongPrediction(1.0, {"hysteresis": 0.7, "linear_spring": 0.1, "": 0.3}, better)
 
-    monkeypatch.setattr("ctrl_df.identify.ladder.climb.lasting", lasting)
+    monkeypatch.setattr("ctrl_df.identify.ladder.climb.long_prediction", long_prediction)
     study = climb(Data(levels))
     assert [s.effect for s in study.steps[1:]] == ["linear_spring", "constant_force"]
     assert set(study.effects) == {"linear_spring", "constant_force"}

@@ -69,7 +69,7 @@ def test_a_relay_is_watched_by_its_input():
     assert row.simulated[0] == pytest.approx(row.exact.omega, rel=1e-6)
 
 
-def test_kicks_reach_the_corners_whatever_the_scale():
+def test_starts_reach_the_corners_whatever_the_scale():
     for scale in (1e-4, 1e4):
         x = np.array([-2, -1, 1, 2]) * scale
         law = cdf.piecewise_linear(x, np.clip(x, -scale, scale))
@@ -94,7 +94,7 @@ def test_a_loop_closed_on_the_velocity_is_verified_there():
 
 def test_starts_of_six_sizes():
     finder = OrbitFinder(cdf.closed_loop(cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5)))
-    starts = finder.poincare.kicks.all()
+    starts = finder.poincare.starts.all()
     assert len(starts) == 6
     assert len(finder.poincare.iterate(starts[0][1], 5).crossings) == 5
 

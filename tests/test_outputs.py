@@ -222,7 +222,7 @@ def test_records_of_different_outputs_are_studied_apart():
 def test_an_encoder_that_was_reset_is_refused(at):
     x = records(TRUE)["position"].y.copy()
     x[at:] -= 0.25
-    with pytest.raises(ValueError, match="leaps; it has 1.*encoder reset"):
+    with pytest.raises(ValueError, match="jumps; it has 1.*encoder reset"):
         cdf.Measurement(TIME, FORCE, x)
     angle = np.angle(np.exp(1j * 40 * records(TRUE)["position"].y))  # wraps
     with pytest.raises(ValueError, match="unwrap"):

@@ -109,7 +109,7 @@ def test_the_steps_of_a_coarse_sensor_are_no_resets():
     slow = np.cumsum(rng.standard_normal(t.size)) * 1e-5
     for noise in (0 * t, 1e-4 * rng.standard_normal(t.size), slow):
         cdf.Measurement(t, np.sin(2 * t), x + noise)
-    with pytest.raises(ValueError, match="without leaps"):
+    with pytest.raises(ValueError, match="without jumps"):
         cdf.Measurement(t, np.sin(2 * t), np.sin(2 * t) - 0.5 * (t > 1) - 0.9 * (t > 2) + 0.7 * (t > 3))
 
 

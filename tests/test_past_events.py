@@ -6,7 +6,7 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.prediction.simulator import free_run
-from ctrl_df.identify.selection.standing import begun
+from ctrl_df.identify.selection.reference import begun
 
 
 @pytest.mark.parametrize("seed", [0, 1])

@@ -9,7 +9,7 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.identify.data.as_data import distinguished
 from ctrl_df.identify.estimation.own_values import OwnValue
-from ctrl_df.identify.estimation.refit_records import blurred, doubts
+from ctrl_df.identify.estimation.refit_records import doubts, undetermined
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.values import for_record, with_own, with_values
 from ctrl_df.identify.shooting.multiple_shooting import Stage
@@ -291,11 +291,11 @@ def test_directions_are_told_by_record():
         "m and k of a cannot be told apart on these data: raising m while lowering k of a"
     )
     assert told[1] == "k of a and b leaves no trace in these data: its value is the start value."
-    assert len(told) == 2 and blurred(fit) == {"m"}
+    assert len(told) == 2 and undetermined(fit) == {"m"}
     own["k"]["c"] = own["k"]["a"]
     fit.null = [(0.0, [("k", r, 1.0)]) for r in "abc"]
     assert doubts(fit) == ("k leaves no trace in these data: its value is the start value.",)
-    assert blurred(fit) == {"k"}
+    assert undetermined(fit) == {"k"}
 
 
 def test_unknown_names_and_tables_are_refused(records):

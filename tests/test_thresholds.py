@@ -94,7 +94,7 @@ def test_what_follows_follows():
     bump = math.exp(-((selection.PASSED / 1e-3) ** 2))
     assert 0.9 * selection.BUMP_LEFT < bump < selection.BUMP_LEFT
     assert selection.COARSE > 1 / math.sqrt(12)
-    assert max(estimation.LEVELS) == estimation.SHORTEST < estimation.BRIEF
+    assert max(estimation.LEVELS) == estimation.SHORTEST < estimation.SHORT
 
 
 def test_rooms_share_what_stands_above_them():

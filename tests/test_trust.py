@@ -302,7 +302,7 @@ def test_the_scale_of_a_smooth_law_in_other_units(force):
 
     def scale(f):
         loop = cdf.closed_loop(ct.tf([11.5], [1, 1.92, 2.15, 1.65]), lambda v: f * (v / f) / (1 + abs(v / f)))
-        return OrbitFinder(loop).poincare.kicks.scale / f
+        return OrbitFinder(loop).poincare.starts.scale / f
 
     assert scale(force) == pytest.approx(scale(1.0), rel=1e-6)
 
@@ -397,10 +397,10 @@ def test_swings_of_a_law_fade_where_it_is_straight():
     """A start below the bend decays as the linear loop does; a tenth of the crossings to 1e-6 tell so."""
     loop = cdf.closed_loop(ct.tf([6.0], [1, 3, 3, 1]), lambda v: v + v**3)
     search = OrbitFinder(loop).poincare
-    assert search.kicks.straight == pytest.approx(search.kicks.scale)
-    course = search.iterate(search.kicks.state(0.03 * search.kicks.scale), 1000)
+    assert search.starts.straight == pytest.approx(search.starts.scale)
+    course = search.iterate(search.starts.state(0.03 * search.starts.scale), 1000)
     assert course.fate == "rests" and len(course.crossings) < 40
-    assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).poincare.kicks.straight == 0
+    assert OrbitFinder(cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))).poincare.starts.straight == 0
 
 
 def test_no_passage_is_lost_between_two_strides_of_samples():

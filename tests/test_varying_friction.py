@@ -139,7 +139,7 @@ def test_hidden_states_go_on_from_window_to_window(effect):
     windows = make_segments(data, 0.5)
     exact = replace(windows, x=y[windows.begins], v=v[windows.begins])
     simulator = Simulator(block, data, begins=MEASURED)
-    assert simulator.nuisances == ()
+    assert simulator.free_states == ()
     gone_on = simulator.run(exact) - y[windows.samples]
     begun_anew = Simulator(block, data).run(exact) - y[windows.samples]
     later = windows.samples >= windows.begins[1]

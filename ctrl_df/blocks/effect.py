@@ -193,7 +193,7 @@ class Effect:
         """Return ranges of parameters beyond which the records show nothing of the effect itself."""
         return {}
 
-    def genuine(self, stroke: float, at_bound) -> bool:
+    def distinct(self, stroke: float, at_bound) -> bool:
         """Return whether it is what its name says over a stroke [m], and no stand-in for another effect.
 
         `at_bound`: names of its parameters that a fit has left at a bound.

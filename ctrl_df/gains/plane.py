@@ -140,10 +140,10 @@ def plane_of(
 def _scales(structure, gains) -> tuple[float, float]:
     """Return the frequency at which a loop moves [rad/s] and the input amplitude at which its block bends."""
     loop: Any = structure.loop(gains)
-    kicks = PoincareSearch(loop, Engine(loop)).kicks
+    starts = PoincareSearch(loop, Engine(loop)).starts
     if isinstance(loop.parts.block, Mechanism):
-        return kicks.pace, kicks.scale * sum(kicks.core.masses) * kicks.pace**2
-    return kicks.pace, kicks.scale
+        return starts.pace, starts.scale * sum(starts.core.masses) * starts.pace**2
+    return starts.pace, starts.scale
 
 
 def _amplitudes(method, a, w):

@@ -123,7 +123,7 @@ def refit(
     parameters = {
         k: FittedParameter(
             k, table[k].value, found.errors[k], table[k].unit, float(before[k]), at_bound,
-            k not in found.blurred,
+            k not in found.undetermined,
         )
         for k, at_bound in zip(names, found.at_bound, strict=True) if k not in found.own
     }  # fmt: skip

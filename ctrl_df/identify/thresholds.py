@@ -43,7 +43,7 @@ PROCESS_NOISE = 50.0
 """Error over the sensor's noise, in the shortest segments, that disturbance forces alone make, and no effect
 that is missing (between the rigs and the recorded machines)."""
 
-HOPELESS = 3.0
+GIVE_UP = 3.0
 """Error over the best candidate's beyond which another try is not worth it: nine times its power, which no
 last step of a fit removes (rigs). Only work depends on it."""
 

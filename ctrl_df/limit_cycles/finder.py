@@ -342,7 +342,7 @@ class OrbitFinder:
         explorer = Explorer(self.poincare, partial(self._closed_from, attempts))
         fate = explorer.explore(search_time, edges=not self.by_simulation)
         for row in fate:
-            attempts.tell(f"rest, displaced: {row.size:.3g} {self.poincare.kicks.unit}", row.told)
+            attempts.tell(f"rest, displaced: {row.size:.3g} {self.poincare.starts.unit}", row.told)
         found = [o for o in fate.orbits if o.status.ok] or fate.orbits[:1]
         return min(found, key=lambda o: o.stable is not True, default=None), attempts.none()
 

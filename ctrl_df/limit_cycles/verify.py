@@ -176,14 +176,14 @@ def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
 
 
 def simulated(
-    finder: OrbitFinder, orbit: Orbit, crossings: int = CROSSINGS_VERIFIED, kick: float = 0.01
+    finder: OrbitFinder, orbit: Orbit, crossings: int = CROSSINGS_VERIFIED, apart: float = 0.01
 ) -> tuple[float, float] | None:
-    """Frequency and output amplitude of a simulation started `kick` beside the orbit; None if it leaves."""
+    """Frequency and output amplitude of a simulation started `apart` beside the orbit; None if it leaves."""
     if orbit.stable is False:
         return None
     if orbit.stable is None:
         return orbit.omega, orbit.output_amplitude
-    met = finder.poincare.iterate(finder.feasible(orbit.states[:, 0] * (1 + kick)), crossings).crossings
+    met = finder.poincare.iterate(finder.feasible(orbit.states[:, 0] * (1 + apart)), crossings).crossings
     if len(met) < MET_LEAST:
         return None
     t = np.array([s[0] for s in met])

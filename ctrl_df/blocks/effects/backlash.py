@@ -68,6 +68,6 @@ class Backlash(Effect):
         """Return what leaves something on either side of the gap."""
         return {"load_fraction": (0.05, 0.95)}
 
-    def genuine(self, stroke, at_bound):
+    def distinct(self, stroke, at_bound):
         """Return whether there is a load behind it: else it is a dashpot, in the place of other friction."""
         return "load_fraction" not in at_bound

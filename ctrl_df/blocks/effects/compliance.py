@@ -75,6 +75,6 @@ class Compliance(Effect):
         """Return what does not settle much faster than a sample, with something on either side."""
         return {"damping": (0.0, 0.1 * seen.mass / seen.dt), "load_fraction": (0.05, 0.95)}
 
-    def genuine(self, stroke, at_bound):
+    def distinct(self, stroke, at_bound):
         """Return whether there is a load behind it: else it is a dashpot, in the place of other friction."""
         return "load_fraction" not in at_bound

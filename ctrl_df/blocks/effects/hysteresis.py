@@ -56,7 +56,7 @@ class Hysteresis(Effect):
         """Return what z comes to."""
         return (1.0,)
 
-    def genuine(self, stroke, at_bound):
+    def distinct(self, stroke, at_bound):
         """Return whether motion bends it: over a tenth of its stroke the slope changes by 1/400."""
         return self.stroke < 10.0 * stroke
 

@@ -102,7 +102,7 @@ class LooseLinkage(Effect):
         for gap in plane.swing.over(4, 0.3, 0.3):
             yield cls(max(plane.friction, 0.02 * plane.force.high) / gap, gap), 1.0
 
-    def genuine(self, stroke, at_bound):
+    def distinct(self, stroke, at_bound):
         """Return whether it has a gap to speak of; without one it is a bristle."""
         return "gap" not in at_bound and self.gap > 2e-3 * stroke
 

@@ -97,7 +97,7 @@ class MaxwellSlip(Effect):
         for bend in plane.swing.over(4, 0.3, 0.3):
             yield cls(3.0 * max(plane.friction, 0.02 * plane.force.high) / bend), 1.0
 
-    def genuine(self, stroke, at_bound):
+    def distinct(self, stroke, at_bound):
         """Return whether there is more than one element to be told."""
         return self.spread > 2.0
 

@@ -69,6 +69,6 @@ class PositionRipple(Effect):
             for amplitude in (0.02, 0.1):
                 yield cls(amplitude * plane.force.high, wavelength), 1.0
 
-    def genuine(self, stroke, at_bound):
+    def distinct(self, stroke, at_bound):
         """Return whether the stroke shows a period: of less it is a spring."""
         return self.wavelength < 0.9 * stroke

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...checks import is_number, shown
 from .derivatives import grain, step_of
-from .thresholds import BESIDE, FAST, LEAP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
+from .thresholds import BESIDE, FAST, JUMP, MINIMUM, MISSING, SINGLE, USUAL_STEPS
 
 
 def as_channel(owner: str, name: str, values, length: int | None = None) -> np.ndarray:
@@ -127,34 +127,34 @@ def check_output(owner: str, y: np.ndarray) -> None:
 
 
 def check_jumps(owner: str, t: np.ndarray, x: np.ndarray) -> None:
-    """Check that a measured place does not leap."""
-    found = leaps(t, x)
+    """Check that a measured place does not jump."""
+    found = jumps(t, x)
     if len(found):
         i = int(found[0])
         raise ValueError(
-            f"{owner} needs a position without leaps; it has {len(found)}, the first from {x[i]:.6g} to "
+            f"{owner} needs a position without jumps; it has {len(found)}, the first from {x[i]:.6g} to "
             f"{x[i + 1]:.6g} at t = {t[i + 1]:.6g} s, which the velocities before and after do not make. Was "
             "the encoder reset? Give the parts as separate records: Measurement.in_parts (an angle that "
             "wraps: np.unwrap first)."
         )
 
 
-def leaps(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the samples after which a place leaps, as it does where an encoder is reset or an angle wraps.
+def jumps(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the samples after which a place jumps, as it does where an encoder is reset or an angle wraps.
 
     Between two samples a machine moves at a velocity between those before and after, impacts included, but
-    for what its acceleration may add. A leap is farther by far: than what the accelerations around it would
+    for what its acceleration may add. A jump is farther by far: than what the accelerations around it would
     add, than what any other of the record would, and than noise and rounding.
     """
     steps = np.diff(x)
-    seen = LEAP * max(step_of(x), grain(x))
+    seen = JUMP * max(step_of(x), grain(x))
     # by the clock, and by the count of samples: a clock may be read late
     found = np.flatnonzero(_thrown(steps, np.diff(t), seen) & _thrown(steps, np.ones(len(steps)), seen))
-    jumps = np.zeros(len(steps))
-    jumps[found] = steps[found]
-    between = np.ptp(x[1:] - np.cumsum(jumps))
+    jumped = np.zeros(len(steps))
+    jumped[found] = steps[found]
+    between = np.ptp(x[1:] - np.cumsum(jumped))
     # A coarse sensor that rounds moves by its steps alone: nothing is seen between them, or, where noise
-    # comes after it, less than half a step. After a reset the next one leaps by what the machine moved.
+    # comes after it, less than half a step. After a reset the next one jumps by what the machine moved.
     if len(found) > SINGLE and between < 0.5 * np.min(np.abs(steps[found])):
         return found[:0]
     return found[np.minimum(np.abs(steps[found]), seen) < between]
@@ -170,6 +170,6 @@ def _thrown(steps, dt, seen) -> np.ndarray:
     for lag in range(1, BESIDE + 1):  # accelerations without the step itself
         around[lag + 1 :] = np.maximum(around[lag + 1 :], a[: len(a) - lag])
         around[: -lag - 1] = np.maximum(around[: -lag - 1], a[lag:])
-    alone = beyond * dt > np.maximum(LEAP * around * dt**2, seen)
+    alone = beyond * dt > np.maximum(JUMP * around * dt**2, seen)
     others = a[~(alone[1:] | alone[:-1])]
     return alone & (beyond > FAST * np.max(others, initial=0.0) * dt)

@@ -1,4 +1,4 @@
-"""Noise floor, zero-phase derivatives and thinning of a sampled signal."""
+"""Noise floor, zero-phase derivatives and decimation of a sampled signal."""
 
 from __future__ import annotations
 
@@ -14,6 +14,10 @@ from .thresholds import (
     CUTOFF_HIGHEST,
     CUTOFF_LOWEST,
     CUTOFF_PERIODS,
+    DECIMATED_BAND,
+    DECIMATED_MEMORY,
+    DECIMATED_ORDER,
+    DECIMATED_RIPPLE,
     FEW_VALUES,
     FLOOR_LEAST,
     LOW_PASS_MEMORY,
@@ -25,10 +29,6 @@ from .thresholds import (
     SEGMENTS,
     SEGMENTS_CUTOFF,
     SPECTRUM_LENGTH,
-    THINNED_BAND,
-    THINNED_MEMORY,
-    THINNED_ORDER,
-    THINNED_RIPPLE,
     WHITE_BAND,
 )
 
@@ -135,14 +135,14 @@ def derivative(t: np.ndarray, y: np.ndarray, order: int, cutoff: float | None) -
     return d if grid is t else np.interp(t, grid, d)
 
 
-def thinned(y: np.ndarray, factor: int) -> np.ndarray:
+def decimated(y: np.ndarray, factor: int) -> np.ndarray:
     """Return every `factor`-th sample after a zero-phase low-pass at 70 % of the new Nyquist frequency."""
     from scipy.signal import cheby1, sosfiltfilt
 
     # Flat within 1e-4 (odd order: exact at 0 Hz), 49 dB down at the new Nyquist frequency, both ways
     # together.
-    sos = cheby1(THINNED_ORDER, THINNED_RIPPLE, THINNED_BAND / factor, output="sos")
-    pad = min(len(y) - 1, THINNED_MEMORY * factor)
+    sos = cheby1(DECIMATED_ORDER, DECIMATED_RIPPLE, DECIMATED_BAND / factor, output="sos")
+    pad = min(len(y) - 1, DECIMATED_MEMORY * factor)
     return sosfiltfilt(sos, y, padtype="odd", padlen=pad)[::factor]
 
 

@@ -7,7 +7,7 @@ import logging
 from . import derivatives
 from .imposed import imposes_motion
 from .measurement import Measurement
-from .thresholds import CUTOFFS_KEPT, LONG, THINNED_BAND
+from .thresholds import CUTOFFS_KEPT, DECIMATED_BAND, LONG
 
 _LOGGER = logging.getLogger("ctrl_df")
 
@@ -28,9 +28,9 @@ def shortened(record: Measurement, motion: bool = False) -> Measurement:
         return record
     signals = [*(record.outputs or {}).values(), *([record.u] if motion or imposes_motion(record) else [])]
     highest = max(derivatives.automatic_cutoff(y, record.dt) for y in signals)
-    factor = min(int(THINNED_BAND * 0.5 / record.dt / (CUTOFFS_KEPT * highest)), -(-len(record) // LONG))
+    factor = min(int(DECIMATED_BAND * 0.5 / record.dt / (CUTOFFS_KEPT * highest)), -(-len(record) // LONG))
     if factor < 2:
         return record
-    note = f"1 of {factor} samples, of what is below {THINNED_BAND * 0.5 / (factor * record.dt):.3g} Hz"
+    note = f"1 of {factor} samples, of what is below {DECIMATED_BAND * 0.5 / (factor * record.dt):.3g} Hz"
     _LOGGER.info("record %r: %s", record.name, note)
     return record.decimate(factor).noted(note)

@@ -77,7 +77,7 @@ class Measurement:
     ------
     ValueError
         NaN, unequal lengths, unsorted or repeated times, a hole in otherwise regular sampling, a position
-        that leaps (an encoder that was reset), a constant input or output, fewer than 10 samples, an unknown
+        that jumps (an encoder that was reset), a constant input or output, fewer than 10 samples, an unknown
         unit; the message gives rule, value, remedy.
 
     Examples
@@ -284,7 +284,7 @@ class Measurement:
         """Take a run that has breaks as several records, which share the parameters of a model.
 
         A break is where the recorder paused or dropped samples (a hole in a regular sampling, NaN, None or
-        masked samples in any channel), where times begin anew, and where a position leaps (an encoder was
+        masked samples in any channel), where times begin anew, and where a position jumps (an encoder was
         reset; places are then counted from elsewhere). Nothing is filled in. Parts that are too short to
         teach anything (under 10 samples, input or output constant) are left out, and a warning says how many
         samples that were.
@@ -447,11 +447,11 @@ class Measurement:
             )
         if factor == 1:
             return self
-        outputs = {k: derivatives.thinned(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
-        velocity = None if self.velocity is None else derivatives.thinned(self.velocity, factor)
-        channels = {k: _frozen(derivatives.thinned(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
+        outputs = {k: derivatives.decimated(v, factor) for k, v in self.outputs.items()}  # type: ignore[union-attr]
+        velocity = None if self.velocity is None else derivatives.decimated(self.velocity, factor)
+        channels = {k: _frozen(derivatives.decimated(v, factor)) for k, v in self.channels.items()}  # type: ignore[union-attr]
         held = self.input_hold == "zoh"
-        u = derivatives.block_means(self.u, factor) if held else derivatives.thinned(self.u, factor)
+        u = derivatives.block_means(self.u, factor) if held else derivatives.decimated(self.u, factor)
         return self.replaced(
             t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels),
             band=THINNED_BAND,

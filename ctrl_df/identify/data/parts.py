@@ -10,7 +10,7 @@ import numpy as np
 
 from ...checks import is_number
 from . import quantities
-from .checks import holes, leaps, seconds
+from .checks import holes, jumps, seconds
 from .thresholds import MINIMUM
 
 
@@ -108,10 +108,10 @@ def _spans(t, there, places) -> list[slice]:
     runs = [r for span in whole for r in _cut(span, lambda i: np.diff(t[i]) < 0)]
     regular = [r for run in runs for r in _cut(run, lambda i: _after(holes(t[i]), i))]
 
-    def leap(i):
-        return np.logical_or.reduce([_after(leaps(t[i], x[i]), i) for x in places] or [False])
+    def jump(i):
+        return np.logical_or.reduce([_after(jumps(t[i], x[i]), i) for x in places] or [False])
 
-    parts = [r for run in regular for r in _cut(run, leap)]
+    parts = [r for run in regular for r in _cut(run, jump)]
     return [slice(int(i[0]), int(i[-1]) + 1) for i in parts]
 
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 MINIMUM = 10
 """Samples of a record at least: fewer have no derivatives."""
 
-BESIDE, LEAP, FAST = 5, 10.0, 5.0
-"""Samples to either side whose accelerations a leap stands out from, how far, and how far from all others of
+BESIDE, JUMP, FAST = 5, 10.0, 5.0
+"""Samples to either side whose accelerations a jump stands out from, how far, and how far from all others of
 the record: the largest of ten second differences of white noise is four to six of its deviations, so that a
-leap of a hundred of them is seen wherever it is, and noise never makes one."""
+jump of a hundred of them is seen wherever it is, and noise never makes one."""
 
 SINGLE = 2
-"""Leaps up to which none is a step of a coarse sensor: there and back again is no motion."""
+"""Jumps up to which none is a step of a coarse sensor: there and back again is no motion."""
 
 USUAL_STEPS = (0.05, 0.95)
 """Quantiles between which steps of time lie that are usual."""
@@ -55,8 +55,8 @@ CUTOFF_LOWEST, CUTOFF_HIGHEST = 0.1, 0.4
 PADDING = 30
 """Samples by which a signal is continued at its ends, at least, before it is filtered."""
 
-THINNED_BAND, THINNED_RIPPLE = 0.7, 5e-4
-"""Band that thinning keeps, over the new Nyquist frequency, and its ripple [dB]: flat within 1e-4, 49 dB down
+DECIMATED_BAND, DECIMATED_RIPPLE = 0.7, 5e-4
+"""Band that decimation keeps, over the new Nyquist frequency; its ripple [dB]: flat within 1e-4, 49 dB down
 at that frequency."""
 
 LONG, CUTOFFS_KEPT = 100_000, 3.0
@@ -85,8 +85,8 @@ LOW_PASS_ORDER, LOW_PASS_MEMORY = 4, 3
 """Order of the low-pass before derivatives, twice for both ways; periods of its cutoff after which it has
 forgotten."""
 
-THINNED_ORDER, THINNED_MEMORY = 9, 40
-"""Order of the low-pass before thinning, odd: exact at 0 Hz; new samples after which it has forgotten."""
+DECIMATED_ORDER, DECIMATED_MEMORY = 9, 40
+"""Order of the low-pass before decimation, odd: exact at 0 Hz; new samples after which it has forgotten."""
 
 WINDOW_LEAST = 9
 """Samples that a window of a record has to be longer than: a record has ten (`MINIMUM`)."""

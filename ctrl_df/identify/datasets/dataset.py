@@ -30,7 +30,7 @@ class Estimate:
         Standard errors by name.
     at_bound : tuple of bool
         Whether each parameter stands at a bound of its range.
-    blurred : collection of str
+    undetermined : collection of str
         Parameters that the data do not determine.
     doubts : tuple of str
         Sentences about these.
@@ -47,7 +47,7 @@ class Estimate:
     block: Any
     errors: dict[str, float]
     at_bound: tuple[bool, ...]
-    blurred: Any
+    undetermined: Any
     doubts: tuple[str, ...]
     covariance: np.ndarray
     comparison: Any

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from ..arguments import check_window
 from ..estimation.fit import segment_lengths
-from ..estimation.refit_records import blurred, doubts, refit_records
+from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
 from ..prediction.prepared import REFERENCE
@@ -90,8 +90,8 @@ class TimeDataset(Dataset):
         )  # fmt: skip
         comparison = self._comparison(found.model, seen.segments, seen.starts, fitted=len(names))
         return Estimate(
-            self.block_of(found.model), found.standard_errors, found.at_bound, blurred(found), doubts(found),
-            found.whole_covariance, comparison, found.converged, found.nfev, found.own,
+            self.block_of(found.model), found.standard_errors, found.at_bound, undetermined(found),
+            doubts(found), found.whole_covariance, comparison, found.converged, found.nfev, found.own,
         )  # fmt: skip
 
     def _tells_references(self) -> bool:

@@ -1,4 +1,4 @@
-"""How well fitted parameters are known, for residuals of any colour; directions that are not determined."""
+"""How well fitted parameters are known, for residuals of any spectrum; directions that are not determined."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .thresholds import FREEDOM_MOST, MANY_SEGMENTS, NOISE_LEAST, UNDETERMINED
 def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity):
     """Return the covariance of the scaled parameters and the directions the data do not determine.
 
-    The sandwich rule with the noise's colour from the residual: cov = H^-1 (sum over records J' Omega J)
+    The sandwich rule with the noise spectrum of the residual: cov = H^-1 (sum over records J' Omega J)
     H^-1, Omega the covariance of stationary noise (`noise_spectrum`). Two of its standard errors hold the
     truth for 95 % of records, also where the noise is known from few frequencies (Student's distribution).
     Errors that go on from one of many segments into the next (forces that vary, whose trace in position every

@@ -1,4 +1,4 @@
-"""Fit a model to records: stages from short segments and a thinned input to whole ones at full rate."""
+"""Fit a model to records: stages from short segments and a decimated input to whole ones at full rate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from ...blocks.probing import stiffness
 from ...cached import cached_property
 from ..data.measurement import Measurement
-from ..prediction.decimated import thinnable
+from ..prediction.decimated import decimable
 from ..prediction.initial_states import FREE
 from ..prediction.segments import Segments, facts, make_segments, usual_segment
 from ..prediction.simulators import simulator_of
@@ -59,7 +59,7 @@ class FitResult:
         The free parameters. Of those that every record has for itself (`PerRecord`) what follows is of their
         mean over the records, weighted by one over the variance where that is known.
     covariance : (p, p) array
-        Of `values`, for residuals of the colour seen, within the directions that the data determine.
+        Of `values`, for residuals of the spectrum seen, within the directions that the data determine.
     residual, simulated : list of (n,) array
         Per record, measured minus simulated.
     count : int
@@ -272,9 +272,9 @@ def fit_records(
     mode, window
         As for `compare`.
     thin : int
-        Samples a step of the input in all but the last iterations, at most; 1: never thinned.
+        Samples a step of the input in all but the last iterations, at most; 1: never decimated.
     polish : int
-        Iterations at full rate at the end; 0 leaves the fit at the thinned input.
+        Iterations at full rate at the end; 0 leaves the fit at the decimated input.
     coarse : bool or None
         Whether to begin with short segments, which converge from far off; None: unless `start` is given.
     robust : bool
@@ -291,7 +291,7 @@ def fit_records(
         Value and standard deviation of parameters known beforehand; of the others see `Prior`.
     """
     records = list(records)
-    thin = thinnable(records, thin)
+    thin = decimable(records, thin)
     model = with_values(model, start)
     first, block = simulator_of(model, records[0]), block_of(model)
     names = tuple(default_free(block) if free is None else free)
@@ -331,7 +331,7 @@ def fit_segments(
     errors: bool = False,
     error_filter: NoiseModel | None = None,
     begins: str = FREE,
-    hopeless: float = math.inf,
+    give_up: float = math.inf,
     steps_left: int = 0,
     rtol: float = RTOL,
     followed: int = 0,
@@ -361,7 +361,7 @@ def fit_segments(
         The `acceleration_filter` whose squares are made least, where disturbance forces make the error.
     begins : str
         How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
-    hopeless : float
+    give_up : float
         Error (see `FitResult.rmse`) above which the fit is of no use: it ends where it would stay there
         at the pace of its last steps.
     steps_left : int
@@ -376,7 +376,7 @@ def fit_segments(
     FitResult
     """
     problem = Problem(
-        model, records, names, UNCOUNTED, limits, error_filter, begins, (hopeless, steps_left), about,
+        model, records, names, UNCOUNTED, limits, error_filter, begins, (give_up, steps_left), about,
         followed,
     )  # fmt: skip
     stage = Stage(problem, list(segments), thin, starts, rtol)

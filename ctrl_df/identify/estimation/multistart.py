@@ -18,7 +18,7 @@ import numpy as np
 from ...simulate.parallel import side_by_side
 from ..prediction.values import feasible
 from ..shooting.thresholds import BETTER
-from ..thresholds import GROWTH, HOPELESS, STILL_POSSIBLE
+from ..thresholds import GIVE_UP, GROWTH, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
@@ -53,7 +53,7 @@ def own(found: FitResult) -> list[str]:
 
 
 def restarted(
-    found: FitResult, fit: Callable[..., FitResult], names: list[str], hopeless: float = math.inf
+    found: FitResult, fit: Callable[..., FitResult], names: list[str], give_up: float = math.inf
 ) -> FitResult:
     """Return the best of the fits that begin beside `found`, one such parameter moved at a time; or itself.
 
@@ -61,10 +61,10 @@ def restarted(
     ----------
     found : FitResult
     fit : callable
-        ``fit(model, names, starts=, iterations=, hopeless=)`` over the segments of `found`.
+        ``fit(model, names, starts=, iterations=, give_up=)`` over the segments of `found`.
     names : list of str
         Parameters to move.
-    hopeless : float
+    give_up : float
         Error above which a minimum is of no use.
     """
     queue = [(name, 0) for name in names]
@@ -75,10 +75,10 @@ def restarted(
             for factor in (STATIC_FACTORS if found.model.parameters[name].threshold else RESTART_FACTORS)
         ]
         starts_only = functools.partial(
-            fit, names=(), starts=found.starts, iterations=GLANCE, hopeless=hopeless
+            fit, names=(), starts=found.starts, iterations=GLANCE, give_up=give_up
         )
         begun = sorted(side_by_side(starts_only, moved), key=lambda f: f.rmse)[:RESTARTS_KEPT]
-        on = functools.partial(_on, fit=fit, hopeless=hopeless, names=found.names)
+        on = functools.partial(_on, fit=fit, give_up=give_up, names=found.names)
         for tried in side_by_side(on, begun):
             if tried.rmse < BETTER * best.rmse:
                 best = tried
@@ -96,8 +96,8 @@ def beyond(found: FitResult, least: float) -> float:
     return STILL_POSSIBLE * least if found.rmse > least else math.inf
 
 
-def _on(begun: FitResult, fit, names, hopeless) -> FitResult:
-    return fit(begun.model, names, starts=begun.starts, iterations=GLANCED_ON, hopeless=hopeless)
+def _on(begun: FitResult, fit, names, give_up) -> FitResult:
+    return fit(begun.model, names, starts=begun.starts, iterations=GLANCED_ON, give_up=give_up)
 
 
 def all_restarted(fits, data: SegmentedData, floor: float) -> list:
@@ -108,7 +108,7 @@ def all_restarted(fits, data: SegmentedData, floor: float) -> list:
     least = min(f.rmse for f in fits)
     if least <= floor:
         return list(fits)
-    lost = [floor < f.rmse < HOPELESS * least for f in fits]
+    lost = [floor < f.rmse < GIVE_UP * least for f in fits]
     base = (
         restarted(fits[0], data.fit, nonsmooth_names(fits[0]), beyond(fits[0], least)) if lost[0] else fits[0]
     )
@@ -120,21 +120,21 @@ def all_restarted(fits, data: SegmentedData, floor: float) -> list:
     return [base, *others]
 
 
-def _other(found: FitResult, data: SegmentedData, values, hopeless: float) -> FitResult:
+def _other(found: FitResult, data: SegmentedData, values, give_up: float) -> FitResult:
     """Return a fit in its best minimum; `values`: of what it shares with a baseline that was restarted."""
     table = found.model.parameters
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
         model = found.model.with_parameters(feasible(found.model, shared))
-        again = _begun(model, found.names, found.starts, data, hopeless)
+        again = _begun(model, found.names, found.starts, data, give_up)
         found = min(found, again, key=lambda f: f.rmse)
-    return restarted(found, data.fit, own(found), hopeless)
+    return restarted(found, data.fit, own(found), give_up)
 
 
-def _begun(model, names, starts, data: SegmentedData, hopeless: float) -> FitResult:
+def _begun(model, names, starts, data: SegmentedData, give_up: float) -> FitResult:
     """Fit a model with values of another, its initial states first."""
-    near = data.fit(model, (), starts=starts, iterations=NEAR_STATES, hopeless=hopeless)
-    return data.fit(model, names, starts=near.starts, iterations=NEAR, hopeless=hopeless)
+    near = data.fit(model, (), starts=starts, iterations=NEAR_STATES, give_up=give_up)
+    return data.fit(model, names, starts=near.starts, iterations=NEAR, give_up=give_up)
 
 
 def cross_started(
@@ -159,7 +159,7 @@ def cross_started(
         return None
     block = tried.block.with_parameters(feasible(tried.block, values))
     near = data.fit(block, (), starts=best.train.starts, iterations=NEAR_STATES)
-    if near.rmse > HOPELESS * best.train.rmse:
+    if near.rmse > GIVE_UP * best.train.rmse:
         return None
     return data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
 
@@ -176,7 +176,7 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
     shared = {name: known[name] for name in tried.train.names if name in known}
     block = tried.block.with_parameters(feasible(tried.block, shared))
     starts = data.starts_as(block, data.train.records, nearer.train)
-    near = data.fit(block, (), starts=starts, iterations=NEAR_STATES, hopeless=tried.train.rmse)
+    near = data.fit(block, (), starts=starts, iterations=NEAR_STATES, give_up=tried.train.rmse)
     if near.rmse < BETTER * tried.train.rmse:
         fitted = data.fit(block, tried.train.names, starts=near.starts, iterations=NEAR)
         if fitted.rmse < BETTER * tried.train.rmse:
@@ -193,11 +193,11 @@ def no_worse_than(base: FitResult, fits: Sequence[FitResult | None], data: Segme
     so far behind the best that nothing begun there catches up.
     """
     least = min((f.rmse for f in fits if f), default=math.inf)
-    return side_by_side(lambda f: f and _from_base(f, base, data, HOPELESS * least), fits)
+    return side_by_side(lambda f: f and _from_base(f, base, data, GIVE_UP * least), fits)
 
 
-def _from_base(found: FitResult, base: FitResult, data: SegmentedData, hopeless: float) -> FitResult:
-    if found.rmse <= GROWTH * base.rmse or base.rmse > hopeless:
+def _from_base(found: FitResult, base: FitResult, data: SegmentedData, give_up: float) -> FitResult:
+    if found.rmse <= GROWTH * base.rmse or base.rmse > give_up:
         return found
     model, key = found.model, found.model.newest
     values = {k: v for k, v in base.parameters.items() if k in found.names}

@@ -60,10 +60,10 @@ def refit_records(
     found = min(fits, key=lambda f: f.rmse)
     shown = None
     if mode == "auto" and window is None and names and isinstance(model, Mechanism):
-        brief = _short_segment(found.model, records)
-        if brief is not None:
+        short = _short_segment(found.model, records)
+        if short is not None:
             shown = settings | {"coarse": False, "starts": found.starts}
-            settings["window"] = brief
+            settings["window"] = short
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
     if nonsmooth_names(found):
@@ -75,7 +75,7 @@ def refit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
             )
     found = _with_step(found, records, names, whole)
-    # a model that errs over brief segments of its own fit would look better than it is
+    # a model that errs over short segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
 
@@ -123,10 +123,10 @@ class _Beside:
     def __init__(self, records, segments, about):
         self.records, self.segments, self.about = records, segments, about
 
-    def __call__(self, model, names, *, starts, iterations, hopeless) -> FitResult:
+    def __call__(self, model, names, *, starts, iterations, give_up) -> FitResult:
         return fit_segments(
             model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
-            hopeless=hopeless, about=self.about,
+            give_up=give_up, about=self.about,
         )  # fmt: skip
 
 
@@ -141,7 +141,7 @@ def _with_step(found: FitResult, records, names, whole) -> FitResult:
     return replace(found, model=with_values(found.model, {key: float(np.median(steps))}))
 
 
-def blurred(found: FitResult) -> set[str]:
+def undetermined(found: FitResult) -> set[str]:
     """Return the parameters in a null direction, or uncertain by more than themselves.
 
     Those that every record has for itself where that holds in all records.
@@ -192,7 +192,7 @@ def doubts(found: FitResult) -> tuple[str, ...]:
         lines.append(
             f"{_of(k, [*records], found)} leaves no trace in these data: its value is the start value."
         )
-    doubtful = blurred(found)
+    doubtful = undetermined(found)
     for k in found.names:
         if k in found.own:
             open_ = [r for r, own in found.own[k].items() if not own.determined]

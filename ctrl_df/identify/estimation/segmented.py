@@ -11,7 +11,7 @@ import numpy as np
 
 from ..data import derivatives
 from ..data.measurement import Measurement
-from ..prediction.decimated import thinnable
+from ..prediction.decimated import decimable
 from ..prediction.initial_states import CONTINUED, FREE, MEASURED
 from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
@@ -28,7 +28,6 @@ from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
 from .starts import carried, least_begins, same_begins
 from .thresholds import (
-    BRIEF,
     EFFORT_MOVED_ON,
     EFFORT_OWN,
     EFFORT_STATES,
@@ -44,6 +43,7 @@ from .thresholds import (
     SEGMENT_MOTIONS,
     SEGMENT_USUAL,
     SEGMENTS,
+    SHORT,
     SHORTEST,
     STROKE_SAMPLES,
     TOLERANCE,
@@ -184,7 +184,7 @@ class SegmentedData:
         their states, fitted anew in every segment, pass for it. No limits: models of any rung of a ladder
         begin near.
         """
-        return replace(self.level(BRIEF), error_filter=None, begins=FREE, limits={})
+        return replace(self.level(SHORT), error_filter=None, begins=FREE, limits={})
 
     @property
     def continued(self) -> SegmentedData:
@@ -219,7 +219,7 @@ class SegmentedData:
 
     def _sampled_by(self, step: int) -> SegmentedData:
         train, validation, *whole = [
-            view.thinned(step) for view in (self.train, self.validation, *(self.whole or ()))
+            view.decimated(step) for view in (self.train, self.validation, *(self.whole or ()))
         ]
         return replace(
             self, train=train, validation=validation, whole=(whole[0], whole[1]) if whole else None
@@ -249,7 +249,7 @@ class SegmentedData:
         starts=None,
         iterations=ITERATIONS,
         tolerance=TOLERANCE,
-        hopeless=math.inf,
+        give_up=math.inf,
         steps_left=0,
         followed=0,
     ) -> FitResult:
@@ -258,12 +258,12 @@ class SegmentedData:
         return fit_segments(
             block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
             tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
-            error_filter=self.error_filter, begins=self.begins, hopeless=hopeless, steps_left=steps_left,
+            error_filter=self.error_filter, begins=self.begins, give_up=give_up, steps_left=steps_left,
             robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
     def states_of(
-        self, block, *, view=None, starts=None, effort=EFFORT_STATES, followed=0, hopeless=math.inf
+        self, block, *, view=None, starts=None, effort=EFFORT_STATES, followed=0, give_up=math.inf
     ) -> FitResult:
         """Fit the initial states alone; by default, well enough for a fit that goes on from them.
 
@@ -272,7 +272,7 @@ class SegmentedData:
         iterations, tolerance = effort
         return self.fit(
             block, (), view=view, starts=starts, iterations=iterations, tolerance=tolerance,
-            followed=followed, hopeless=hopeless,
+            followed=followed, give_up=give_up,
         )  # fmt: skip
 
     def rtol_of(self, block) -> float:
@@ -288,17 +288,17 @@ class SegmentedData:
         return limits | {k: _within(span, limits.get(k)) for k, span in self.limits.items()}
 
     def moved(
-        self, found: FitResult, iterations=EFFORT_MOVED_ON[0], tolerance=EFFORT_MOVED_ON[1], hopeless=math.inf
+        self, found: FitResult, iterations=EFFORT_MOVED_ON[0], tolerance=EFFORT_MOVED_ON[1], give_up=math.inf
     ) -> FitResult:
         """Fit a model found over other segments to these; those that begin at one sample share states."""
         starts = same_begins(found, self.train.segments)
         if sum(map(len, self.train.segments)) > sum(map(len, found.segments)):
             # The initial states of new segments first: parameters would bend to make up for them.
-            states = self.states_of(found.model, starts=starts, hopeless=hopeless)
+            states = self.states_of(found.model, starts=starts, give_up=give_up)
             starts = states.starts
         return self.fit(
             found.model, found.names, starts=starts, iterations=iterations, tolerance=tolerance,
-            hopeless=hopeless,
+            give_up=give_up,
         )  # fmt: skip
 
     def as_it_is(self, found: FitResult) -> FitResult:
@@ -312,24 +312,24 @@ class SegmentedData:
         fits = [self.fit(found.model, found.names, starts=starts, iterations=0) for starts in begins]
         return min(fits, key=lambda f: f.rmse)
 
-    def reached(self, found: FitResult, hopeless=math.inf) -> FitResult:
+    def reached(self, found: FitResult, give_up=math.inf) -> FitResult:
         """As `moved`, and begun once more where the error grows: the model may have left its minimum.
 
         What a parameter is off by grows with at least the square of the length of segments, and over long
         ones minima are narrow.
         """
-        there = self.moved(found, hopeless=hopeless)
+        there = self.moved(found, give_up=give_up)
         if there.rmse <= GROWTH * found.rmse:
             return there
-        again = self.fit(found.model, found.names, followed=RESTARTS_KEPT, hopeless=there.rmse)
+        again = self.fit(found.model, found.names, followed=RESTARTS_KEPT, give_up=there.rmse)
         return min(there, again, key=lambda f: f.rmse)
 
-    def validate(self, tried: CandidateFit, hopeless: float = math.inf) -> CandidateFit:
+    def validate(self, tried: CandidateFit, give_up: float = math.inf) -> CandidateFit:
         """Run a fitted model over the segments to validate on, from initial states of their own.
 
-        These are not sought to the last where the error would stay above `hopeless`.
+        These are not sought to the last where the error would stay above `give_up`.
         """
-        return replace(tried, validation=self._ran(tried.block, "validation", hopeless))
+        return replace(tried, validation=self._ran(tried.block, "validation", give_up))
 
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""
@@ -353,7 +353,7 @@ class SegmentedData:
         records = [[r.name for r in view.records] for view in (self.train, self.validation)]
         return knowing(model, held.model, *records), train.nrmse, held.nrmse
 
-    def _ran(self, model, name, hopeless: float = math.inf) -> FitResult:
+    def _ran(self, model, name, give_up: float = math.inf) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""
         thin = self.step or self.thin
         rough, view = self.coarse(thin, thin), getattr(self, name)
@@ -366,7 +366,7 @@ class SegmentedData:
         for data in (rough, self):
             near = data.states_of(
                 model, view=getattr(data, name), starts=same_begins(near, view.segments),
-                effort=EFFORT_ALONE, followed=RESTARTS_KEPT, hopeless=hopeless,
+                effort=EFFORT_ALONE, followed=RESTARTS_KEPT, give_up=give_up,
             )  # fmt: skip
         return near
 
@@ -394,7 +394,7 @@ def prepare(
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
     thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
     thin = min(thin, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records))
-    step, thin = thin, thinnable((*records, *validation), thin)
+    step, thin = thin, decimable((*records, *validation), thin)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = scales_of(block, records)

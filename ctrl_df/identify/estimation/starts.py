@@ -33,9 +33,9 @@ def least_begins(one: FitResult, other: FitResult) -> list[np.ndarray]:
 
 def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
     """Return one model's initial states as those of another: what the first lacks begins as usual."""
-    given = dict(zip(before.nuisances, starts.T, strict=True))
+    given = dict(zip(before.free_states, starts.T, strict=True))
     columns = []
-    for name in simulator.nuisances:
+    for name in simulator.free_states:
         usual = np.where(segments.a > 0, 1.0, 0.0) if name == "slack" else np.zeros(len(segments))
         columns.append(given.get(name, usual))
     return np.array(columns).T.reshape(len(segments), len(columns))

@@ -26,7 +26,7 @@ and a half, a sixth of one remains, over which every effect is all but linear.""
 LEVELS = (SHORTEST, 4, 1)
 """How many times as many as the longest segments are, of the three lengths that are looked at."""
 
-BRIEF = 4 * SHORTEST
+SHORT = 4 * SHORTEST
 """How many times as many they are for the parameters of a machine with disturbance forces."""
 
 FILTERED = 40
@@ -36,7 +36,7 @@ HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is."""
 
 SCREEN_SAMPLES = 2500
-"""Steps of the input to which a record is thinned while candidates are screened: a quarter of those
+"""Steps of the input to which a record is decimated while candidates are screened: a quarter of those
 of the rigs' records."""
 
 RTOL_COARSE, RTOL_OVER_NOISE = 1e-5, 1e-3
@@ -150,7 +150,7 @@ LEVELS_BETWEEN = 7
 """Static levels tried over an open range: neighbours differ by less than one sample lets see."""
 
 STROKE_SAMPLES = 60
-"""Samples of a to-and-fro motion that thinning leaves at least."""
+"""Samples of a to-and-fro motion that decimation leaves at least."""
 
 POLISH = 6
 """Steps at the full rate of a fit over whole records."""

@@ -23,7 +23,7 @@ from ..course import COMPLETE, UNDER_WAY, Course
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
-from ..selection.lasting import Lasting, lasting
+from ..selection.long_prediction import LongPrediction, long_prediction
 from ..selection.search import Search
 from ..selection.thresholds import CONFIRMED, SHOWS_HARDLY
 from ..selection.verdict import Diagnosed, diagnosed, worth
@@ -71,7 +71,7 @@ class Rung:
         return plainest(ranking) if worth(ranking[0], self.search) else None
 
     @cached_property
-    def _long(self) -> Lasting | None:
+    def _long(self) -> LongPrediction | None:
         """How the first candidate does over long stretches, beside others and the model without it.
 
         While several effects are missing, one whose hidden states are fitted anew in every segment may stand
@@ -79,7 +79,7 @@ class Rung:
         need not be so in short segments: where something remains unexplained it needs no evidence there.
         """
         least = -math.inf if self.found.verdict == UNKNOWN else self.search.significant
-        return lasting(self.found.ranking, self.found.baseline, least)
+        return long_prediction(self.found.ranking, self.found.baseline, least)
 
     @property
     def way(self) -> list[Rung]:

@@ -10,7 +10,7 @@ from ..data.thresholds import REGULAR
 from .thresholds import MOST_SAMPLES, ROUGH
 
 
-def thinned(t, u, factor):
+def decimated(t, u, factor):
     """Return times and values of a held input in fewer steps, and how to join them: "zoh" or "linear".
 
     An input that changes seldom is given as it is, at the times when it changes. Of another one it is the
@@ -48,7 +48,7 @@ def thinned(t, u, factor):
     return time, values, "linear"
 
 
-def thinnable(records, factor: int) -> int:
+def decimable(records, factor: int) -> int:
     """Return how many samples a step of the inputs may take, `factor` at most, so that none is rough."""
     while factor > 1 and any(_rough(r, factor) for r in records):
         factor //= 2
@@ -56,7 +56,7 @@ def thinnable(records, factor: int) -> int:
 
 
 def _rough(record, factor: int) -> bool:
-    """Whether the input jumps about within the steps of a thinned one: its peaks decide what breaks away."""
+    """Whether the input jumps about within steps of a decimated one: its peaks decide what breaks away."""
     u, t = record.u, record.t
     off = np.abs(u - np.interp(t, t[::factor], u[::factor]))
     # single jumps (steps of the force) are no harm: what counts is what most samples do

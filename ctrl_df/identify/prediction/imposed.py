@@ -43,7 +43,7 @@ class ImposedSimulator(Simulator):
         return True
 
     @property
-    def nuisances(self) -> tuple[str, ...]:
+    def free_states(self) -> tuple[str, ...]:
         """Names of the hidden states at the begin of the record."""
         named = initial_states.fitted_names(self.block.core, initial_states.FREE)
         return tuple(n for n in named if n not in initial_states.SEEN)
@@ -82,14 +82,14 @@ class ImposedSimulator(Simulator):
     def _begin(self, core, segments: Segments, start) -> np.ndarray:
         """Return the hidden states at the record's first sample."""
         m, states = self.motion, np.zeros((1, core.nstates))
-        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start)[0], strict=True))
+        given = {} if start is None else dict(zip(self.free_states, np.asarray(start)[0], strict=True))
         usual = tuple(np.array([signal[0]]) for signal in (m.x, m.v, m.a))
         initial_states.fill(states, core, given, usual, self.facts.speed)
         return states[0, 2:]
 
     def at_rest(self, segments, values):
         """Return the usual initial states: nothing is known of rest."""
-        return np.zeros((len(segments), len(self.nuisances)))
+        return np.zeros((len(segments), len(self.free_states)))
 
     def carried_on(self, segments, values, start):
         """Return that no segment needs to be told where the one before it ended."""

@@ -15,7 +15,7 @@ import numpy as np
 from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ...simulate.engine import Engine
 from ..data.measurement import Measurement
-from .decimated import lagged, thinned
+from .decimated import decimated, lagged
 from .thresholds import LONG_BEFORE
 
 _DRIVES: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
@@ -111,7 +111,7 @@ def _driven(record, held, thin):
     if thin not in known:
         time, value, hold = record.t, held, record.input_hold
         if thin > 1:
-            time, value, hold = thinned(time, held, thin)
+            time, value, hold = decimated(time, held, thin)
         known[thin] = (*_before(record, time, value), hold)
     return known[thin]
 

@@ -105,7 +105,7 @@ class Simulator:
         return pull > RESTORING * self.facts.force
 
     @cached_property
-    def nuisances(self) -> tuple[str, ...]:
+    def free_states(self) -> tuple[str, ...]:
         """Names of the initial states estimated beside the parameters, per segment."""
         if not self.mechanism:
             return ()
@@ -130,11 +130,11 @@ class Simulator:
         return not self.continued
 
     def priors(self, segments: Segments) -> np.ndarray:
-        """Return how far each initial state may be from its estimate, (nw, number of nuisances)."""
-        if not self.nuisances:
+        """Return how far each initial state may be from its estimate, (nw, number of them)."""
+        if not self.free_states:
             return np.zeros((len(segments), 0))
         unsettled = self._unsettled
-        states = [n for n in self.nuisances if n not in unsettled]
+        states = [n for n in self.free_states if n not in unsettled]
         reach = initial_states.reach(states, self.block.core, self.facts, segments)
         since = self.record.t[segments.begins] - self.record.t[0]
         # a lag forgets: deep in the record its state is known
@@ -160,7 +160,7 @@ class Simulator:
             Where the state is set anew.
         values : mapping or None
             Parameters that differ from the model's.
-        start : (nw, number of nuisances) array or None
+        start : (nw, number of them) array or None
             Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
             slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its stretch
             [m] and rate [m/s] beyond the steady one, for bristles the share of full deflection beyond the
@@ -298,7 +298,7 @@ class Simulator:
 
     def _starts(self, part, segments: Segments, start) -> np.ndarray:
         """Return the states (nw, nx) in which segments begin."""
-        given = {} if start is None else dict(zip(self.nuisances, np.asarray(start).T, strict=True))
+        given = {} if start is None else dict(zip(self.free_states, np.asarray(start).T, strict=True))
         return self._begun(part, segments, slice(None), given, len(segments))
 
     def _begun(self, part, segments: Segments, which, given: Mapping[str, Any], count: int) -> np.ndarray:
@@ -344,11 +344,11 @@ class Simulator:
         return initial_states.corrections(run.states[-1][part.offset :], part.core, usual, self.facts.speed)
 
     def at_rest(self, segments: Segments, values) -> np.ndarray:
-        """Return the initial states (nw, number of nuisances) with which every segment begins at rest."""
+        """Return the initial states (nw, number of them) with which every segment begins at rest."""
         part, rows = self.prepared(values), []
         for w in range(len(segments)):
             given = initial_states.at_rest(part.core, self._usual(part, segments, w), self.facts.speed)
-            rows.append([given.get(name, 0.0) for name in self.nuisances])
+            rows.append([given.get(name, 0.0) for name in self.free_states])
         return np.array(rows)
 
     def carried_on(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
@@ -356,7 +356,7 @@ class Simulator:
 
         Returns
         -------
-        (nw, number of nuisances) array
+        (nw, number of them) array
             NaN for segments that follow no other.
         """
         part, found = self.prepared(values), np.full_like(start, np.nan)
@@ -383,7 +383,7 @@ class Simulator:
                 came = initial_states.corrections(
                     result.x[i, part.offset :], part.core, usual, self.facts.speed
                 )
-                found[w + 1] = [came.get(name, 0.0) for name in self.nuisances]
+                found[w + 1] = [came.get(name, 0.0) for name in self.free_states]
         return found
 
     def _drive(self, part):
@@ -420,7 +420,7 @@ class Simulator:
         return part
 
     def _start(self, part, segments, w, start, time, hidden) -> State:
-        given = hidden | (dict(zip(self.nuisances, start, strict=True)) if start is not None else {})
+        given = hidden | (dict(zip(self.free_states, start, strict=True)) if start is not None else {})
         return part.engine.start(self._begun(part, segments, w, given, 1)[0], time)
 
     def _usual(self, part, segments, w) -> tuple[Any, Any, Any]:
@@ -458,5 +458,5 @@ def free_run(
     known = {"x": position, "v": velocity, "slack": slack}
     one = np.zeros(1)
     whole = Segments(np.array([0]), np.array([len(record)]), one, one, one, one, one)
-    start = np.array([[known.get(name, 0.0) for name in simulator.nuisances]])
+    start = np.array([[known.get(name, 0.0) for name in simulator.free_states]])
     return simulator.run(whole, None, start, rounded=True)

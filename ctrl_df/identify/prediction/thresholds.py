@@ -7,7 +7,7 @@ HIDDEN_RTOL = 1e-4
 some 1e-6 of the force, and is twice as fast as 1e-6 (records)."""
 
 ROUGH = 0.05
-"""Distance of samples of an input from its thinned form, over its rms, beyond which it is not thinned, if a
+"""Distance of samples of an input from its decimated form, over its rms, beyond which it stays whole, if a
 quarter of them lie farther off: the model would break away elsewhere (rigs)."""
 
 PLACE_REACH, SPEED_REACH = (5, 0.02), (2, 0.01)
@@ -55,4 +55,4 @@ FAR_OUT, FAR_LIMIT = 10.0, 100.0
 """Spreads of an output from its mean that stand for a run that failed; typical sizes beyond which one has."""
 
 MOST_SAMPLES = 0.75
-"""Quantile of the distances from a thinned input: see `ROUGH`."""
+"""Quantile of the distances from a decimated input: see `ROUGH`."""

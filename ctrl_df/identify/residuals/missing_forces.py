@@ -86,7 +86,7 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
 
     found = regressed(noise)
     if found:
-        # The noise is what the most telling kind leaves: structure would pass for noise of its own colour.
+        # The noise is what the most telling kind leaves: structure would pass for noise of its own spectrum.
         _, explained = max(found, key=lambda f: f[0].evidence)
         left = residual - explained
         found = regressed(noise_of_outputs([left[w] for w in segments], outputs, max_order=NOISE_ORDER))

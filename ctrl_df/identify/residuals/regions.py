@@ -1,8 +1,8 @@
 """Where the error is: its share by time, direction, speed, position, load, amplitude, frequency.
 
 A region is a set of samples (or a band of frequencies). Under the null hypothesis the residual is stationary
-noise of the colour it is seen to have, so that a region's share of the squared error is its share of the
-samples. The p-values allow for that colour: neighbouring samples of a smooth residual say nearly the same
+noise of the spectrum it is seen to have, so that a region's share of the squared error is its share of the
+samples. The p-values allow for that spectrum: neighbouring samples of a smooth residual say nearly the same
 thing, and count as few. All are adjusted for the number of regions looked at.
 """
 
@@ -241,16 +241,16 @@ def _quantiles(kind, unit, values, count, prefix=""):
 
 
 class _Null:
-    """Shares and means of a stationary Gaussian residual of the colour seen."""
+    """Shares and means of a stationary Gaussian residual of the spectrum seen."""
 
     def __init__(self, r):
         n = len(r)
         self.r, self.n, self.power = r, n, float(np.mean(r * r))
         self.lags = n // 2
         self.size = 1 << (2 * n - 1).bit_length()
-        self.rho = self._colour(r)
+        self.rho = self._correlation(r)
 
-    def _colour(self, r):
+    def _correlation(self, r):
         rho = autocorrelation(r, self.lags)
         # Lags whose correlation is within three standard errors of none add noise only.
         rho = np.where(rho**2 > CORRELATED**2 / self.n, rho, 0.0)
@@ -274,11 +274,11 @@ class _Null:
         inside, outside = self._pairs(mask), self._pairs(~mask)
         squares = [_independent(pairs, self.rho**2) for pairs in (inside, outside)]
         p = chance_of(share, expected, *squares)
-        # A step between the region and the rest colours the residual by itself: without it the test is
+        # A step between the region and the rest correlates the residual by itself: without it the test is
         # sharper, where enough independent samples remain to know the two means.
         mean_in, mean_out = float(np.mean(self.r[mask])), float(np.mean(self.r[~mask]))
         rest = self.r - np.where(mask, mean_in, mean_out)
-        error_filter, power = self._colour(rest), float(np.mean(rest * rest))
+        error_filter, power = self._correlation(rest), float(np.mean(rest * rest))
         means = [_independent(pairs, np.maximum(error_filter, 0)) for pairs in (inside, outside)]
         if min(means) < REGION_SAMPLES:
             error_filter, power = self.rho, self.power

@@ -1,7 +1,7 @@
 """How large a residual is, and whether anything of the model is left in it.
 
 Residual means measured minus simulated. Every test here allows for what records really are: long, finely
-sampled, driven by smooth inputs, with noise that has a colour.
+sampled, driven by smooth inputs, with coloured noise.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def whiteness(
     return Whiteness(statistic, dof, p, p >= alpha, k, rho, TWO_SIDED / math.sqrt(n))
 
 
-# --- colour ---------------------------------------------------------------------------------------
+# --- coloured noise ---------------------------------------------------------------------------------------
 
 
 # --- is the input still in it? --------------------------------------------------------------------
@@ -155,7 +155,7 @@ class InputTest:
 def input_residual_test(u, residual, lags=None, *, alpha: float = 0.01, fitted: int = 0) -> InputTest:
     """Test whether the residual is uncorrelated with past inputs.
 
-    The residual's own colour is taken out of both signals first, and the test is an exact F test given the
+    The spectrum of the residual is taken out of both signals first, and the test is an exact F test given the
     input, so that neither coloured noise nor a smooth input (whose neighbouring lags say the same) gives
     false alarms.
 

@@ -61,7 +61,7 @@ HORIZON_LEAST = 50
 """Samples of the shortest horizon at least."""
 
 HORIZON_THIN, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
-"""Initial states for a horizon: thinning of the first fit, its steps, those where a shorter horizon is known,
+"""Initial states for a horizon: decimation of the first fit, its steps, those where a shorter one is known,
 and those at the full rate."""
 
 CORRELATED = 3.0

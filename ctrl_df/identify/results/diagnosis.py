@@ -111,7 +111,7 @@ class CandidateEffect(Brief, Predicting):
     confirmed : bool
         Whether it was refitted at the full rate and tried on held-out data (the best few are).
     errors : dict
-        Standard errors of `parameters`, for residuals of any colour; only of confirmed candidates.
+        Standard errors of `parameters`, for residuals of any spectrum; only of confirmed candidates.
     undetermined : tuple of str
         Parameters of the effect that the data do not determine: at a bound of their range, or less certain
         than they are large.

@@ -105,7 +105,7 @@ def sensed_side(d, first) -> str:
 
 
 def falls_behind(first, long) -> str:
-    """Return how the first of a ranking predicts over long horizons (`Lasting`)."""
+    """Return how the first of a ranking predicts over long horizons (`LongPrediction`)."""
     if long.horizon == 0:
         return (
             f"In free prediction, internal states continued, neither {named(first.effect)} nor any other "
@@ -120,7 +120,7 @@ def falls_behind(first, long) -> str:
 
 
 def left_out(first, long) -> str:
-    """Return why the first of a ranking was left out, and all others tried without it (`Lasting`)."""
+    """Return why the first of a ranking was left out, and all others tried without it (`LongPrediction`)."""
     return f"{falls_behind(first, long)} All others were therefore tried again without {named(first.effect)}."
 
 

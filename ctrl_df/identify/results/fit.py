@@ -24,7 +24,7 @@ class FittedParameter:
     name, unit : str
         As in ``block.parameters``.
     value, standard_error : float
-        SI; the error allows for the colour of the noise, as the residual tells it: two of them hold the truth
+        SI; the error allows for the noise spectrum that the residual shows: two of them hold the truth
         for 95 % of records.
     start : float
         Value before.

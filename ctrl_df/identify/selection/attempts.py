@@ -24,7 +24,7 @@ from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import HOPELESS
+from ..thresholds import GIVE_UP
 from .thresholds import (
     ANOTHER_START,
     BEGUN,
@@ -140,7 +140,7 @@ def tried(
     resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in begun for a in found]
-    rounds = _Rounds(run, screen, span, 1 if known else KEPT, HOPELESS * reached)
+    rounds = _Rounds(run, screen, span, 1 if known else KEPT, GIVE_UP * reached)
     later = {c.id: c.generalizes for c in kinds if c.generalizes in kinds}
     best = rounds.fitted(
         [a for a in attempts if a.key not in later], _Best({}, min(screen.base.rmse, reached))
@@ -202,7 +202,7 @@ class _Best:
             return False
         error = self.fits[key].train.rmse
         explained, most = base**2 - error**2, base**2 - self.least**2
-        return error < HOPELESS * self.least and explained > PROMISES * most
+        return error < GIVE_UP * self.least and explained > PROMISES * most
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,8 +233,8 @@ class _Rounds:
         # those of few steps first: what they come to tells of the others which need no long look
         begun = self.run(_first, [(a, self.near) for a in attempts if not a.multimodal])
         least = min([best.least, *(a.error for a in begun)])
-        begun += self.run(_first, [(a, HOPELESS * least) for a in attempts if a.multimodal])
-        begun = [a for a in begun if itself(a.trial, self.span)]
+        begun += self.run(_first, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
+        begun = [a for a in begun if distinct(a.trial, self.span)]
         kept = _best(begun, self.kept)
         # few steps from where the user begins tell little: the baseline may have ended in another minimum
         own = _best([a for a in begun if a.nominal], 1)
@@ -243,11 +243,11 @@ class _Rounds:
         found = self.run(_finish, [(a, self.screen.data, self.near) for a in ahead])
         least = min([least, *(t.train.rmse for t in found)])
         rest = [a for a in begun if not any(a is o for o in ahead)]
-        found += self.run(_finish, [(a, self.screen.data, HOPELESS * least) for a in rest])
+        found += self.run(_finish, [(a, self.screen.data, GIVE_UP * least) for a in rest])
         fits = dict(best.fits)
         for t in found:
             known = fits.get(t.key)
-            if itself(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
+            if distinct(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
                 fits[t.key] = t
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
@@ -274,11 +274,11 @@ def _screened(begun, screen: Screen) -> list[CandidateFit]:
     return sorted(found, key=lambda t: -t.evidence)
 
 
-def itself(tried: CandidateFit, span) -> bool:
+def distinct(tried: CandidateFit, span) -> bool:
     """Whether the newest effect is what its name says over the stroke `span` [m]."""
     own, pairs = tried.block.newest + ".", zip(tried.train.names, tried.train.at_bound, strict=True)
     at_bound = {name.removeprefix(own) for name, bound in pairs if bound and name.startswith(own)}
-    return tried.block.effects[-1].genuine(span, at_bound)
+    return tried.block.effects[-1].distinct(span, at_bound)
 
 
 def _best(attempts, count) -> list[Attempt]:
@@ -357,8 +357,8 @@ def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None
 
 
 def _first(job) -> Attempt:
-    """Take the first steps, fewer where all would not lead to an error below `hopeless` at their pace."""
-    attempt, hopeless = job
+    """Take the first steps, fewer where all would not lead to an error below `give_up` at their pace."""
+    attempt, give_up = job
     data, block = attempt.data, attempt.block
 
     def fit(model, names, starts, iterations) -> FitResult:
@@ -366,13 +366,13 @@ def _first(job) -> Attempt:
 
     block, starts = begun_with_angles(block, own_names(block), data.train.records, attempt.starts, fit)
     attempt = replace(attempt, block=block, starts=starts)
-    return _on(attempt, min(BEGUN, attempt.steps), hopeless)
+    return _on(attempt, min(BEGUN, attempt.steps), give_up)
 
 
-def _on(attempt: Attempt, steps, hopeless) -> Attempt:
+def _on(attempt: Attempt, steps, give_up) -> Attempt:
     fit = attempt.data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
-        hopeless=hopeless, steps_left=attempt.steps if steps < attempt.steps else 0,
+        give_up=give_up, steps_left=attempt.steps if steps < attempt.steps else 0,
     )  # fmt: skip
     left = 0 if fit.converged else attempt.steps
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)
@@ -381,15 +381,15 @@ def _on(attempt: Attempt, steps, hopeless) -> Attempt:
 def _finish(job) -> CandidateFit:
     """Take the steps that are left, then those over the segments of the screen.
 
-    Where they would not lead to an error below `hopeless` at the pace of the last ones they are left out.
+    Where they would not lead to an error below `give_up` at the pace of the last ones they are left out.
     """
-    attempt, data, hopeless = job
+    attempt, data, give_up = job
     if attempt.steps:
-        attempt = _on(attempt, attempt.steps, hopeless)
+        attempt = _on(attempt, attempt.steps, give_up)
     trial = attempt.trial
     if attempt.data is data:
         return trial
-    return replace(trial, train=data.moved(trial.train, *EFFORT_MOVED, hopeless))
+    return replace(trial, train=data.moved(trial.train, *EFFORT_MOVED, give_up))
 
 
 def _spread(effects, count):

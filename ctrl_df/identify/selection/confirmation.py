@@ -25,11 +25,11 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import feasible
-from ..thresholds import FLOOR, GROWTH, HOPELESS, NOTHING, STILL_POSSIBLE
+from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .alike import alike_along
-from .attempts import itself
+from .attempts import distinct
 from .evidence import misses_lines, ranked, rounds
-from .standing import Standing
+from .reference import Reference
 from .thresholds import (
     CONFIRMED,
     CONFIRMED_FORCED,
@@ -44,31 +44,31 @@ from .thresholds import (
 )
 
 Stages = list[list[FitResult | None]]
-"""Fits in segments of every length, short ones first: the baseline's, then of candidates; None: hopeless."""
+"""Fits in segments of every length, short ones first: the baseline's, then of candidates; None: given up."""
 
 
 def confirmed(
-    at: Standing, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
-) -> tuple[Standing, list[CandidateFit]]:
+    at: Reference, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+) -> tuple[Reference, list[CandidateFit]]:
     """Refit baseline and best candidates at the full rate; return these, best first, and what judges them.
 
     Parameters
     ----------
-    at : Standing
+    at : Reference
     found : sequence of CandidateFit
         Of the first look, best first.
     staged : callable
-        ``staged(standing, fits)``, such as `stages`.
+        ``staged(at, fits)``, such as `stages`.
     told, stage : callable
         See `FirstLook.of`.
     """
     span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)
     while True:
         now, chosen = _confirmed(at, found, staged, told, stage)
-        odd = {t.key for t in chosen if not itself(t, span)}
+        odd = {t.key for t in chosen if not distinct(t, span)}
         if not odd or chosen[0].key not in odd:
             break
-        # beside what is not what its name says the others were hopeless
+        # beside what is not what its name says the others were given up
         found = [t for t in found if t.key not in odd]
     if odd:
         chosen, noise = ranked(now.base, [t for t in chosen if t.key not in odd])
@@ -77,8 +77,8 @@ def confirmed(
 
 
 def _confirmed(
-    at: Standing, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
-) -> tuple[Standing, list[CandidateFit]]:
+    at: Reference, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+) -> tuple[Reference, list[CandidateFit]]:
     """Do what `confirmed` does, whatever the effects have become."""
     stage("the best refitted over segments of every length")
     # Disturbance forces let the first look tell little.
@@ -104,7 +104,7 @@ def _confirmed(
     return replace(at, noise=noise), chosen
 
 
-def _farthest(at: Standing, fits: Sequence[FitResult | None]) -> FitResult:
+def _farthest(at: Reference, fits: Sequence[FitResult | None]) -> FitResult:
     """Return the baseline over the longest segments, begun again as the nearest model there."""
     base, *others = [CandidateFit("", f) for f in fits if f is not None]
     nearest = min([base, *others], key=lambda t: t.train.rmse)
@@ -112,7 +112,7 @@ def _farthest(at: Standing, fits: Sequence[FitResult | None]) -> FitResult:
 
 
 def _judged(
-    at: Standing, tried: Sequence[CandidateFit], stages: Stages
+    at: Reference, tried: Sequence[CandidateFit], stages: Stages
 ) -> tuple[SegmentedData, list[CandidateFit | None]]:
     """Return the data in segments of the length that suits them, and the models validated there.
 
@@ -164,8 +164,8 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
         found[i] = t
     known = [t for t in found if t is not None]
     bounds = (
-        HOPELESS * min(t.train.rmse for t in known),
-        HOPELESS * min(t.validation_rmse for t in known),
+        GIVE_UP * min(t.train.rmse for t in known),
+        GIVE_UP * min(t.validation_rmse for t in known),
     )
     rest = [i for i in there if i not in first]
     for i, t in zip(rest, side_by_side(lambda i: at_full_rate(i, *bounds), rest), strict=True):
@@ -202,7 +202,7 @@ def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits)
 # --- segments of every length -------------------------------------------------------------------------
 
 
-def stages(at: Standing, fits: Sequence[FitResult]) -> tuple[Stages, float]:
+def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     """Return the fits in segments of every length that may judge, and their floor.
 
     The floor is the error that a fit can come down to at best: over short segments nearly every model
@@ -257,12 +257,12 @@ def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> Fi
     """Return the best of a fit in longer segments and of those begun at points about one in shorter ones."""
     models = [near.model.with_parameters(feasible(near.model, values)) for values in points]
     begun = side_by_side(
-        lambda model: longer.moved(replace(near, model=model), iterations=2, hopeless=HOPELESS * far.rmse),
+        lambda model: longer.moved(replace(near, model=model), iterations=2, give_up=GIVE_UP * far.rmse),
         models,
     )
     begun = sorted(begun, key=lambda f: f.rmse)[:RESTARTS_KEPT]
     ended = side_by_side(
-        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=STEPS_LONGER, hopeless=far.rmse),
+        lambda f: longer.fit(f.model, f.names, starts=f.starts, iterations=STEPS_LONGER, give_up=far.rmse),
         begun,
     )
     return min([far, *ended], key=lambda f: f.rmse)
@@ -279,9 +279,9 @@ def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | No
     found: list[Any] = [None] * len(fits)
     for i, f in zip(ahead, side_by_side(data.reached, [fits[i] for i in ahead]), strict=True):
         found[i] = f
-    hopeless = HOPELESS * min(found[i].rmse for i in ahead)
-    others = [i for i, e in enumerate(errors) if i not in ahead and e < hopeless]
-    moved = side_by_side(lambda i: data.moved(fits[i], hopeless=hopeless), others)
+    give_up = GIVE_UP * min(found[i].rmse for i in ahead)
+    others = [i for i, e in enumerate(errors) if i not in ahead and e < give_up]
+    moved = side_by_side(lambda i: data.moved(fits[i], give_up=give_up), others)
     for i, f in zip(others, moved, strict=True):
         found[i] = f
     there = [i for i, f in enumerate(found) if f is not None]
@@ -326,20 +326,20 @@ def _left(base, best, at) -> float:
 # --- to the end ---------------------------------------------------------------------------------------
 
 
-def _to_the_end(at: Standing, chosen: list[CandidateFit]) -> list[CandidateFit]:
+def _to_the_end(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]:
     """Tell near equals apart by fits that have come to an end, and in the right minimum."""
     chosen = _again(at, chosen, chosen[:1])
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
     least = min(t.train.rmse for t in chosen)
     close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
-    close = [t for t in close if t.train.rmse < HOPELESS * least]
+    close = [t for t in close if t.train.rmse < GIVE_UP * least]
     ended = side_by_side(lambda t: _ended(at, t, t in near and len(near) > 1, least), close)
     if any(a is not b for a, b in zip(ended, close, strict=True)):
         chosen = _again(at, [*ended, *(t for t in chosen if t not in close)], ended)
     return chosen
 
 
-def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
+def _ended(at: Reference, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
     """Return a candidate in its best minimum, unless nothing better is possible.
 
     `exactly`: iterated to the end first. `least`: error of the best of all.
@@ -352,7 +352,7 @@ def _ended(at: Standing, tried: CandidateFit, exactly: bool, least: float) -> Ca
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)
 
 
-def _again(at: Standing, chosen, those) -> list[CandidateFit]:
+def _again(at: Reference, chosen, those) -> list[CandidateFit]:
     """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
     fine = at.data.fine
     alike = alike_along(fine, at.base.block)

@@ -15,7 +15,7 @@ from ..thresholds import BY_CHANCE, GROWTH
 from .alike import begun_like_better
 from .attempts import tried
 from .evidence import ranked
-from .standing import Standing
+from .reference import Reference
 from .thresholds import (
     CONFIRMED,
     EFFORT_MOVED,
@@ -50,15 +50,15 @@ class FirstLook:
     disturbs: Callable[[float, SegmentedData], bool]
     executor: object = None
 
-    def of(self, at: Standing, told: Callable, stage: Callable) -> tuple[Standing, list[CandidateFit]]:
+    def of(self, at: Reference, told: Callable, stage: Callable) -> tuple[Reference, list[CandidateFit]]:
         """Return every effect that can be added, fitted, the one with most evidence first, and by what.
 
         Parameters
         ----------
-        at : Standing
+        at : Reference
             On which the search begins.
         told : callable
-            ``told(standing, found)`` hears of what is known on the way.
+            ``told(at, found)`` hears of what is known on the way.
         stage : callable
             Hears in words what is done.
         """
@@ -88,7 +88,7 @@ class FirstLook:
             at = replace(at, base=min(at.base, back, key=lambda t: t.train.rmse))
         return (at.rebased(found, self.free) if found else at), found
 
-    def rivals(self, at: Standing, model, names) -> list[CandidateFit]:
+    def rivals(self, at: Reference, model, names) -> list[CandidateFit]:
         """Return effects that may do what the model of one effect more does, with evidence over it."""
         data = at.data.sampled
         known = data.fit(model, names, iterations=RIVAL_STEPS, followed=RESTARTS_KEPT)
@@ -97,7 +97,7 @@ class FirstLook:
         more = data.count(model, names) - data.count(at.base.block, self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
-    def _sampled(self, at: Standing, screened=None) -> tuple[FitResult, list[CandidateFit]]:
+    def _sampled(self, at: Reference, screened=None) -> tuple[FitResult, list[CandidateFit]]:
         """Return the model and every effect fitted over every second of the segments that judge."""
         data = at.data.sampled
         base = data.moved(at.base.train, RIVAL_BASE_STEPS)
@@ -105,7 +105,7 @@ class FirstLook:
 
     def _over(
         self,
-        at: Standing,
+        at: Reference,
         data: SegmentedData,
         base: FitResult,
         about: FitResult,
@@ -122,7 +122,7 @@ class FirstLook:
 
     def _tried(
         self,
-        at: Standing,
+        at: Reference,
         data: SegmentedData,
         about: FitResult,
         short: SegmentedData | None,
@@ -136,14 +136,14 @@ class FirstLook:
         return tried(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
 
     @staticmethod
-    def _short(at: Standing, data: SegmentedData) -> SegmentedData:
+    def _short(at: Reference, data: SegmentedData) -> SegmentedData:
         """Return the segments in which fits of effects with many minima begin: short ones, or `data`."""
         # where short ones show noise alone (its rms, but for chance) no minimum is right
         most = (1 + BY_CHANCE / math.sqrt(2 * at.nearest.count)) * at.data.noise
         shows = at.nearest.rmse > most or at.data.disturbed
         return at.segmentations[0].sampled if shows else data
 
-    def _disturbed(self, at: Standing, found) -> bool:
+    def _disturbed(self, at: Reference, found) -> bool:
         """Whether forces disturb the machine that no effect accounts for.
 
         The baseline then errs over the shortest segments by far more than the sensor's noise, and so does the
@@ -153,11 +153,11 @@ class FirstLook:
         if not self.disturbs(least, at.data):
             return False
         best = sorted(found, key=lambda t: t.train.rmse)[:2]
-        moved = side_by_side(lambda t: shortest.moved(t.train, hopeless=least), best)
+        moved = side_by_side(lambda t: shortest.moved(t.train, give_up=least), best)
         return all(self.disturbs(f.rmse, at.data) and f.rmse > LEFT * least for f in moved)
 
 
-def _over_long_segments(at: Standing, here: float, found) -> list[CandidateFit] | None:
+def _over_long_segments(at: Reference, here: float, found) -> list[CandidateFit] | None:
     """Return the best by error moved to the longest segments; None where they explain enough there.
 
     `here`: error of the baseline where the trials were fitted; that of `at` is over the longest segments.

@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ...simulate.parallel import side_by_side
-from ..estimation.refit_records import blurred, refit_records
+from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import feasible
 from ..thresholds import FLOOR, GROWTH, RULED_OUT
 from .evidence import ranked
-from .standing import Standing
+from .reference import Reference
 from .thresholds import ON_LIMIT, REFIT_MOST
 
 
 def refitted(
-    at: Standing, chosen: Sequence[CandidateFit], significant: float, refit: Callable
-) -> tuple[Standing, list[CandidateFit]]:
+    at: Reference, chosen: Sequence[CandidateFit], significant: float, refit: Callable
+) -> tuple[Reference, list[CandidateFit]]:
     """Refit the first of confirmed candidates and those that the data hardly tell from it.
 
     Candidates are told apart in segments that show what is missing, at an effort that they all can have.
@@ -44,7 +44,7 @@ def refitted(
     return replace(at, noise=noise), chosen
 
 
-def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> CandidateFit:
+def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> CandidateFit:
     """Return a candidate with the values that `refit` finds from its own.
 
     It stays as it is where the segments that judge speak against these, or tell parameters that the refit
@@ -73,7 +73,7 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> Candida
     if found.rmse > FLOOR * at.floor:
         # a minimum beside the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
-    if blurred(found) - blurred(tried.train):
+    if undetermined(found) - undetermined(tried.train):
         return tried
     there = data.as_it_is(found)
     there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
@@ -83,7 +83,7 @@ def whole_refit(at: Standing, tried: CandidateFit, prior, seen: bool) -> Candida
     return other if seen else replace(other, validation=tried.validation)
 
 
-def beyond_range(at: Standing, best: CandidateFit, significant: float, refit: Callable):
+def beyond_range(at: Reference, best: CandidateFit, significant: float, refit: Callable):
     """Return the model without an effect, refitted without limits, where that explains more than the best.
 
     Fits keep the model's own parameters within a range of what they were stated to be. Where one ends there,

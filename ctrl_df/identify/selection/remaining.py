@@ -23,7 +23,7 @@ def remainder(
     best: CandidateFit,
     data: SegmentedData,
     noise: NoiseModel,
-    colour: NoiseModel,
+    coloured: NoiseModel,
     most: float,
     significant: float,
 ) -> Remainder:
@@ -31,7 +31,7 @@ def remainder(
 
     Structure shows on the segments fitted by what free forces explain, and on those held out by an error
     beyond the noise and what the parameters are known to. The noise is that of the fitted segments, times
-    what its colour and the records' own noise floors say of the two.
+    what its spectrum and the records' own noise floors say of the two.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def remainder(
     data : SegmentedData
     noise : NoiseModel
         Of the best model's residual.
-    colour : NoiseModel
+    coloured : NoiseModel
         The same as far as it may be slow.
     most : float
         Error over the segments fitted that noise alone may make.
@@ -64,9 +64,9 @@ def remainder(
         for v in (data.train, data.validation)
     ]
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
-    expected = _noisier(best, colour) * spread * max(1.0, floors[1] / floors[0])
+    expected = _noisier(best, coloured) * spread * max(1.0, floors[1] / floors[0])
     if best.validation.rmse > expected:
-        expected = _at_most(expected, best, data, colour)
+        expected = _at_most(expected, best, data, coloured)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
@@ -79,14 +79,14 @@ def remainder(
     return Remainder(spread, max(structure, outside), unexplained, missed, more=more)
 
 
-def _noisier(best: CandidateFit, colour: NoiseModel) -> float:
+def _noisier(best: CandidateFit, coloured: NoiseModel) -> float:
     """Return the error of noise alone held out over that on segments fitted, at most."""
     assert best.validation is not None
-    shares = [colour.memory / f.spanned for f in (best.train, best.validation)]
+    shares = [coloured.memory / f.spanned for f in (best.train, best.validation)]
     return by_chance(min(2 / sum(shares), INDEPENDENT_MOST))
 
 
-def _at_most(expected: float, best: CandidateFit, data: SegmentedData, colour: NoiseModel) -> float:
+def _at_most(expected: float, best: CandidateFit, data: SegmentedData, coloured: NoiseModel) -> float:
     """Return the error held out that noise makes, and parameters that are off by as much as may be chance.
 
     `expected`: of noise that initial states take as much of as on the segments fitted.
@@ -96,7 +96,7 @@ def _at_most(expected: float, best: CandidateFit, data: SegmentedData, colour: N
     there = data.fit(held.model, names, view=data.validation, starts=held.starts, iterations=0)
     if there.sensitivity is None or best.train.sensitivity is None or len(there.slopes) != len(covariance):
         return expected
-    left = there.sensitivity.left_by_starts(colour) / best.train.sensitivity.left_by_starts(colour)
+    left = there.sensitivity.left_by_starts(coloured) / best.train.sensitivity.left_by_starts(coloured)
     columns = np.concatenate(there.sensitivity.parameters) / there.slopes
     if not (np.all(np.isfinite(covariance)) and np.all(np.isfinite(columns))):
         return math.inf  # nothing is known of some: they may be off by anything

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ..course import Course
-from ..estimation.refit_records import blurred, cannot_be_told_apart, in_null_directions
+from ..estimation.refit_records import cannot_be_told_apart, in_null_directions, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -22,9 +22,9 @@ from .confirmation import confirmed, stages
 from .evidence import ranked, step_as_recorded
 from .first_look import FirstLook
 from .named import beyond_range, refitted, whole_refit
+from .reference import Reference, begun
 from .remaining import located, remainder
 from .search import Remainder, Search, Words
-from .standing import Standing, begun
 from .thresholds import EXACT, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
@@ -44,14 +44,14 @@ class StructureSearch(Search):
 
     Attributes
     ----------
-    at : Standing
+    at : Reference
         What models are judged by.
     """
 
     significant = SIGNIFICANT
     significant_validation = SIGNIFICANT_HELD
     words = Words("data", "the noise of these data", "", "an input", " It shows as {}.")
-    at: Standing
+    at: Reference
 
     def __init__(self, block, records, validation, free, prior=None):
         self.block, self.free, self.prior = block, tuple(free), prior
@@ -71,7 +71,7 @@ class StructureSearch(Search):
         """Whether an error over the shortest segments is one that disturbance forces make."""
         return error > PROCESS_NOISE * data.noise and not data.noise_free
 
-    def stages(self, at: Standing, fits):
+    def stages(self, at: Reference, fits):
         """Return fits in segments of every length that may judge, and the error they can come down to."""
         return stages(at, fits)
 
@@ -121,7 +121,7 @@ class StructureSearch(Search):
         found = self._whole_refit(self.at, self.base)
         return None if found is self.base else found.block
 
-    def _whole_refit(self, at: Standing, tried: CandidateFit, seen: bool = False) -> CandidateFit:
+    def _whole_refit(self, at: Reference, tried: CandidateFit, seen: bool = False) -> CandidateFit:
         return whole_refit(at, tried, self.prior, seen or bool(self.records[1]))
 
     def _look(self, classes, executor) -> FirstLook:
@@ -129,7 +129,7 @@ class StructureSearch(Search):
         classes = [c for c in classes if self.applies(c)]
         return FirstLook(classes, self.free, nominal, self.disturbs, executor)
 
-    def _told(self, course: Course, at: Standing, found) -> None:
+    def _told(self, course: Course, at: Reference, found) -> None:
         course.known((self.after(at=at), found))
 
     def alike(self, a: CandidateFit, b: CandidateFit) -> bool:
@@ -158,7 +158,7 @@ class StructureSearch(Search):
             f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.at.data.filtered)
         }
         at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
-        doubtful = (at_bound - proved) | blurred(fit)
+        doubtful = (at_bound - proved) | undetermined(fit)
         # a static level is found by trying, as single samples pass it: slopes know nothing of it
         table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
         own = [k for k in own_names(judged.block) if not table[k].threshold]
@@ -221,7 +221,7 @@ class StructureSearch(Search):
         """Return what the best model leaves."""
         noise = self._noise(best)
         left = remainder(
-            self.at.base, best, self.at.data.fine, noise, self.at.colour(noise),
+            self.at.base, best, self.at.data.fine, noise, self.at.coloured(noise),
             self.at.by_noise(best.train, noise), self.significant,
         )  # fmt: skip
         if not significant and self.at.unmoved(self.significant):

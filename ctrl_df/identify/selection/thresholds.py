@@ -24,7 +24,7 @@ which fits gained on the rigs when brought to their end. More costs time, less t
 
 PROMISING = 0.2
 """Share of the best one's evidence, at the first look, from which a candidate is confirmed: there records are
-thinned fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
+decimated fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
 
 FORCE_ALIKE = 0.98
 """Share of the best one's evidence that another kind of force must bring to be named beside it, but for what
@@ -118,7 +118,7 @@ REFUTED_MOST = 2
 """Candidates that long stretches refute, after each of which all others are looked at again without it: a
 joint and a gap, which have the hidden states that follow short segments. Each look is a whole search."""
 
-OUTLASTING = 2
+LONG_RIVALS = 2
 """Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 

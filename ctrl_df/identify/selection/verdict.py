@@ -32,7 +32,7 @@ from ..results.explain import (
     undetermined,
 )
 from ..thresholds import EXPONENT, FLOOR
-from .lasting import Lasting, compared, lasting
+from .long_prediction import LongPrediction, compared, long_prediction
 from .search import Remainder, Search
 from .thresholds import REFUTED_MOST
 
@@ -155,7 +155,7 @@ class _Asked:
         told = verdict != NONE
         jobs = [lambda: search.remainder(best, told), *(lambda m=m: m.error_by_horizon for m in far)]
         remainder, *_ = side_by_side(lambda job: job(), jobs)
-        long = lasting(ranking, base, search.significant) if far else None
+        long = long_prediction(ranking, base, search.significant) if far else None
         refuted = long is not None and long.refuted
         fallen = (ranking[0].id, left_out(ranking[0], long)) if refuted else None
         if remainder.unexplained and not search.exact():
@@ -200,7 +200,7 @@ class _Asked:
         return result, located.note
 
 
-def doubted(ranking, long: Lasting | None):
+def doubted(ranking, long: LongPrediction | None):
     """Return what becomes of the verdict that the first of a ranking is the effect, and why.
 
     It stands where the first predicts the motion over long stretches as well as any rival, and better than

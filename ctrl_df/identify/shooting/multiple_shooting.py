@@ -149,11 +149,11 @@ class Stage(SegmentOutputs):
         return trial if power(trial.residual) < power(found.residual) else found
 
     def _worth_restarting(self, found: Solution) -> bool:
-        """Whether the error could come below what is hopeless if all segments erred like the good ones."""
-        if self.problem.error_filter is not None or math.isinf(self.problem.hopeless):
+        """Whether a fit need not be given up if all segments erred like the good ones."""
+        if self.problem.error_filter is not None or math.isinf(self.problem.give_up):
             return True
         rms = [np.sqrt(w.means(e**2)) for w, e in zip(self.segments, found.residual, strict=True)]
-        return float(np.quantile(np.concatenate(rms), GOOD)) < self.problem.hopeless
+        return float(np.quantile(np.concatenate(rms), GOOD)) < self.problem.give_up
 
     def trusts(self, found: Solution) -> Signals:
         """Return weights of the samples (n,): 1 in segments that err like the rest, less in worse ones."""
@@ -222,11 +222,11 @@ class Stage(SegmentOutputs):
         return Solution(theta, states, residual), reached
 
     def too_far(self, residual, pace: float, left: int) -> bool:
-        """Whether the error is hopeless still after so many steps more, its square falling at this pace."""
-        if math.isinf(self.problem.hopeless):
+        """Whether a fit is given up: so many more steps at this pace leave the error too large."""
+        if math.isinf(self.problem.give_up):
             return False
         total, count = self.power(residual)
-        return total / count * pace**left > self.problem.hopeless**2
+        return total / count * pace**left > self.problem.give_up**2
 
     def _weights(self, residual, robust):
         if not robust:

@@ -1,4 +1,4 @@
-"""Noise of any colour: an autoregressive model of residuals, and what is left of them once it is taken out.
+"""Noise of any spectrum: an autoregressive model of residuals, and what is left of them once it is taken out.
 
 Residuals come in pieces, one a segment: each begins from an initial state of its own, so nothing ties the
 last sample of one to the first of the next.

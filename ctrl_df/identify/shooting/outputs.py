@@ -128,8 +128,8 @@ class SegmentOutputs:
         """Return the expected corrections of the initial states: none, but half the slack of a gap."""
         means = [np.zeros_like(a) for a in self.begun.values]
         for mean, simulator in zip(means, self.simulators, strict=True):
-            if "slack" in simulator.nuisances:
-                mean[:, simulator.nuisances.index("slack")] = 0.5
+            if "slack" in simulator.free_states:
+                mean[:, simulator.free_states.index("slack")] = 0.5
         return means
 
     def precision(self, states: States) -> Signals:
@@ -141,7 +141,7 @@ class SegmentOutputs:
 
         The data say where a segment begins: its start must not hide the faults of the model.
         """
-        names = self.simulators[k].nuisances
+        names = self.simulators[k].free_states
         means = np.array([0.5 if name == "slack" else 0.0 for name in names])
         values = np.clip(values, means - WIDEST * reach, means + WIDEST * reach)
         if "slack" in names:
@@ -233,7 +233,7 @@ class SegmentOutputs:
         """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
         simulator, known = self.simulators[k], self.problem.known[k]
         moved, widths = [], []
-        for j, name in enumerate(simulator.nuisances):
+        for j, name in enumerate(simulator.free_states):
             if name == "x" and not simulator.position_dependent:
                 moved.append(None)
                 widths.append(None)

@@ -34,13 +34,13 @@ class Problem:
         limits=None,
         error_filter=None,
         begins=FREE,
-        hopeless=(math.inf, 0),
+        give_up=(math.inf, 0),
         about=None,
         followed=0,
     ):
         self.model, self.records, self.names, self.budget = model, list(records), tuple(names), budget
         self.error_filter, self.begins = error_filter, begins
-        self.hopeless, self.steps_left = hopeless
+        self.give_up, self.steps_left = give_up
         self.followed = followed
         self.block = block_of(model)
         self.blocks = [for_record(self.block, r.name) for r in self.records]
@@ -115,9 +115,9 @@ class Problem:
     def alone(self, theta, which=slice(None)) -> Problem:
         """Return the problem of the initial states alone, for some of the records."""
         model = self.model_at(theta)
-        hopeless, records = (self.hopeless, self.steps_left), self.records[which]
+        give_up, records = (self.give_up, self.steps_left), self.records[which]
         return Problem(
-            model, records, (), self.budget, None, self.error_filter, self.begins, hopeless,
+            model, records, (), self.budget, None, self.error_filter, self.begins, give_up,
             followed=self.followed,
         )  # fmt: skip
 

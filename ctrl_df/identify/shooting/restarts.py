@@ -41,9 +41,9 @@ def restarted_segments(stage, found):
     all_starts = [a.copy() for a in found.states.values]
     all_reach = [p.copy() for p in found.states.reach]
     for k, simulator in enumerate(stage.simulators):
-        if "v" not in simulator.nuisances or simulator.continued:
+        if "v" not in simulator.free_states or simulator.continued:
             continue
-        column, segments, starts = simulator.nuisances.index("v"), stage.segments[k], all_starts[k]
+        column, segments, starts = simulator.free_states.index("v"), stage.segments[k], all_starts[k]
         values = problem.values(found.theta, k)
         rms = np.sqrt(segments.means(found.residual[k] ** 2))
         usual = OUTLYING_SEGMENT * np.quantile(rms, GOOD) if _comparable(problem, segments) else 0.0
@@ -63,8 +63,8 @@ def restarted_segments(stage, found):
             (slice(None), simulator.at_rest(some, values)),
         ]
         tries += [(column, f * reach) for f in RESTART_SPEEDS]
-        if "slack" in simulator.nuisances:
-            at = simulator.nuisances.index("slack")
+        if "slack" in simulator.free_states:
+            at = simulator.free_states.index("slack")
             tries += [(slice(at, at + 2), pair) for pair in _slacks(stage, k)]
         trials = [starts[bad].copy() for _ in tries]
         for trial, (which, value) in zip(trials, tries, strict=True):
@@ -114,9 +114,9 @@ def scanned_gap_states(stage, theta, states):
     """Find where in its gap each segment begins, and how fast it crosses it (the cost has several minima)."""
     found, problem = list(states.values), stage.problem
     for k, simulator in enumerate(stage.simulators):
-        if "slack" not in simulator.nuisances:
+        if "slack" not in simulator.free_states:
             continue
-        at = simulator.nuisances.index("slack")
+        at = simulator.free_states.index("slack")
         segments, chosen = stage.segments[k], found[k].copy()
         least, values, tries = np.full(len(segments), np.inf), problem.values(theta, k), _slacks(stage, k)
         trials = [found[k].copy() for _ in tries]

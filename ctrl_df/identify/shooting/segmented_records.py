@@ -1,4 +1,4 @@
-"""Records and the segments of each that count: shorter, fewer, thinner, of one output."""
+"""Records and the segments of each that count: shorter, fewer, decimated, of one output."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SegmentedRecords:
             self.records, tuple(w.only(np.arange(len(w)) % step == 0) for w in self.segments)
         )
 
-    def thinned(self, step: int) -> SegmentedRecords:
+    def decimated(self, step: int) -> SegmentedRecords:
         """Return the same segments, of which every `step`-th sample counts."""
         return replace(self, segments=tuple(w.every(step) for w in self.segments))
 

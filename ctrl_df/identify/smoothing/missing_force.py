@@ -299,7 +299,7 @@ def missing_of_imposed(model, record: Measurement, residual) -> MissingForce:
     known = facts(record)
     simulator = simulator_of(model, record)
     whole = make_segments(record)
-    start = np.zeros((1, len(simulator.nuisances)))
+    start = np.zeros((1, len(simulator.free_states)))
     table = simulator.block.parameters
     free = [k for k in default_free(simulator.block) if table[k].value != 0]
     steps = {k: PARAMETER_NUDGE * table[k].value for k in free}

@@ -8,7 +8,7 @@ about.
 from __future__ import annotations
 
 from ..estimation.fit import FitResult
-from ..thresholds import HOPELESS
+from ..thresholds import GIVE_UP
 from .extend import extended
 from .screen import Screen
 from .thresholds import JOINT_DAMPING, JOINT_GAIN, JOINTS_TRIED, RESONANCES
@@ -20,17 +20,17 @@ def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]
     `share`: of the mass, behind the joint; one of `LOAD_SHARES`. Initial states are all but linear: one step
     tells which joints to look at again.
     """
-    scales, found, hopeless = screen.scales, [], HOPELESS * screen.base.rmse
+    scales, found, give_up = screen.scales, [], GIVE_UP * screen.base.rmse
     reduced = share * (1 - share) * scales.mass
     for rate in RESONANCES * scales.speed / scales.position:
         stiffness, damping = reduced * rate**2, 2 * JOINT_DAMPING * reduced * rate
         joint = cls.from_spring(stiffness, damping, share, scales.of)
         block = None if joint is None else extended(screen.block, joint)
         if block is not None:
-            found.append(screen.data.fit(block, (), iterations=1, hopeless=hopeless))
+            found.append(screen.data.fit(block, (), iterations=1, give_up=give_up))
     near = sorted(found, key=lambda f: f.rmse)[:JOINTS_TRIED]
     again = [
-        screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=JOINT_GAIN, hopeless=hopeless)
+        screen.data.fit(f.model, (), starts=f.starts, iterations=2, tolerance=JOINT_GAIN, give_up=give_up)
         for f in near
     ]
     return sorted(again, key=lambda f: f.rmse)[:count]

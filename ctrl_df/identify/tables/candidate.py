@@ -16,7 +16,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
     scales = Scales(scales.force, scales.position, scales.speed, scales.mass)
     slow = cls.costly
     work = WORK_LOW if slow else WORK_MEDIUM
-    grown, hopeful = best_starts(cls, block, points, slopes, free, scales, cls.table_starts, work)
+    grown, promising = best_starts(cls, block, points, slopes, free, scales, cls.table_starts, work)
     if not grown:
         return None
     own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
@@ -27,7 +27,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
             again=False, iterations=iterations, tolerance=TABLE_STEPS["try"], work=work,
         )  # fmt: skip
 
-    if not hopeful:
+    if not promising:
         return cls.id, fitted(grown[0], 0), len(own)
     begun = [fitted(g, STEPS_BEGUN) for g in grown]
     best = max(begun, key=_likelihood_of)

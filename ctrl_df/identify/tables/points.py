@@ -69,7 +69,7 @@ class Points:
         """Return the same points, some of them of no weight."""
         return replace(self, weight=np.where(where, 0.0, self.weight))
 
-    def thinned(self, count: int, size) -> Points:
+    def selected(self, count: int, size) -> Points:
         """Return up to `count` points: that of largest `size` in every cell of the logarithmic plane."""
         if len(self) <= count:
             return self

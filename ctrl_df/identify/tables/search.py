@@ -28,7 +28,7 @@ from .simulated import relative_error, simulate_table
 from .starts import balanced
 from .thresholds import (
     CONFIRMED_ON_TABLE,
-    HOPELESS_ON_TABLE,
+    GIVE_UP_ON_TABLE,
     POINTS,
     POINTS_COSTLY,
     SCATTER_LEAST,
@@ -149,7 +149,7 @@ class TableSearch(Search):
             return self, []
         course = course or Course()
         size = np.abs(self.inside.weight * self.base.error[self.train])
-        few, fewer = self.inside.thinned(POINTS, size), self.inside.thinned(POINTS_COSTLY, size)
+        few, fewer = self.inside.selected(POINTS, size), self.inside.selected(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
         for some in (few, fewer):
             slopes[len(some)] = slopes_of(block, some, self.free, self.scales, WORK_MEDIUM)
@@ -173,7 +173,7 @@ class TableSearch(Search):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
         (course or Course()).stage("the best fitted to all points")
         base = self.base
-        best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > HOPELESS_ON_TABLE]
+        best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > GIVE_UP_ON_TABLE]
         for tried in best[:2]:
             values = {k: tried.block.parameters[k].value for k in self.free}
             try:

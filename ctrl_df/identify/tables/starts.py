@@ -29,7 +29,7 @@ from .thresholds import (
     BALANCED_STARTS,
     DELAYS,
     DRY_SHARES,
-    HOPELESS_START,
+    GIVE_UP_START,
     START_COMMON,
     START_SAME,
     STARTS_KEPT,
@@ -192,6 +192,6 @@ def best_starts(
             lost = int(np.isnan(table).sum()) > silent
             scored.append((lost, float(np.sum(np.log(left(table) + common))), len(scored), grown))
     scored.sort(key=lambda s: s[:3])
-    bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(HOPELESS_START)
-    hopeful = [g for _, size, _, g in scored[:keep] if size < bound]
-    return hopeful or [g for *_, g in scored[:1]], bool(hopeful)
+    bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(GIVE_UP_START)
+    promising = [g for _, size, _, g in scored[:keep] if size < bound]
+    return promising or [g for *_, g in scored[:1]], bool(promising)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..thresholds import HOPELESS, SIGNIFICANT
+from ..thresholds import GIVE_UP, SIGNIFICANT
 
 SIGNIFICANT_TABLE = 12.0
 """Evidence an effect needs on the points of a table: a hundred shapes, a false alarm of 6e-4."""
@@ -11,11 +11,11 @@ SIGNIFICANT_TABLE_HELD = 2.0
 """Evidence an effect needs on the points held out: odds of 7 to 1, as a third of the points can hardly give
 more (tables)."""
 
-HOPELESS_ON_TABLE = -SIGNIFICANT
+GIVE_UP_ON_TABLE = -SIGNIFICANT
 """Evidence on a few points of a table below which a candidate is not confirmed: as much as makes an effect,
 but against it."""
 
-HOPELESS_START = HOPELESS
+GIVE_UP_START = GIVE_UP
 """Error of a start on a table over that of the model itself from which it is none."""
 
 GROSS = 0.02

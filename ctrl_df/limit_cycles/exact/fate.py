@@ -158,10 +158,10 @@ class Explorer:
 
         Starts whose course ends on an orbit of `known` are not followed to its end, nor closed again.
         """
-        kicks, met = self.search.kicks, []
+        starts, met = self.search.starts, []
         known = KnownOrbits(self.search, []) if known is None else known
         rows = []
-        for size, x0 in kicks.all(factors):
+        for size, x0 in starts.all(factors):
             course = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
             orbit = known.reached(course) or known.kept(self.close(x0, course, True))
             rows.append(self._row(size, course, orbit, x0))
@@ -173,7 +173,7 @@ class Explorer:
                 if low.fate != high.fate and UNDECIDED not in (low.fate, high.fate):
                     borders.append(self._border(low, high, longest, known))
                     _once(met, borders[-1].orbit)
-        return Fate(tuple(rows), tuple(borders), kicks.unit, met)
+        return Fate(tuple(rows), tuple(borders), starts.unit, met)
 
     def _row(self, size, course, orbit, x0) -> Start:
         fate = course.fate
@@ -187,7 +187,7 @@ class Explorer:
     def _wound(self, course, x0) -> float:
         """Factor by which controller states outgrew the block's during a divergence; 1 where they did not."""
         nc = self.search.loop.syslist[0].nstates or 0 if self.search.parts is not None else 0
-        core = self.search.kicks.core
+        core = self.search.starts.core
         if not nc or core is None or not course.crossings:
             return 1.0
         if not any(getattr(e, "corners", ()) for e, _ in core.input_channel):
@@ -203,7 +203,7 @@ class Explorer:
             middle = float(np.sqrt(below * above))
             if not below < middle < above:
                 break
-            x0 = self.search.kicks.state(middle)
+            x0 = self.search.starts.state(middle)
             course = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
             if course.fate == fates[0]:
                 below = middle

@@ -15,7 +15,7 @@ from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
 from ...status import Status
 from ..thresholds import NOTHING
-from .kicks import Kicks
+from .starts import Starts
 from .thresholds import (
     BEYOND,
     COURSE_RTOL,
@@ -24,8 +24,6 @@ from .thresholds import (
     FAINT,
     FEW,
     GONE,
-    LASTING_DECAY,
-    LASTING_GROWTH,
     LOOK,
     LOOK_POINTS,
     LOOK_RTOL,
@@ -42,6 +40,8 @@ from .thresholds import (
     STEPS,
     STRIDE,
     STRIDE_SAMPLES,
+    SUSTAINED_DECAY,
+    SUSTAINED_GROWTH,
     TENFOLD,
     WITHIN,
     WORK,
@@ -115,12 +115,12 @@ class PoincareSearch:
         )  # a held input steps: no passage to locate
         ints = engine.program.ints
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
-        self.kicks = Kicks(loop, engine)
-        self.stride = STRIDE * np.pi / self.kicks.pace  # ten swings at the loop's own pace
+        self.starts = Starts(loop, engine)
+        self.stride = STRIDE * np.pi / self.starts.pace  # ten swings at the loop's own pace
 
     @property
     def units(self) -> np.ndarray:
-        """What each state is measured in: the largest it becomes in the first swing from the largest kick."""
+        """What each state is measured in: the largest it becomes in the first swing from the largest."""
         return self._first_swing[0]
 
     @property
@@ -130,7 +130,7 @@ class PoincareSearch:
 
     @cached_property
     def _first_swing(self) -> tuple[np.ndarray, float]:
-        x0 = self.kicks.all()[-1][1]
+        x0 = self.starts.all()[-1][1]
         times = np.linspace(0.0, LOOK * self.stride, LOOK_POINTS)
         limits: Any = dict(rtol=LOOK_RTOL, log=1, max_steps=LOOK_WORK)
         run = self.engine.run(self.start(x0), times[-1], times=times, **limits)
@@ -234,7 +234,7 @@ class PoincareSearch:
     def _fades(self, crossings) -> bool:
         """Whether the swings shrink by a steady ratio where the block is a straight line: so they go on."""
         recent = crossings[-RECENT:]
-        if not max(c.peak for c in recent[-STEPS:]) * self._unit < WITHIN * self.kicks.straight:
+        if not max(c.peak for c in recent[-STEPS:]) * self._unit < WITHIN * self.starts.straight:
             return False
         return _endless([1 / max(crossing.peak, NOTHING) for crossing in recent], 1 / FAINT) > 0
 
@@ -337,7 +337,7 @@ def _tendency(crossings) -> str:
     now, earlier = _growth(crossings), _growth(crossings, 1)
     if not now > 0 or not earlier > 0 or max(now, 1 / now) < STEADY:
         return UNDECIDED
-    lasting = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
+    sustained = np.log(now) / np.log(earlier) if earlier != 1.0 else 0.0
     if now > 1.0:
-        return DIVERGES if lasting > LASTING_GROWTH else UNDECIDED
-    return RESTS if lasting > LASTING_DECAY else UNDECIDED
+        return DIVERGES if sustained > SUSTAINED_GROWTH else UNDECIDED
+    return RESTS if sustained > SUSTAINED_DECAY else UNDECIDED

@@ -103,10 +103,10 @@ SHRINK_FAR = 2.0
 # --- starts -----------------------------------------------------------------------------------------
 
 FACTORS = (0.3, 1.0, 0.1, 3.0, 0.03, 10.0)
-"""Sizes of kicks, of the scale, in the order tried."""
+"""Sizes of starts, of the scale, in the order tried."""
 
 INSIDE_STOPS = 0.9
-"""Share of the way to a stop that a kick may take."""
+"""Share of the way to a stop that a start may take."""
 
 DECADES, BENT, JUMPED = np.arange(-40.0, 41.0), 0.01, 1e6
 """Sizes over which a smooth law is asked where it bends; change of its slope, relative, from which it does;
@@ -166,12 +166,12 @@ RECENT, RECENT_CLOSED = 64, 12
 """Laps among which steady growths are looked for; among which the pair is that comes nearest to repeating."""
 
 BEYOND = 10.0
-"""Times the largest kick's first swing: growth at a steady ratio from there has no bound."""
+"""Times the largest start's first swing: growth at a steady ratio from there has no bound."""
 
 GONE = 1e4
-"""Times what the largest kick sets in motion: a loop beyond it has run away."""
+"""Times what the largest start sets in motion: a loop beyond it has run away."""
 
-STEADY, LASTING_GROWTH, LASTING_DECAY = 1.25, 0.5, 0.9
+STEADY, SUSTAINED_GROWTH, SUSTAINED_DECAY = 1.25, 0.5, 0.9
 """Change of the swings from the third to the last quarter of a course below which they keep their size, and
 the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
 quadratic)."""

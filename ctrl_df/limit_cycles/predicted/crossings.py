@@ -25,7 +25,7 @@ from .thresholds import (
     CROSSING_RANK,
     CROSSING_STEPS,
     CUTS,
-    HOPELESS,
+    GIVE_UP,
     LINE_HALVINGS,
     MARGIN,
     MOST_PER_CELL,
@@ -242,7 +242,7 @@ def _polish(D, p, q, reach, box, refine):
         settled = np.abs(step).max(axis=1) < SETTLED
         finished[active[settled | ~moved]] = True
         if iteration == SHOWS_BY:  # quadratic convergence shows by now; what has none sits at a jump
-            alive &= np.abs(value) < HOPELESS
+            alive &= np.abs(value) < GIVE_UP
         far = np.abs((x - start) / reach).max(axis=1) > STRAYED  # strayed: another start owns what is there
         alive &= ~far
         if refine:

@@ -58,7 +58,7 @@ MOST_STARTS = 600
 CROSSING_NUDGE = 1e-5
 """Of the difference quotients, in ln a and ln omega: error 1e-10 beside rounding 1e-10."""
 
-ACCEPT, CONVERGED, SETTLED, HOPELESS = 1e-8, 1e-14, 1e-13, 1e-3
+ACCEPT, CONVERGED, SETTLED, GIVE_UP = 1e-8, 1e-14, 1e-13, 1e-3
 """|1 + N H| of a crossing, and of one that needs no other step; step that moves nothing; |1 + N H| that
 quadratic convergence leaves behind after eight steps."""
 

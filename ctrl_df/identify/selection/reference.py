@@ -21,7 +21,7 @@ from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class Reference:
     """What models are judged by at one time of a search.
 
     Attributes
@@ -76,7 +76,7 @@ class Standing:
         base = self.base.train
         return self.nearest.nrmse > UNMOVED or -base.count * math.log(base.nrmse) < significant
 
-    def colour(self, noise: NoiseModel) -> NoiseModel:
+    def coloured(self, noise: NoiseModel) -> NoiseModel:
         """Return the noise if it forgets within the shortest segments, else white noise.
 
         What lasts longer is not told from something that is missing: nothing is conceded to it.
@@ -90,18 +90,18 @@ class Standing:
         return self.floor * (GROWN if self.least is None else self.grown(self.least, fit, noise))
 
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
-        """Return how many times larger noise alone may be over longer segments, by its colour and by chance.
+        """Return how many times larger noise alone may be over longer segments, by its memory and by chance.
 
         Of slow noise the initial states of short ones take a part, the more of them the more. `noise`: None:
         that which judges.
         """
         if near.sensitivity is None or far.sensitivity is None:
             return GROWN
-        colour = self.colour(noise or self.noise)
-        left = far.sensitivity.left_by_starts(colour) / near.sensitivity.left_by_starts(colour)
-        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / colour.memory))
+        coloured = self.coloured(noise or self.noise)
+        left = far.sensitivity.left_by_starts(coloured) / near.sensitivity.left_by_starts(coloured)
+        return max(GROWN, math.sqrt(left) * by_chance(far.spanned / coloured.memory))
 
-    def by_accelerations(self, free: tuple[str, ...]) -> Standing:
+    def by_accelerations(self, free: tuple[str, ...]) -> Reference:
         """Return the same where disturbance forces drown all else over longer segments.
 
         `free`: parameters of the model that are refitted.
@@ -111,7 +111,7 @@ class Standing:
         base = CandidateFit("", data.fit(self.nearest.model, free))
         return replace(self, segmentations=segmentations, data=data, base=base, noise=ranked(base, ())[1])
 
-    def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Standing:
+    def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Reference:
         """Refit the model from what the best candidates say of its parameters: it may have been stuck."""
         base = self.base
         for best in found[:2]:
@@ -124,7 +124,7 @@ class Standing:
         return replace(self, base=base)
 
 
-def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Standing:
+def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Reference:
     """Fit a model from its own values and from a regression of the force; return what the better comes to."""
     shortest, data = segmentations[:2]
     begins = [block]
@@ -142,7 +142,7 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
     noise = ranked(base, ())[1]
-    return Standing(segmentations, data, base, shortest.moved(base.train), noise, regressed=guess)
+    return Reference(segmentations, data, base, shortest.moved(base.train), noise, regressed=guess)
 
 
 def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:

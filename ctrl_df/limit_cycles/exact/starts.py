@@ -26,7 +26,7 @@ from .thresholds import (
 )
 
 
-class Kicks:
+class Starts:
     """Starts of one loop, by size.
 
     Parameters

@@ -8,7 +8,7 @@ from test_ladder import Data, climb
 
 import ctrl_df as cdf
 from ctrl_df.identify.selection import verdict
-from ctrl_df.identify.selection.lasting import Lasting, lasting
+from ctrl_df.identify.selection.long_prediction import LongPrediction, long_prediction
 
 T = np.arange(0, 4, 0.01)
 RECORD = cdf.Measurement(
@@ -47,7 +47,7 @@ def model(id, *errors):
     ],
 )
 def test_who_is_refuted(first, rival, base, ahead, refuted):
-    found = lasting([model("compliance", *first), model("gravity", *rival)], model("", *base), 20.0)
+    found = long_prediction([model("compliance", *first), model("gravity", *rival)], model("", *base), 20.0)
     assert found is not None and found.refuted == refuted and found.ahead == ahead
 
 
@@ -57,8 +57,8 @@ def refuting(*ids):
     def judged(ranking, base, significant):
         first, better = ranking[0].id, ("",)
         if first not in ids:
-            return Lasting(2.0, {first: 0.1, "": 0.5}, ())
-        return Lasting(2.0, {first: 0.9, "": 0.5}, better, True)
+            return LongPrediction(2.0, {first: 0.1, "": 0.5}, ())
+        return LongPrediction(2.0, {first: 0.9, "": 0.5}, better, True)
 
     return judged
 
@@ -69,7 +69,7 @@ def level(added):
 
 
 def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
-    monkeypatch.setattr(verdict, "lasting", refuting("hysteresis"))
+    monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
     data = Data({"": 0, "hysteresis": 600, "linear_spring": 500})
     data.top = 500
     monkeypatch.setattr(Data, "level", lambda self, block: level(self.added(block)))
@@ -81,6 +81,6 @@ def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
 
 
 def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):
-    monkeypatch.setattr(verdict, "lasting", refuting("hysteresis"))
+    monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
     first = climb(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
     assert first.verdict == "unknown" and first.ranking[0].id == "hysteresis"

@@ -17,11 +17,11 @@ from ...simulate.parallel import side_by_side
 from ..prediction.segments import facts
 from ..results.diagnosis import Baseline, CandidateEffect
 from ..thresholds import GROWTH, UNMOVED
-from .thresholds import LEFT, OUTLASTING
+from .thresholds import LEFT, LONG_RIVALS
 
 
 @dataclass(frozen=True)
-class Lasting:
+class LongPrediction:
     """How the first of some models does over long stretches.
 
     Attributes
@@ -50,13 +50,15 @@ class Lasting:
 
 
 def compared(ranking: Sequence[CandidateEffect], significant: float) -> list[CandidateEffect]:
-    """Return what `lasting` compares with the baseline: the first of a ranking, and those nearest to it."""
+    """Return what is compared with the baseline: the first of a ranking, and those nearest to it."""
     first, *others = ranking
     near = [c for c in others if c.confirmed and c.evidence > significant and c.id not in first.equivalents]
-    return [first, *near[:OUTLASTING]]
+    return [first, *near[:LONG_RIVALS]]
 
 
-def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: float) -> Lasting | None:
+def long_prediction(
+    ranking: Sequence[CandidateEffect], base: Baseline, significant: float
+) -> LongPrediction | None:
     """Compare the first of a ranking with its rivals over all stretches up to the longest that one predicts.
 
     Errors count by their geometric mean over these lengths, each as much as any other: what follows long ones
@@ -75,7 +77,7 @@ def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: flo
 
     Returns
     -------
-    Lasting or None
+    LongPrediction or None
         None where there is nothing to predict.
     """
     first = ranking[0]
@@ -89,7 +91,7 @@ def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: flo
     table = np.maximum([c.nrmse for c in curves], noise)  # errors below tell nothing
     told = np.flatnonzero(np.min(table, axis=0) < UNMOVED)
     if not told.size:
-        return Lasting(0.0, dict(zip(names, table[:, 0].tolist(), strict=True)), ())
+        return LongPrediction(0.0, dict(zip(names, table[:, 0].tolist(), strict=True)), ())
     table = table[:, : told[-1] + 1]
     usual = dict(zip(names, np.exp(np.mean(np.log(table), axis=1)).tolist(), strict=True))
     better = sorted((n for n in names if GROWTH * usual[n] < usual[first.id]), key=usual.__getitem__)
@@ -98,4 +100,4 @@ def lasting(ranking: Sequence[CandidateEffect], base: Baseline, significant: flo
     errors = dict(zip(names, table[:, shown].tolist(), strict=True))
     farthest = dict(zip(names, table[:, -1].tolist(), strict=True))
     nothing = farthest[first.id] >= UNMOVED and any(farthest[n] < LEFT for n in better)
-    return Lasting(float(curves[0].horizon[shown]), errors, tuple(better), "" in better or nothing)
+    return LongPrediction(float(curves[0].horizon[shown]), errors, tuple(better), "" in better or nothing)
