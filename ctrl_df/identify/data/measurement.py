@@ -19,7 +19,7 @@ from . import derivatives, quantities, readers
 from .checks import as_channel, check_input, check_jumps, check_output, check_times
 from .frequency_measurement import FrequencyMeasurement
 from .parts import in_parts
-from .thresholds import MINIMUM, REGULAR, THINNED_BAND, WINDOW_LEAST
+from .thresholds import DECIMATED_BAND, MINIMUM, REGULAR, WINDOW_LEAST
 
 __all__ = ["FrequencyMeasurement", "Measurement"]
 
@@ -454,7 +454,7 @@ class Measurement:
         u = derivatives.block_means(self.u, factor) if held else derivatives.decimated(self.u, factor)
         return self.replaced(
             t=self.t[::factor], u=u, outputs=outputs, velocity=velocity, channels=MappingProxyType(channels),
-            band=THINNED_BAND,
+            band=DECIMATED_BAND,
         )  # fmt: skip
 
     def _part(self, where, name):
