@@ -12,10 +12,17 @@ from ..residuals.missing_forces import FreeForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
 from ..shooting.noise_model import NoiseModel
+from ..smoothing.missing_force import missing_force
 from ..thresholds import BY_CHANCE, NOTHING
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
-from .thresholds import FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+from .thresholds import CURVE_TOLD, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+
+CURVES = {
+    "time": "time", "position": "position", "velocity": "low_speed", "load": "load",
+    "reversal": "after_reversal",
+}  # fmt: skip
+"""Region of an error that a force makes which is a curve over a quantity."""
 
 
 def remainder(
@@ -118,17 +125,30 @@ def located(
     """Return where the error of the baseline is, or (`unknown`) that which nothing explains."""
     shown, missed = base, left.about
     if unknown:
-        # An effect that stands in for the one missing bends what it leaves: look where least remains.
+        # what the model misses, which an effect that stands in for it would bend; where that shows in long
+        # segments alone, what the best one misses
         before = missing_forces(base, data, noise)
-        if not before or (missed and missed[0].left < before[0].left):
-            shown = best
-        else:
+        if before and before[0].evidence > significant:
             missed = before
+        else:
+            shown = best
     where = find_regions(shown, data.train)
     if not unknown:
         return Located(where, tuple(where.kinds) if where is not None else ())
-    kinds = tuple(m.kind for m in missed if m.evidence > FORCE_ALIKE * missed[0].evidence - significant)
-    return Located(where, kinds, _sentences(left, missed, where, measure))
+    kinds = [m.kind for m in missed if m.evidence > FORCE_ALIKE * missed[0].evidence - significant]
+    kinds += [k for k in _curve(base, data) if k not in kinds]
+    return Located(where, tuple(kinds), _sentences(left, missed, where, measure))
+
+
+def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
+    """Return the region in which the smoothed missing force of the longest record is a curve, if any."""
+    record = max(data.train.records, key=len)
+    try:
+        force = missing_force(base.block, record)
+    except ValueError:  # it is not to be had of this record
+        return []
+    name, share = next(iter(force.shares.items()))
+    return [CURVES[name]] if force.significant and share > CURVE_TOLD else []
 
 
 def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:

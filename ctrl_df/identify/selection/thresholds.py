@@ -56,6 +56,10 @@ FOLLOWED = 0.05
 law leaves that where the input is not known exactly (a moving base read by an accelerometer: 0.015), one that
 stands in for another law more (rigs with something unknown hidden: 0.07 and more)."""
 
+CURVE_TOLD = 0.15
+"""Share of a missing force that is a curve over one quantity from which on that quantity is told: others came
+to 0.1 at most beside the right one (rigs with something unknown hidden)."""
+
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
 
