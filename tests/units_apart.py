@@ -80,7 +80,9 @@ def driven(seed):
     """Return a record of voltage and motion of a motor against a spring."""
     rng, t = np.random.default_rng(seed), 2e-3 * np.arange(1500)
     volts = 3.0 * np.sin(4.0 * t + seed) + 2.0 * np.sin(11.0 * t) + np.sin(23.0 * t)
-    x, _ = np.asarray(cdf.event_response(MOTOR.with_effect(cdf.LinearSpring(40.0)), t, volts).outputs)
+    x, _ = np.asarray(
+        cdf.event_response(MOTOR.with_effect(cdf.LinearSpring(40.0)), t, volts, input_hold="zoh").outputs
+    )
     noise = 1e-3 * np.std(x) * rng.standard_normal(t.size)
     return cdf.Measurement(t, volts, x + noise, input_unit="V", output_unit="m")
 
