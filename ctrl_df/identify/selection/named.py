@@ -73,7 +73,9 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     if found.rmse > FLOOR * at.floor:
         # a minimum beside the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
-    if undetermined(found) - undetermined(tried.train):
+    # a static level is found by trying, as single samples pass it: slopes know nothing of it
+    levels = {k for k in names if tried.block.parameters[k].threshold}
+    if undetermined(found) - undetermined(tried.train) - levels:
         return tried
     there = data.as_it_is(found)
     there = replace(there, covariance=found.covariance, at_bound=found.at_bound, null=found.null)
