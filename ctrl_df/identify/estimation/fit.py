@@ -212,16 +212,26 @@ class FitResult:
         return dict(zip(self.names, np.sqrt(np.diag(self.whole_covariance)).tolist(), strict=True))
 
     @property
+    def names_at_bound(self) -> set[str]:
+        """Parameters that end at a bound of their range."""
+        return {name for name, bound in zip(self.names, self.at_bound, strict=True) if bound}
+
+    @property
     def whole_covariance(self) -> np.ndarray:
         """The covariance, infinite and by itself for parameters that take part in a null direction."""
         if not len(self.covariance):
             return self.covariance
         found = self.covariance.copy()
-        part = {name for _, parts in self.null for name, _, _ in parts if name not in self.own}
+        part = in_null_directions(self)
         lost = np.array([name in part for name in self.names])
         found[lost], found[:, lost] = 0.0, 0.0
         found[lost, lost] = math.inf
         return found
+
+
+def in_null_directions(found: FitResult) -> set[str]:
+    """Return the parameters in a null direction but those that every record has for itself."""
+    return {name for _, parts in found.null for name, _, _ in parts if name not in found.own}
 
 
 def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=None) -> list[float | None]:

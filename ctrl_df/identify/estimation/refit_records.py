@@ -17,7 +17,7 @@ from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
-from .fit import FitResult, fit_records, fit_segments
+from .fit import FitResult, fit_records, fit_segments, in_null_directions
 from .multistart import nonsmooth_names, restarted
 from .per_record import begun_with_angles, unknown_angles
 from .segmented import prepare
@@ -152,11 +152,6 @@ def undetermined(found: FitResult) -> set[str]:
         if k not in found.own and (not math.isfinite(error) or error > max(abs(value), scale)):
             names.add(k)
     return names | {k for k, own in found.own.items() if not any(v.determined for v in own.values())}
-
-
-def in_null_directions(found: FitResult) -> set[str]:
-    """Return the parameters in a null direction but those that every record has for itself."""
-    return {k for _, parts in found.null for k, _, _ in parts if k not in found.own}
 
 
 def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:

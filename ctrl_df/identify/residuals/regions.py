@@ -88,6 +88,7 @@ class Regions(tuple[Region, ...]):
 
     heading: ClassVar[str] = "where the error is"
     measure: ClassVar[str] = "share of squared error [%]\n(black: of the samples)"
+    columns: ClassVar[str] = f"{'kind':<15} {'region':<34} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"
 
     @property
     def significant(self) -> Regions:
@@ -114,13 +115,15 @@ class Regions(tuple[Region, ...]):
 
     def table(self, rows: int = 12) -> str:
         """Return the worst `rows` regions as text."""
-        lines = [f"{'kind':<15} {'region':<34} {'error':>7} {'samples':>8} {'p':>8} {'bias':>6}"]
-        for r in self[:rows]:
-            lines.append(
-                f"{r.kind:<15} {r.label:<34} {r.share:>7.1%} {r.expected_share:>8.1%} {chance(r.p_value):>8} "
-                f"{r.bias:>+6.2f}"
-            )
-        return "\n".join(lines)
+        return "\n".join([self.columns, *(self.line(r) for r in self[:rows])])
+
+    @staticmethod
+    def line(r: Region) -> str:
+        """Return a region as a line of the table."""
+        return (
+            f"{r.kind:<15} {r.label:<34} {r.share:>7.1%} {r.expected_share:>8.1%} {chance(r.p_value):>8} "
+            f"{r.bias:>+6.2f}"
+        )
 
 
 def error_regions(

@@ -276,8 +276,8 @@ def _screened(begun, screen: Screen) -> list[CandidateFit]:
 
 def distinct(tried: CandidateFit, span) -> bool:
     """Whether the newest effect is what its name says over the stroke `span` [m]."""
-    own, pairs = tried.block.newest + ".", zip(tried.train.names, tried.train.at_bound, strict=True)
-    at_bound = {name.removeprefix(own) for name, bound in pairs if bound and name.startswith(own)}
+    own = tried.block.newest + "."
+    at_bound = {name.removeprefix(own) for name in tried.train.names_at_bound if name.startswith(own)}
     return tried.block.effects[-1].distinct(span, at_bound)
 
 

@@ -147,8 +147,10 @@ def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
         force = missing_force(base.block, record)
     except ValueError:  # it is not to be had of this record
         return []
+    if not force.significant:
+        return []
     name, share = next(iter(force.shares.items()))
-    return [CURVES[name]] if force.significant and share > CURVE_TOLD else []
+    return [CURVES[name]] if share > CURVE_TOLD else []
 
 
 def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:

@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 
 from ..course import Course
-from ..estimation.refit_records import cannot_be_told_apart, in_null_directions, undetermined
+from ..estimation.fit import in_null_directions
+from ..estimation.refit_records import cannot_be_told_apart, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -157,8 +158,7 @@ class StructureSearch(Search):
         proved = {
             f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.at.data.filtered)
         }
-        at_bound = {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
-        doubtful = (at_bound - proved) | undetermined(fit)
+        doubtful = (fit.names_at_bound - proved) | undetermined(fit)
         # a static level is found by trying, as single samples pass it: slopes know nothing of it
         table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
         own = [k for k in own_names(judged.block) if not table[k].threshold]
@@ -176,18 +176,10 @@ class StructureSearch(Search):
         Those that the data leave free to be what the model states are not meant: two standard errors.
         """
         stated, errors = self.block.parameters, self.standard_errors(judged)
-        with_it, without = (
-            {k for k, bound in zip(fit.names, fit.at_bound, strict=True) if bound}
-            for fit in (judged.train, self.at.base.train)
-        )
-        values = judged.train.parameters
-        return tuple(
-            sorted(
-                k
-                for k in with_it - without - set(own_names(judged.block))
-                if SIZE_KNOWN * abs(values[k] - stated[k].value) > errors.get(k, math.inf)
-            )
-        )
+        fit, values = judged.train, judged.train.parameters
+        moved = fit.names_at_bound - self.at.base.train.names_at_bound - set(own_names(judged.block))
+        far = (k for k in moved if SIZE_KNOWN * abs(values[k] - stated[k].value) > errors.get(k, math.inf))
+        return tuple(sorted(far))
 
     def open_directions(self):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""

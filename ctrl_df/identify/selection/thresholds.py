@@ -57,8 +57,9 @@ law leaves that where the input is not known exactly (a moving base read by an a
 stands in for another law more (rigs with something unknown hidden: 0.07 and more)."""
 
 CURVE_TOLD = 0.15
-"""Share of a missing force that is a curve over one quantity from which on that quantity is told: others came
-to 0.1 at most beside the right one (rigs with something unknown hidden)."""
+"""Share of a missing force that is a curve over one quantity from which on that quantity is told. On 40 rigs
+with something unknown hidden 19 came to it, and for 16 of them the quantity was the right one; under steps of
+force three had a curve after reversals in the place of one over time or position, of 0.37 to 0.54."""
 
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""

@@ -75,8 +75,9 @@ def diagnosed(
     def so_far(known) -> Diagnosed:
         return _Asked(known[0], began, limits).so_far(known[1])
 
-    def rest(block, part: Course) -> Diagnosis | None:
-        return None if beside is None else diagnosed(beside(block), classes, executor, part).diagnosis
+    def rest(block, part: Course) -> Diagnosis:
+        assert beside is not None
+        return diagnosed(beside(block), classes, executor, part).diagnosis
 
     course = (course or Course()).within(so_far)
     first: Diagnosed | None = None
@@ -86,7 +87,9 @@ def diagnosed(
         after, found = search.candidates(left, executor, course)
         after, chosen = after.confirm(found, course)
         course.stage("verdict")
-        known, fallen = _Asked(after, began, limits, refuted).answer(chosen, found, course, rest)
+        known, fallen = _Asked(after, began, limits, refuted).answer(
+            chosen, found, course, rest if beside else None
+        )
         ranking = known.diagnosis.ranking
         if first is not None and not (ranking and worth(ranking[0], after)):
             return first  # without what was refuted nothing is explained
@@ -117,7 +120,7 @@ class _Asked:
         return Diagnosed(replace(result, explanation=explain_so_far(result, search.words)), search)
 
     def answer(
-        self, chosen: Sequence, found: Sequence, course: Course, rest: Callable
+        self, chosen: Sequence, found: Sequence, course: Course, rest: Callable[..., Diagnosis] | None
     ) -> tuple[Diagnosed, tuple[str, str] | None]:
         """Return what confirmed candidates amount to, `found` beside them; and the first if it is refuted.
 
@@ -125,7 +128,8 @@ class _Asked:
         anew in each, has set the pace at which others were given up: they are worth a look without it.
 
         Where the first leaves more than noise a second effect is missing beside it, or it stands in for one
-        outside the library. `rest(block, course)` tells: the diagnosis of the model with the first.
+        outside the library. `rest(block, course)` tells: the diagnosis of the model with the first;
+        None: that is asked elsewhere.
         """
         search = self.search
         best = chosen[0] if chosen else search.base
@@ -169,12 +173,11 @@ class _Asked:
                 # refuted: what is missing is what the model leaves without it
                 best, remainder = search.base, search.remainder(search.base, False)
             verdict = lasts if verdict == EFFECT else verdict
-        if verdict in (EFFECT, AMBIGUOUS) and remainder.more and not silent:
+        if rest is not None and verdict in (EFFECT, AMBIGUOUS) and remainder.more and not silent:
             course.stage(f"what {ranking[0].id.replace('_', ' ')} leaves")
             second = rest(best.block, course.within(lambda _: (search, chosen)))
-            if second is not None:
-                verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
-                doubts = (*doubts, leaves(ranking[0], second))
+            verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
+            doubts = (*doubts, leaves(ranking[0], second))
         doubts = (*doubts, *(why for _, why in self.refuted), *search.open_directions())
         result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)

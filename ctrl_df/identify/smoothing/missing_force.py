@@ -40,12 +40,12 @@ class Curves(Regions):
     heading: ClassVar[str] = "what the missing force is"
     measure: ClassVar[str] = "share of its square [%]"
 
-    def table(self, rows: int = 12) -> str:
-        """Return the largest `rows` shares as text."""
-        lines = [f"{'what the missing force is':<52} {'share':>6} {'p':>8}"]
-        for r in self[:rows]:
-            lines.append(f"{f'{r.kind} {r.label}':<52} {r.share:>6.1%} {chance(r.p_value):>8}")
-        return "\n".join(lines)
+    columns: ClassVar[str] = f"{heading:<52} {'share':>6} {'p':>8}"
+
+    @staticmethod
+    def line(r: Region) -> str:
+        """Return what a force is made of as a line of the table."""
+        return f"{f'{r.kind} {r.label}':<52} {r.share:>6.1%} {chance(r.p_value):>8}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,44 +140,20 @@ class MissingForce:
             return Curves()
         words, (own, constant) = self.words, self.made
         size = f"the missing {words['force']} ({digits(self.rms)} {self.unit} rms)"
+        makes = f"of {size} is what other values of the model's parameters make"
         told = [
-            (
-                own,
-                "parameters",
-                "of the model",
-                f"of {size} is what other values of the model's parameters make",
-            ),
-            (constant, "constant", words["force"], f"of {size} is a constant {words['force']}"),
-        ]
-        found = [
-            Region(
-                kind,
-                label,
-                share,
-                0.0,
-                float(share < MADE_LEAST),
-                0.0,
-                1.0,
-                (-inf, inf),
-                f"{share:.0%} {said}.",
-            )
-            for share, kind, label, said in told
-        ]
+            (own, "parameters", "of the model", float(own < MADE_LEAST), makes),
+            (constant, "constant", words["force"], float(constant < MADE_LEAST),
+             f"of {size} is a constant {words['force']}"),
+        ]  # fmt: skip
         rest = f"of what parameters leave of {size} is a curve over the"
         for name, curve in self._curves.items() if self._left else ():
-            found.append(
-                Region(
-                    "curve",
-                    f"over the {words[name]}",
-                    curve.share,
-                    0.0,
-                    curve.p_value,
-                    0.0,
-                    1.0,
-                    (-inf, inf),
-                    f"{curve.share:.0%} {rest} {words[name]}.",
-                )  # fmt: skip
-            )
+            said = f"{rest} {words[name]}"
+            told.append((curve.share, "curve", f"over the {words[name]}", curve.p_value, said))
+        found = [
+            Region(kind, label, share, 0.0, p_value, 0.0, 1.0, (-inf, inf), f"{share:.0%} {said}.")
+            for share, kind, label, p_value, said in told
+        ]
         return Curves(sorted(found, key=lambda region: (region.p_value >= LEVEL, -region.share)))
 
     def curve(self, against: str) -> Curve:
