@@ -12,7 +12,7 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
 from ctrl_df.identify.selection.evidence import ranked
-from ctrl_df.identify.selection.verdict import worth
+from ctrl_df.identify.selection.verdict import favoured_held_out, worth
 from ctrl_df.identify.shooting.variables import Variable
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
@@ -134,3 +134,24 @@ def test_an_encoder_fitted_to_small_motions_is_found_in_large_ones():
         records.append(cdf.Measurement(t, force, x))
     found = cdf.diagnose(PLAIN, records[0], holdout=records[1], candidates=["sensor_quantization"])
     assert found.verdict == "effect" and found.ranking[0].parameters["step"] == pytest.approx(step, rel=1e-3)
+
+
+def candidate(id, fitted, held, same=()):
+    """Return a candidate of a ranking with these log-likelihoods of its records."""
+    return SimpleNamespace(
+        id=id, evidence=fitted + held, evidence_holdout=held, confirmed=True, equivalents=same
+    )
+
+
+@pytest.mark.parametrize(
+    "rival, favoured",
+    [
+        (candidate("bristle", 100.0, 90.0), ["bristle"]),  # the records contradict each other
+        (candidate("bristle", 100.0, 52.0), []),  # by chance
+        (candidate("bristle", 400.0, 20.0), []),
+        (candidate("bristle", 100.0, 90.0, same=("backlash",)), []),
+    ],
+)
+def test_a_rival_that_the_held_out_data_favour(rival, favoured):
+    first = candidate("backlash", 500.0, 50.0, same=("bristle",) if rival.equivalents else ())
+    assert [c.id for c in favoured_held_out([first, rival], 5.0)] == favoured

@@ -43,6 +43,16 @@ def unconfirmed(first) -> str:
     )
 
 
+def contradict(first, rival) -> str:
+    """Return that the fitted data favour the first effect, and the held-out data a rival."""
+    fitted = first.evidence_fitted - rival.evidence_fitted
+    held = rival.evidence_holdout - first.evidence_holdout
+    return (
+        f"The fitted data favour {named(first.effect)} (log-likelihood higher by {fitted:.0f}), the held-out "
+        f"data {named(rival.effect)} (by {held:.0f}): neither is all that is missing."
+    )
+
+
 def explain(d, words) -> str:
     """Return the verdict of a `Diagnosis` in sentences; `words`: those of its data (`Words`)."""
     first: Any = d.ranking[0] if d.ranking else None
