@@ -118,3 +118,21 @@ def test_what_is_not_determined_has_an_infinite_error():
     assert np.all(np.isnan(fit.correlation)) and "cannot be told apart" in fit.report()
     held = cdf.refit(fit.model, fit.comparison.records[0].record, free=["mass", "coulomb", "viscous"])
     assert all(p.standard_error < 1e-4 for p in held.parameters.values())  # seen: 2e-5
+
+
+@pytest.mark.parametrize("looped", [False, True])
+def test_a_static_level_is_known_to_what_single_samples_leave_open(looped):
+    """Slopes know nothing of it: by these alone it was 13 and 29 of its standard errors off on two rigs."""
+    rng = np.random.default_rng(3)
+    t = 1e-3 * np.arange(3000)
+    steps = np.repeat(rng.uniform(-4, 4, 60), 50)
+    true = PLAIN.with_effect(cdf.Stiction(1.6))
+    model = cdf.closed_loop(cdf.pid(40.0, 0.0, 3.0), true) if looped else true
+    u = 0.02 * steps if looped else steps
+    blank = Measurement(t, u, np.sin(t), input_hold="zoh")
+    y = np.asarray(cdf.event_response(model, t, u, input_hold="zoh").outputs)[0]
+    record = blank.replaced(outputs={"position": y + 1e-6 * rng.standard_normal(len(t))})
+    fit = cdf.refit(model, record, ["mass", "stiction.level"], start={"stiction.level": 1.7}, budget=60)
+    found = fit.parameters["stiction.level"]
+    assert 1e-3 * found.value < found.standard_error < 0.2 * found.value
+    assert abs(found.value - 1.6) < 3 * found.standard_error

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...simulate.parallel import side_by_side
-from ..prediction.values import feasible
+from ..prediction.values import block_of, with_values
 from ..shooting.thresholds import BETTER
 from ..thresholds import GIVE_UP, GROWTH, STILL_POSSIBLE
 from .common_friction import dry_level
@@ -125,7 +125,7 @@ def _other(found: FitResult, data: SegmentedData, values, give_up: float) -> Fit
     table = found.model.parameters
     shared = {k: v for k, v in values.items() if k in table}
     if shared:
-        model = found.model.with_parameters(feasible(found.model, shared))
+        model = with_values(found.model, shared)
         again = _begun(model, found.names, found.starts, data, give_up)
         found = min(found, again, key=lambda f: f.rmse)
     return restarted(found, data.fit, own(found), give_up)
@@ -157,7 +157,7 @@ def cross_started(
         values |= {f"{mine}.{k}": p.value for k, p in like.parameters.items()}
     elif not frictions or not any(name.startswith(f"{mine}.") for name in values):
         return None
-    block = tried.block.with_parameters(feasible(tried.block, values))
+    block = with_values(tried.block, values)
     near = data.fit(block, (), starts=best.train.starts, iterations=NEAR_STATES)
     if near.rmse > GIVE_UP * best.train.rmse:
         return None
@@ -174,7 +174,7 @@ def begun_as(tried: CandidateFit, nearer: CandidateFit, data: SegmentedData) -> 
         return tried
     known = nearer.train.parameters
     shared = {name: known[name] for name in tried.train.names if name in known}
-    block = tried.block.with_parameters(feasible(tried.block, shared))
+    block = with_values(tried.block, shared)
     starts = data.starts_as(block, data.train.records, nearer.train)
     near = data.fit(block, (), starts=starts, iterations=NEAR_STATES, give_up=tried.train.rmse)
     if near.rmse < BETTER * tried.train.rmse:
@@ -205,23 +205,17 @@ def _from_base(found: FitResult, base: FitResult, data: SegmentedData, give_up: 
     if effect.proportional:
         size = next(iter(effect.parameters))
         values[f"{key}.{size}"] = NEXT_TO_NOTHING * effect.values[0]
-    model = model.with_parameters(feasible(model, values))
+    model = with_values(model, values)
     starts = data.starts_as(model, data.train.records, base)
     again = _begun(model, found.names, starts, data, found.rmse)
     return min(found, again, key=lambda f: f.rmse)
 
 
 def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit:
-    """Choose thresholds by the segments to validate on, within what the segments fitted leave open.
-
-    What is left open is their error: single samples pass a static level, and slopes know nothing of it.
-    """
-    table, spreads = tried.block.parameters, {}
+    """Choose thresholds by the segments to validate on, within what the segments fitted leave open."""
+    table = tried.block.parameters
     for name in [n for n in tried.train.names if table[n].threshold]:
-        low, high = _open_range(tried.train, data.fit, name)
-        # nothing nearer was tried; the spread of a uniform distribution
-        least = 2 * OPEN_RANGE[0] * tried.train.parameters[name]
-        spreads[name] = max(high - low, least) / math.sqrt(12)
+        low, high = left_open = _open_range(tried.train, data.fit, name)
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, LEVELS_BETWEEN)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
@@ -230,8 +224,27 @@ def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit
                 tried = runs[i]
             low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
         train = data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
-        tried = replace(tried, train=train.with_errors(spreads))
+        error = _uniform(tried.block.parameters[name].value, *left_open)
+        tried = replace(tried, train=train.with_errors({name: error}))
     return tried
+
+
+def thresholds_known(found: FitResult, fit: Callable[..., FitResult]) -> FitResult:
+    """Return a fit with the standard errors of its thresholds: single samples pass them, slopes know nothing.
+
+    `fit`: as for `restarted`, over the segments of `found`.
+    """
+    table = block_of(found.model).parameters
+    names = [n for n in found.names if table[n].threshold and n not in found.own]
+    ranges = {name: _open_range(found, fit, name) for name in names}
+    return found.with_errors({k: _uniform(table[k].value, *ends) for k, ends in ranges.items()})
+
+
+def _uniform(value: float, low: float, high: float) -> float:
+    """Return the rms distance of a value from one anywhere between two, or as near as any other was tried."""
+    tried = OPEN_RANGE[0] * value
+    below, above = max(value - low, tried), max(high - value, tried)
+    return math.sqrt((below**3 + above**3) / (3 * (below + above)))
 
 
 def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> CandidateFit:
@@ -249,19 +262,20 @@ def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> t
             moved = _moved(found.model, name, value)
             if fit(moved, (), starts=found.starts, iterations=GLANCE).rmse > SAME * found.rmse:
                 break
-            edge = moved.parameters[name].value
+            edge = block_of(moved).parameters[name].value
         edges.append(edge)
     return edges[0], edges[1]
 
 
 def _moved(model, name, value):
-    values, table, shared = {name: value}, model.parameters, dry_level(model)
-    effect = model.named_effects.get(name.partition(".")[0])
+    block = block_of(model)
+    values, table, shared = {name: value}, block.parameters, dry_level(block)
+    effect = block.named_effects.get(name.partition(".")[0])
     if shared is not None and effect is not None and effect.role == "friction" and effect.side == "load":
         # the sum of both shows best: what the load gains the motor loses
         motor, more = table[shared].value, value - table[name].value
         values[shared] = max(motor - more, MOTOR_LEAST * motor)
-    return model.with_parameters(feasible(model, values))
+    return with_values(model, values)
 
 
 def _within(found, name, value):

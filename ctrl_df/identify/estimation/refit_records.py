@@ -18,7 +18,7 @@ from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..shooting.variables import priors, step_of_sensor
 from ..thresholds import PROCESS_NOISE
 from .fit import FitResult, fit_records, fit_segments, in_null_directions
-from .multistart import nonsmooth_names, restarted
+from .multistart import nonsmooth_names, restarted, thresholds_known
 from .per_record import begun_with_angles, unknown_angles
 from .segmented import prepare
 from .thresholds import EFFORT_REFIT, HOLDOUT_PARTS, POLISH
@@ -66,15 +66,14 @@ def refit_records(
             settings["window"] = short
             # from the start again: longer segments may have left the right minimum (of a ripple, say)
             found = fit_records(model, records, start, names, coarse=False, iterations=steps, **settings)
+    beside = _Beside(records, found.segments, priors(block_of(model), prior))
     if nonsmooth_names(found):
-        better = restarted(
-            found, _Beside(records, found.segments, priors(block_of(model), prior)), nonsmooth_names(found)
-        )
+        better = restarted(found, beside, nonsmooth_names(found))
         if better is not found:
             found = fit_records(
                 better.model, records, None, names, coarse=False, starts=better.starts, **settings
             )
-    found = _with_step(found, records, names, whole)
+    found = thresholds_known(_with_step(found, records, names, whole), beside)
     # a model that errs over short segments of its own fit would look better than it is
     seen = found if shown is None else fit_records(found.model, records, None, (), **shown)
     return found, seen
@@ -123,7 +122,7 @@ class _Beside:
     def __init__(self, records, segments, about):
         self.records, self.segments, self.about = records, segments, about
 
-    def __call__(self, model, names, *, starts, iterations, give_up) -> FitResult:
+    def __call__(self, model, names, *, starts, iterations, give_up=math.inf) -> FitResult:
         return fit_segments(
             model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
             give_up=give_up, about=self.about,

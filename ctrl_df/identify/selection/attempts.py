@@ -132,7 +132,9 @@ def tried(
 
     kinds = [c for c in classes if applicable(c, screen.block)]
     user = screen.block.with_parameters(feasible(screen.block, dict(nominal)))
-    places = _Places(screen, short, screen.data.states_of(user), tuple(nominal.items()))
+    states = screen.data.states_of(user)
+    about = screen.data.fit(user, tuple(free), starts=states.starts, iterations=0)
+    places = _Places(screen, short, Screen(about, screen.data), tuple(nominal.items()))
     joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
     begun = run(_begin, [(c, screen, places, free, known) for c in kinds])
     if screened is not None:
@@ -159,15 +161,15 @@ class _Places:
     screen : Screen
     short : SegmentedData or None
         Where those of effects with many minima do; None: where all others do.
-    user : FitResult
-        The model without an effect as the user has it, over the segments of the screen.
+    user : Screen
+        About the model as the user has it.
     values : tuple of (str, float)
         What the user has.
     """
 
     screen: Screen
     short: SegmentedData | None
-    user: FitResult
+    user: Screen
     values: tuple[tuple[str, float], ...]
 
     def data(self, multimodal: bool) -> SegmentedData:
@@ -183,7 +185,7 @@ class _Places:
         if (self.short is not None and multimodal) or (values and values != self.values):
             return None
         data = self.screen.data
-        return data.starts_as(block, data.train.records, self.user if values else self.screen.base)
+        return data.starts_as(block, data.train.records, self.user.base if values else self.screen.base)
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +332,9 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
         if i and not starts[0].values and start.left > share * starts[0].left + beyond:
             break
         found.append(_from(start, screen, places, free))
-    if cls.multimodal or screen.block.core.bodies == 2:
+    if not (cls.multimodal or screen.block.core.bodies == 2):
+        found.append(_from_user(cls, screen, places, free, starts))
+    else:
         # The baseline may have bent far from the truth to make up for what is missing: begin where the user
         # does. What changes in proportion to its size finds that within a step.
         several = cls.multimodal or not cls.proportional
@@ -338,6 +342,21 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
             attempt = _from(Start(effect, 0.0, places.values), screen, places, free)
             found.append(attempt and replace(attempt, nominal=True))
     return starts, [a for a in found if a is not None]
+
+
+def _from_user(cls, screen: Screen, places: _Places, free, starts) -> Attempt | None:
+    """Return the attempt that begins at the user's values; None where `starts` promise no larger error.
+
+    A model without an effect as strong as all else is bent by the refit far from the truth, where nothing
+    that is small beside it explains much.
+    """
+    about = places.user
+    promised = [s.left * screen.power for s in starts if s.left > 0]
+    own = [s for s in starts_for(cls, about, proposals(cls, about), 1) if s.left > 0]
+    if not own or own[0].left * about.power >= min(promised, default=math.inf):
+        return None
+    attempt = _from(Start(own[0].effect, own[0].left, places.values), screen, places, free)
+    return attempt and replace(attempt, nominal=True)
 
 
 def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:

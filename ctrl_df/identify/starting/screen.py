@@ -51,6 +51,11 @@ class Screen:
         self.simulators = [data.simulator(base.model, r) for r in self.view.records]
 
     @property
+    def power(self) -> float:
+        """Sum of the squared residual."""
+        return float(self.residual @ self.residual)
+
+    @property
     def scales(self) -> Scales:
         """Typical sizes in the records."""
         return self.data.scales
@@ -72,7 +77,7 @@ class Screen:
 
     def step(self) -> float:
         """Return the step of the grid to which measured values keep [m]; 0 where there is none."""
-        noise = math.sqrt(float(self.residual @ self.residual) / len(self.residual))
+        noise = math.sqrt(self.power / len(self.residual))
         return value_grid(np.concatenate(self.data.train.outputs), noise)
 
     def force_fit(self, columns) -> ForceFit:
@@ -118,7 +123,7 @@ class Screen:
 def starts_for(cls, screen: Screen, proposed, keep: int = 2) -> list[Start]:
     """Return the best start values for one effect class, best first; `proposed`: effects of it."""
     found: list[Start] = []
-    total = float(screen.residual @ screen.residual)
+    total = screen.power
     for effect in proposed:
         found += _judged(effect, screen, total)
     found.sort(key=lambda s: s.left)
