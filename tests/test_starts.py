@@ -11,6 +11,7 @@ from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.selection.alike import begun_like_better
+from ctrl_df.identify.selection.attempts import _begin, _Places
 from ctrl_df.identify.selection.rounding import rounding_evidence
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.variables import default_free
@@ -189,3 +190,21 @@ def test_what_drove_a_lag_before_the_record_is_found():
     found = fit.parameters["input_lag.time_constant"]
     assert abs(found.value - 0.04) < 3 * found.standard_error < 1e-3
     assert fit.comparison.white and fit.comparison.rmse < 1.1e-5
+
+
+def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
+    """Refitted without the drift the model is bent: what is small beside that explains nothing."""
+    rng = np.random.default_rng(2)
+    t = 2.4e-3 * np.arange(2500)
+    machine = cdf.Inertia(1e-5).with_effect(cdf.Viscous(1.6e-4)).with_effect(cdf.LinearSpring(0.01))
+    u = 0.02 * np.interp(t, t[::125], rng.uniform(-1, 1, 20))
+    blank = cdf.Measurement(t, u, np.sin(t), input_unit="N m", output_unit="rad")
+    y = free_run(machine.with_effect(cdf.Drift(1.1)), blank)
+    run = blank.replaced(y=y + 0.01 * rng.standard_normal(len(t)))
+    data, free = prepare(machine, [run], [run]).segmentations[-1], default_free(machine)
+    user, bent = (Screen(data.fit(machine, free, iterations=n), data) for n in (0, 12))
+    assert bent.base.model.parameters["viscous.coefficient"].value > 5 * 1.6e-4
+    places = _Places(bent, None, user, tuple((k, machine.parameters[k].value) for k in free))
+    _, begun = _begin((cdf.Drift, bent, places, free, False))
+    rates = [a.block.effects[-1].rate for a in begun if a.nominal]
+    assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1
