@@ -50,7 +50,7 @@ output = "x"
 input_unit = "N"           # optional; also time_unit, velocity, velocity_unit, input_hold, decimal
 output_unit = "mm"         # its unit tells the quantity: mm/s is a velocity, V a voltage
 # outputs = { x = "x", v = ["tacho", "mm/s"] }  # in the place of output: several, by quantity
-closed_loop = false        # true: the input column is the reference of the loop with [controller]
+closed_loop = false        # true: the input is the reference of the loop with [controller], in output_unit
 """
 
 MOST_POINTS = 1_000_000
@@ -133,6 +133,8 @@ def read_model(path) -> ModelFile:
     closed = bool(data.pop("closed_loop", False))
     if closed and controller is None:
         raise ValueError(f"{path}, [data]: closed_loop = true needs a [controller] section; add it.")
+    if closed:  # a reference is of the output, unless said otherwise
+        data.setdefault("input_unit", data.get("output_unit", plant.coordinates.unit))
     return ModelFile(str(path), plant, controller, dt or 0.0, amplitudes, omega, data, closed)
 
 

@@ -287,3 +287,18 @@ def test_an_imposed_velocity_is_refused_with_the_remedy(unit, times):
         place = cumulative_trapezoid(motion, t, initial=0)
         record = cdf.Measurement(t, place, force, velocity=motion, input_unit="m", output_unit="N")
         assert cdf.compare(damper, record).rmse < 0.06  # noise 0.05; seen: 0.050
+
+
+def test_something_unknown_under_an_imposed_motion_is_told_where_it_acts():
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 6, 0.004)
+    x = 0.012 * np.sin(2.6 * t) + 0.005 * np.sin(7.1 * t)
+    v = np.gradient(x, t)
+    force = 800 * v + 60 * np.sin(9 * t) * (t > 3) + np.where(x > 0.0135, 2e5 * (x - 0.0135), 0)
+    record = cdf.Measurement(
+        t, x + 1e-6 * rng.standard_normal(t.size), force + rng.standard_normal(t.size), input_unit="m",
+        output_unit="N",
+    )  # fmt: skip
+    model = cdf.Massless().with_effect(cdf.Viscous(600.0))
+    found = cdf.diagnose(model, record, candidates=["coulomb", "linear_spring"])
+    assert found.verdict == "unknown" and found.regions

@@ -46,8 +46,9 @@ def diagnose(
     Parameters
     ----------
     model : block or closed loop
-        The model in use. Of a loop its block is diagnosed, driven by the recorded force. Where a gap or an
-        elastic joint may be missing it says which side of it the sensor sees: the load, or, as
+        The model in use. Of a loop its block is diagnosed, driven by the recorded force; where the input is
+        the reference (in m, not N), by the force that the controller makes of it and of the output. Where a
+        gap or an elastic joint may be missing it says which side of it the sensor sees: the load, or, as
         ``model.with_measured("motor")``, the motor. That is not tried.
     data : Measurement, FrequencyMeasurement or sequence of them
         Training records, or tables N(A, omega): every effect leaves its signature on the plane, too.
@@ -107,7 +108,7 @@ def diagnose(
     checked_executor("diagnose", executor)
     classes = effect_classes(candidates)
     course = Course("diagnose", progress, callback, budget)
-    dataset = dataset_of(model, data, holdout)
+    dataset = dataset_of(model, data, holdout).driven_by_force(model)
     block = mechanism_of(model)
     limits = check_limits("diagnose", block, limits)
     check_quantities(block, (*dataset.records, *dataset.validation))

@@ -84,7 +84,7 @@ def improve(
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
     course = Course("improve", progress, callback, budget)
-    dataset = dataset_of(model, train, holdout, "train")
+    dataset = dataset_of(model, train, holdout, "train").driven_by_force(model)
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
     own = own_parameters(start, own)

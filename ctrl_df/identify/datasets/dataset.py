@@ -79,6 +79,10 @@ class Dataset(ABC):
         """Check how records are to be cut; tables are not."""
         return None
 
+    def driven_by_force(self, model):
+        """Return the same data, the force on the block of a loop as input; tables have no reference."""
+        return self
+
     @abstractmethod
     def block_of(self, model):
         """Return the block whose parameters a fit to these data moves."""

@@ -10,6 +10,7 @@ from ..estimation.fit import segment_lengths
 from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
+from ..prediction.loop_force import driven_by_force
 from ..prediction.prepared import REFERENCE
 from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
@@ -33,6 +34,14 @@ class TimeDataset(Dataset):
         """Return the same data, of a machine of which that is known."""
         other = copy(self)
         other.prior = prior
+        return other
+
+    def driven_by_force(self, model):
+        """Return the same data, a reference replaced by the force that the controller of the loop makes."""
+        other = copy(self)
+        other.records, other.validation = (
+            tuple(driven_by_force(model, r) for r in records) for records in (self.records, self.validation)
+        )
         return other
 
     def check_segments(self, mode, window):

@@ -49,7 +49,7 @@ def contradict(first, rival) -> str:
     held = rival.evidence_holdout - first.evidence_holdout
     return (
         f"The fitted data favour {named(first.effect)} (log-likelihood higher by {fitted:.0f}), the held-out "
-        f"data {named(rival.effect)} (by {held:.0f}): neither is all that is missing."
+        f"data {named(rival.effect)} (by {held:.0f}): neither may be all that is missing."
     )
 
 

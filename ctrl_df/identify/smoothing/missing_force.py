@@ -16,6 +16,7 @@ from ...checks import choice
 from ...drawing import draw
 from ...numerals import digits
 from ..data.measurement import Measurement
+from ..prediction.loop_force import driven_by_force
 from ..prediction.prepared import REFERENCE
 from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
@@ -232,17 +233,20 @@ def missing_force(model, record: Measurement) -> MissingForce:
     Parameters
     ----------
     model : block of masses or inertias and effects, or loop of `ctrl_df.closed_loop` round one
-        Of a loop the block is taken, driven by the force that was recorded.
+        Of a loop the block is taken, driven by the force that was recorded, or that its controller makes of
+        the reference and the output that were.
     record : Measurement
-        Of position, velocity or both.
+        Of position, velocity or both; or of an imposed motion and the force that it took.
 
     Raises
     ------
     TypeError
         A model that is no mechanism: nobody knows where a force acts in it.
     ValueError
-        A loop, and a record whose input is the reference: no force was recorded.
+        A loop, and a record whose input may be its reference: neither its unit nor a channel tells.
     """
+    if facts(record).imposed:
+        return missing_of_imposed(model, record)
     parts = getattr(model, "parts", None)
     block = model if parts is None else parts.block
     if not isinstance(block, Mechanism):
@@ -250,11 +254,12 @@ def missing_force(model, record: Measurement) -> MissingForce:
             f"a missing force needs a block of masses and effects; got {type(block).__name__}. Build it from "
             "ctrl_df.Mass, TwoMass, Inertia or TwoInertias and effects."
         )
+    record = driven_by_force(model, record)
     if parts is not None and not any(name in (record.channels or {}) for name in REFERENCE):
         raise ValueError(
-            "a missing force of a loop needs the force that was recorded; this record's input is the "
-            "reference. Record the controller's output as the input u, and the reference as a channel "
-            "'reference'."
+            "a missing force of a loop needs the force that was recorded, and the input of "
+            f"{record.name!r} may be the reference. State input_unit= of a reference, as that of the output, or give the force as "
+            "the input u and the reference as the channel 'reference'."
         )
     found = smooth_record(block, record)
     coordinates, core = block.coordinates, block.core
@@ -267,10 +272,11 @@ def missing_force(model, record: Measurement) -> MissingForce:
     )  # fmt: skip
 
 
-def missing_of_imposed(model, record: Measurement, residual) -> MissingForce:
+def missing_of_imposed(model, record: Measurement, residual=None) -> MissingForce:
     """Return the force that a model lacks under an imposed motion: what it errs by, at every sample.
 
-    Its standard deviation is that of the load cell's noise, by the record's noise floor.
+    Its standard deviation is that of the load cell's noise, by the record's noise floor. `residual`: None:
+    that of the model begun at rest.
     """
     known = facts(record)
     simulator = simulator_of(model, record)
@@ -282,6 +288,7 @@ def missing_of_imposed(model, record: Measurement, residual) -> MissingForce:
     runs = simulator.run_all(
         [(whole, None, start), *((whole, {k: table[k].value + d}, start) for k, d in steps.items())]
     )
+    residual = record.y - runs[0] if residual is None else residual
     # over the load that the model gives: the force recorded holds what is missing
     load = runs[0] if np.ptp(runs[0]) > 0 else known.load
     own = np.array([(y - runs[0]) / d for y, d in zip(runs[1:], steps.values(), strict=True)])
