@@ -258,8 +258,8 @@ def missing_force(model, record: Measurement) -> MissingForce:
     if parts is not None and not any(name in (record.channels or {}) for name in REFERENCE):
         raise ValueError(
             "a missing force of a loop needs the force that was recorded, and the input of "
-            f"{record.name!r} may be the reference. State input_unit= of a reference, as that of the output, or give the force as "
-            "the input u and the reference as the channel 'reference'."
+            f"{record.name!r} may be the reference. State input_unit= of a reference, as that of the output, "
+            "or give the force as the input u and the reference as the channel 'reference'."
         )
     found = smooth_record(block, record)
     coordinates, core = block.coordinates, block.core
