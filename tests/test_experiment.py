@@ -115,3 +115,18 @@ def test_the_noise_a_controller_passes_on():
     assert _fastest_gain(ct.tf([1, -1], [0.01, 0], 0.01), dt) == pytest.approx(200.0)
     assert _fastest_gain(ct.ss([], [], [], [[7.0]], 0.01), dt) == pytest.approx(7.0)
     assert _fastest_gain(cdf.pid(100.0, 0.0, 3.0), dt) == 0.0
+
+
+@pytest.mark.parametrize("held", [cdf.LinearSpring(2e3), cdf.ConstantForce(-100.0)])
+def test_a_machine_that_works_under_a_bias_is_planned_for_there(held):
+    """A valve on its spring, a vertical axis: about no force both leave the place where they work."""
+    t = np.arange(0, 6, 0.01)
+    force = 100 + 15 * np.sin(2 * np.pi * 0.3 * t) + 10 * np.sin(2 * np.pi * 1.1 * t)
+    model = cdf.Mass(4.0).with_effect(held).with_effect(cdf.Viscous(20.0))
+    true = model.with_effect(cdf.Coulomb(4.0))
+    x = np.asarray(cdf.event_response(true, t, force, [0.05, 0], input_hold="zoh").outputs)[0]
+    record = cdf.Measurement(t, force, x + 1e-6 * np.random.default_rng(0).standard_normal(t.size))
+    found = cdf.diagnose(model, record, candidates=["coulomb", "viscous"])
+    planned = found.next_experiment
+    assert np.mean(planned.u) == pytest.approx(100.0, rel=0.1) and np.max(planned.u) <= np.max(force) * 1.001
+    assert planned.separation > 10

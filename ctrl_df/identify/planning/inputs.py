@@ -71,25 +71,20 @@ def input_that_separates(
         if loop is None
         else _Loop(models, loop, record, t, centre, noise)
     )
-    best, best_moves, still = None, False, 0
     shapes = _shapes(t, record) if loop is None else _references(t, record)
-    for kind, shape in shapes.items():
-        for size in PLAN_SIZES:
-            u = force * size * shape if loop is None else centre + PLAN_MARGIN * reach * size * shape
-            ys, asked, gaps = play(u)
-            far = max(float(np.max(np.abs(y - centre))) for y in ys)
-            if not np.isfinite(far) or far > PLAN_MARGIN * reach * PLAN_SLACK or asked > force:
-                continue
-            if max(float(np.ptp(y)) for y in ys) <= noise:
-                still += 1
-                continue
-            separation = min(gaps) / noise
-            # A record in which nothing may move teaches one bit; where all candidates move it teaches their
-            # shape.
-            moves = min(float(np.ptp(y)) for y in ys) > PLAN_MOVES * max(float(np.ptp(y)) for y in ys)
-            if best is None or (moves, separation) > (best_moves, best.separation):
-                best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
-    if best is None and still == len(shapes) * len(PLAN_SIZES):
+    sized = [(kind, size * shape) for kind, shape in shapes.items() for size in PLAN_SIZES]
+    # about no force, or about the one at which a machine works that a spring or its weight holds there
+    levels = [0.0, float(np.mean(record.u))] if loop is None else [centre]
+    best, still = None, 0
+    for level in levels:
+        size = force - abs(level) if loop is None else PLAN_MARGIN * reach
+        best, still = _most_telling(
+            play, [(kind, level + size * shape) for kind, shape in sized], t, names, noise,
+            lambda y: float(np.max(np.abs(y - centre))), (PLAN_MARGIN * reach * PLAN_SLACK, force),
+        )  # fmt: skip
+        if best is not None:
+            break
+    if best is None and still == len(sized):
         raise ValueError(
             f"no model of {separated(names)} moves under ±{force:g} {strong}, though the machine did in "
             "these records: its friction or inertia is far too large. Give better values, or leave them free."
@@ -110,6 +105,37 @@ def input_that_separates(
         f"times the noise, within {digits(best.stroke)} {long} of the centre."
     )
     return replace(best, reason=reason)
+
+
+def _most_telling(play, inputs, t, names, noise, distance, most) -> tuple[Experiment | None, int]:
+    """Return the input that separates best, and how many move nothing.
+
+    Parameters
+    ----------
+    play : callable
+        Returns the outputs of all models, the largest force asked, and how far any two outputs are apart.
+    inputs : list of (str, (n,) array)
+    distance : callable
+        How far an output goes.
+    most : (float, float)
+        Largest distance and force.
+    """
+    best, best_moves, still = None, False, 0
+    for kind, u in inputs:
+        ys, asked, gaps = play(u)
+        far = max(map(distance, ys))
+        if not np.isfinite(far) or far > most[0] or asked > most[1] * PLAN_SLACK:
+            continue
+        spans = [float(np.ptp(y)) for y in ys]
+        if max(spans) <= noise:
+            still += 1
+            continue
+        separation = min(gaps) / noise
+        # a record in which nothing may move teaches one bit, one in which all candidates move their shape
+        moves = min(spans) > PLAN_MOVES * max(spans)
+        if best is None or (moves, separation) > (best_moves, best.separation):
+            best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
+    return best, still
 
 
 class _Free:
