@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_ladder import Data, climb
+from test_ladder import Data, ladder_of
 
 import ctrl_df as cdf
 from ctrl_df.identify.selection import verdict
@@ -73,7 +73,7 @@ def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
     data = Data({"": 0, "hysteresis": 600, "linear_spring": 500})
     data.top = 500
     monkeypatch.setattr(Data, "level", lambda self, block: level(self.added(block)))
-    study = climb(data)
+    study = ladder_of(data)
     assert study.effects == ("linear_spring",)
     first = study.steps[0].diagnosis
     assert first.verdict == "effect" and "hysteresis" not in [c.id for c in first.ranking]
@@ -82,5 +82,5 @@ def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
 
 def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):
     monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
-    first = climb(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
+    first = ladder_of(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
     assert first.verdict == "unknown" and first.ranking[0].id == "hysteresis"
