@@ -141,7 +141,7 @@ def test_one_effect_and_its_neighbours():
     assert around["- linear_spring"].verdict == "worse"
     assert around["- linear_spring + constant_force"].evidence == pytest.approx(-600, abs=10)
     assert around["+ coulomb"].verdict == "equal" and around["+ coulomb"].change == "add"
-    assert study.neighbours.complete and "none does better" in study.summary()
+    assert study.neighbours.complete and "none is better" in study.summary()
     table = study.neighbours.to_pandas()
     assert len(table) == len(study.neighbours) and set(table["verdict"]) <= {"better", "equal", "worse"}
 
@@ -154,7 +154,7 @@ def test_what_stood_in_gives_way_beside_a_later_effect():
     assert set(study.effects) == {"coulomb", "quadratic_drag"}
     last = study.steps[-1]
     assert (last.effect, last.dropped, last.instead) == ("quadratic_drag", ("stribeck",), ("coulomb",))
-    assert "coulomb does what stribeck stood in for" in study.summary()
+    assert "coulomb explains the data better than stribeck" in study.summary()
 
 
 def test_the_end_is_exchanged_for_a_better_neighbour():

@@ -1,4 +1,4 @@
-"""What long stretches refute is left out, and all others are tried again without it."""
+"""A candidate that long horizons refute is left out, and the search repeated without it."""
 
 from types import SimpleNamespace
 
@@ -52,7 +52,7 @@ def test_who_is_refuted(first, rival, base, ahead, refuted):
 
 
 def refuting(*ids):
-    """Return what long stretches say of a ranking where these effects come to nothing over them."""
+    """Return the long prediction of a ranking where these effects explain nothing over long horizons."""
 
     def judged(ranking, base, significant):
         first, better = ranking[0].id, ("",)
@@ -68,7 +68,7 @@ def level(added):
     return 500.0 if "linear_spring" in added else 600.0 if "hysteresis" in added else 0.0
 
 
-def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
+def test_the_search_is_repeated_without_what_is_refuted(monkeypatch):
     monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
     data = Data({"": 0, "hysteresis": 600, "linear_spring": 500})
     data.top = 500
@@ -77,7 +77,7 @@ def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
     assert study.effects == ("linear_spring",)
     first = study.steps[0].diagnosis
     assert first.verdict == "effect" and "hysteresis" not in [c.id for c in first.ranking]
-    assert "again without hysteresis" in first.explanation
+    assert "repeated without hysteresis" in first.explanation
 
 
 def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):

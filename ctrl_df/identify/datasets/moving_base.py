@@ -22,7 +22,7 @@ class MovingBaseDataset(TimeDataset):
         for record in (*records, *validation):
             if not moves_base(model, record):
                 raise ValueError(
-                    "records of a base that moves and such with a force as input are judged apart; got "
+                    "records of a moving base cannot be combined with records with a force as input; got "
                     f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
                     "the other."
                 )

@@ -168,8 +168,8 @@ def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:
         down = ", ".join(names[k] for k, d in moves.items() if d * first <= 0)
         change = f"raising {up}" + (f" while lowering {down}" if down else "") + " together"
         lines.append(
-            f"{' and '.join(names.values())} cannot be told apart on these data: {change} leaves the "
-            "output as it is. Fix one of them, or excite the drive otherwise."
+            f"{' and '.join(names.values())} cannot be distinguished on these data: {change} leaves the "
+            "output unchanged. Fix one of them, or excite the drive otherwise."
         )
     return tuple(lines)
 
@@ -184,7 +184,7 @@ def doubts(found: FitResult) -> tuple[str, ...]:
                 alone.setdefault(k, {})[record] = None
     for k, records in alone.items():
         lines.append(
-            f"{_of(k, [*records], found)} leaves no trace in these data: its value is the start value."
+            f"{_of(k, [*records], found)} has no influence on these data: its value is the start value."
         )
     doubtful = undetermined(found)
     for k in found.names:
@@ -198,7 +198,7 @@ def doubts(found: FitResult) -> tuple[str, ...]:
         else:
             doubt = k in doubtful and (k, None) not in told
         if doubt:
-            lines.append(f"{k} is less certain than it is large: these data do not determine it.")
+            lines.append(f"{k} has a standard error larger than its value: these data do not determine it.")
     return tuple(lines)
 
 

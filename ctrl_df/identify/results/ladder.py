@@ -1,4 +1,4 @@
-"""The ladder, over time and over the (A, omega) plane alike: its steps, the study they make, the climb."""
+"""The ladder, over time and over the (A, omega) plane alike: its steps, and the study that they make."""
 
 from __future__ import annotations
 
@@ -76,28 +76,24 @@ class Step(Brief):
 
     @property
     def sentence(self) -> str:
-        """What became of effects added earlier, in plain words; empty where they all stayed."""
+        """What became of effects added earlier, in a sentence; empty where they all stayed."""
         if not self.changes:
             return ""
         gone, new = _named(self.dropped), _named(self.instead)
+        better, it = f"{new} {_explain(self.instead)} the data better than {gone}", _it(self.dropped)
         if self.effect:
-            beside = f"Beside {_words(self.effect)}"
+            beside = f"With {_words(self.effect)} in the model,"
             if not new:
                 return f"{beside} {gone} {_are(self.dropped)} no longer needed."
-            return (
-                f"{beside} {new} {_do(self.instead)} what {gone} stood in for, and took {_its(self.dropped)} "
-                "place."
-            )
+            return f"{beside} {better}, and replaced {it}."
         if not new:
-            return f"In the end {gone} {_are(self.dropped)} not needed, and {_were(self.dropped)} dropped."
+            return f"The final model does not need {gone}, which {_were(self.dropped)} dropped."
         if self.evidence > 0:
-            return (
-                f"In the end {new} {_do(self.instead)} better than {gone} (log-likelihood higher by "
-                f"{self.evidence:.0f}), and took {_its(self.dropped)} place."
-            )
+            gain = f"log-likelihood higher by {self.evidence:.0f}"
+            return f"At the end of the ladder {better} ({gain}), and replaced {it}."
         if not gone:
-            return f"The ladder went back, and on with {new}: what it had tried left more than noise."
-        return f"The ladder went back: {new} in place of {gone}, which had led to no end without remainder."
+            return f"The ladder went back and continued with {new}: the model before left more than noise."
+        return f"The ladder went back and took {new} in place of {gone}, with which more than noise was left."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,7 +170,7 @@ class Study(Brief):
         """Return the outcome in plain words."""
         head = self._outcome()
         if self.status != COMPLETE:
-            head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
+            head = f"Not complete ({self.status}): the ladder would have continued. {head}"
         told = [line for line in (which_errors(self.measure),) if line]
         lines = [" ".join([head, *self.story]), "", self.table(), *told, ""]
         if self.neighbours:
@@ -255,9 +251,9 @@ def _were(names) -> str:
     return "was" if len(names) == 1 else "were"
 
 
-def _do(names) -> str:
-    return "does" if len(names) == 1 else "do"
+def _explain(names) -> str:
+    return "explains" if len(names) == 1 else "explain"
 
 
-def _its(names) -> str:
-    return "its" if len(names) == 1 else "their"
+def _it(names) -> str:
+    return "it" if len(names) == 1 else "them"

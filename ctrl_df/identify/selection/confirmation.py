@@ -84,7 +84,7 @@ def _confirmed(
     # Disturbance forces let the first look tell little.
     found = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
     fits, floor = staged(at, [at.base.train, *(t.train for t in found)])
-    stage("the best refitted at the full rate, and tried on what is held out")
+    stage("the best refitted at the full rate, and validated on held-out data")
     data, judged = _judged(at, (at.base, *found), fits)
     base, *others = [t for t in judged if t is not None]
     # what contains the baseline never errs more where both are fitted as well
@@ -99,7 +99,7 @@ def _confirmed(
     if not chosen:
         return at, []
     told(at, chosen)
-    stage("near ones begun again where the best one ended")
+    stage("near equals restarted from the best fit")
     chosen, noise = ranked(base, _to_the_end(at, chosen))
     return replace(at, noise=noise), chosen
 

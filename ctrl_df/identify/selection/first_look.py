@@ -62,20 +62,20 @@ class FirstLook:
         stage : callable
             Hears in words what is done.
         """
-        stage(f"{len(self.classes)} effects tried over short segments")
+        stage(f"{len(self.classes)} effects screened over short segments")
         begun = at
         base, found = self._sampled(at, lambda screened: told(begun, screened))
         told(at, found)
         if self._disturbed(at, found):
             at = at.by_accelerations(self.free)
-            stage("the same by accelerations: disturbance forces outweigh the noise")
+            stage("screening repeated on accelerations: disturbance forces outweigh the noise")
             base, found = self._sampled(at)
             told(at, found)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
         if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
             # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
-            stage("the same over long segments")
+            stage("screening repeated over long segments")
             far = replace(at, base=CandidateFit("", there))
             moved = _over_long_segments(far, base.rmse, found)
             if moved is not None:

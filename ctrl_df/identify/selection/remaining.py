@@ -154,9 +154,11 @@ def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
 
 
 def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:
-    acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
+    acts = f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
-        f"Of structure {left.structure:.2g} remains beside {left.noise:.2g} of noise (rms of the {measure}). "
+        f"The residual contains structure of {left.structure:.2g} beside noise of {left.noise:.2g} (rms of "
+        "the "
+        f"{measure}). "
         f"{acts}{places(where)}".rstrip()
     )
 

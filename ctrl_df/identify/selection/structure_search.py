@@ -113,7 +113,7 @@ class StructureSearch(Search):
         """Refit baseline and best candidates at the full rate."""
         course = course or Course()
         at, chosen = confirmed(self.at, found, self.stages, partial(self._told, course), course.stage)
-        course.stage("the parameters of those that may be named")
+        course.stage("refit of the candidates that may be named")
         at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen
 

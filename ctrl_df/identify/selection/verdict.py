@@ -98,7 +98,7 @@ def diagnosed(
             return known
         first = first or known
         course.known((after, found))
-        course.stage(f"the same without {fallen[0].replace('_', ' ')}, which long stretches refute")
+        course.stage(f"the search repeated without {fallen[0].replace('_', ' ')}, which long horizons refute")
         refuted = (*refuted, fallen)
 
 
@@ -154,7 +154,7 @@ class _Asked:
             verdict = AMBIGUOUS
         far: list = []
         if verdict == EFFECT or (verdict == AMBIGUOUS and not silent):
-            course.stage("free prediction over long stretches")
+            course.stage("free prediction over long horizons")
             far = [base, *compared(ranking, search.significant)]
         # neither needs the other's answer; what takes longest first
         told = verdict != NONE
@@ -175,7 +175,7 @@ class _Asked:
                 best, remainder = search.base, search.remainder(search.base, False)
             verdict = lasts if verdict == EFFECT else verdict
         if rest is not None and verdict in (EFFECT, AMBIGUOUS) and remainder.more and not silent:
-            course.stage(f"what {ranking[0].id.replace('_', ' ')} leaves")
+            course.stage(f"the residual with {ranking[0].id.replace('_', ' ')}")
             second = rest(best.block, course.within(lambda _: (search, chosen)))
             verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
             doubts = (*doubts, leaves(ranking[0], second))

@@ -160,7 +160,7 @@ class TableSearch(Search):
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         found = []
-        course.stage(f"{len(jobs)} effects tried on some points")
+        course.stage(f"{len(jobs)} effects screened on some of the points")
         for r in run(try_effect, jobs):
             course.done()
             if r is not None:
@@ -304,14 +304,15 @@ class TableSearch(Search):
     def located(self, best, remainder, unknown):
         """Return the bands of amplitude and frequency where the error is."""
         where = plane_regions(self.points, (best if unknown else self.base).error)
-        look = places(where) or "the error is spread over the whole plane."
+        look = places(where) or "The error is spread over the whole plane."
         remains = (
-            f"Neighbouring points err alike: {percent(remainder.structure)} beside "
-            f"{percent(remainder.noise)} of scatter. Look here: {look}"
+            f"The errors of neighbouring points agree: structure of {percent(remainder.structure)} beside "
+            "scatter of "
+            f"{percent(remainder.noise)}. {look}"
         )
         far = np.count_nonzero(outlying(best.error))
         note = (
-            f" {far} of {len(best.error)} points err by more than ten times the usual and are left out of "
+            f" {far} of {len(best.error)} points err by more than ten times the median and are left out of "
             "these figures: another motion that coexists, or a bad measurement."
         )
         return Located(where, where.kinds, remains if unknown else "", note if far else "")
