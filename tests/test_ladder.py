@@ -62,7 +62,7 @@ class Given(Search):
         blocks = [extended(self.block, effect) for effect in made]
         found = [self.fitted(b, (), 0) for b in blocks if b is not None]
         ranked = self.ranked(self.base, [replace(t, extra=1) for t in found])
-        return self.after(first_look=ranked), ranked
+        return self.after(screened=ranked), ranked
 
     def confirm(self, found, course=None):
         return self, [replace(t, confirmed=True) for t in found]
@@ -88,7 +88,7 @@ class Given(Search):
     def so_far(self, judged):
         return Remainder(0.0, 0.0, False)
 
-    def alike(self, a, b):
+    def equivalent(self, a, b):
         return {a.key, b.key} in self.data.alike
 
     def remainder(self, best, significant):

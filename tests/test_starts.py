@@ -10,9 +10,9 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
-from ctrl_df.identify.selection.alike import begun_like_better
-from ctrl_df.identify.selection.attempts import _begin, _Places
-from ctrl_df.identify.selection.rounding import rounding_evidence
+from ctrl_df.identify.residuals.rounding import rounding_evidence
+from ctrl_df.identify.selection.attempts import _attempts_of, _Places
+from ctrl_df.identify.selection.equivalence import restarted_from_better
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
@@ -172,7 +172,7 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
     # the bump as it was found, and a fit that was lost
     bump, lost = PLAIN.with_effect(cdf.Stribeck(0.9, 1e-3)), PLAIN.with_effect(cdf.Stiction(0.5))
     found = [CandidateFit(b.newest, data.fit(b, tuple(b.parameters), iterations=0)) for b in (bump, lost)]
-    again = {t.key: t.train for t in begun_like_better(found, data, PLAIN)}
+    again = {t.key: t.train for t in restarted_from_better(found, data, PLAIN)}
     # 26 times the noise as it was lost, 0.95 begun again
     assert again["stiction"].rmse < 1.1 * data.noise < found[1].train.rmse / 10
 
@@ -205,6 +205,6 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     user, bent = (Screen(data.fit(machine, free, iterations=n), data) for n in (0, 12))
     assert bent.base.model.parameters["viscous.coefficient"].value > 5 * 1.6e-4
     places = _Places(bent, None, user, tuple((k, machine.parameters[k].value) for k in free))
-    _, begun = _begin((cdf.Drift, bent, places, free, False))
+    _, begun = _attempts_of((cdf.Drift, bent, places, free, False))
     rates = [a.block.effects[-1].rate for a in begun if a.nominal]
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1

@@ -1,4 +1,4 @@
-"""The course of a long computation: what is known so far, who hears of it, and how long it may go on.
+"""The course of a long computation: what is known so far, to whom it is reported, how long it may last.
 
 Work is done in units, between which it may end: where the time given is over, or at Ctrl-C, it is left where
 it stands, and what was known last is the answer.

@@ -28,8 +28,8 @@ SIGNIFICANT = float(math.ceil(math.log(SHAPES / FALSE_ALARM)))
 RULED_OUT = float(round(math.log(150)))
 """Evidence behind the first beyond which a candidate is no rival: odds of 150 to 1."""
 
-TOLD_APART = float(round(math.log(400)))
-"""Log likelihood ratio that tells two candidates apart: odds of 400 to 1."""
+DISTINGUISHED = float(round(math.log(400)))
+"""Log likelihood ratio that distinguishes two candidates: odds of 400 to 1."""
 
 QUARTILE = round(NormalDist().inv_cdf(0.75), 4)
 """Of a normal distribution: half the values lie within so many standard deviations, 0.6745."""

@@ -103,7 +103,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
         data.segmentations[0].states_of(model),
         data.with_process_noise,
     )
-    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
+    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.continues(model):
         return None
     segments = disturbed.short_segments.train.segments
     spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]

@@ -231,7 +231,7 @@ class SegmentedData:
             block, record, thin=self.thin, begins=self.begins, rtol=self.rtol_of(block), **keywords
         )  # fmt: skip
 
-    def carries(self, block) -> bool:
+    def continues(self, block) -> bool:
         """Whether the block has hidden states that go on from segment to segment."""
         return any(self.simulator(block, r).continued for r in self.train.records)
 
@@ -338,7 +338,7 @@ class SegmentedData:
             for r, w, starts in zip(records, other.segments, other.starts, strict=True)
         ]
 
-    def judged(self, model) -> tuple[Any, float, float]:
+    def evaluated(self, model) -> tuple[Any, float, float]:
         """Return a model as it is with its nrmse over the segments fitted and those held out.
 
         It then knows what the records held out have for themselves: by that their error is.

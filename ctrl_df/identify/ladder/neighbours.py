@@ -9,7 +9,7 @@ from typing import Any
 from ..results.diagnosis import NONE, Diagnosis
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..selection.search import Search
-from ..selection.verdict import worth
+from ..selection.verdict import is_significant
 from ..thresholds import RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import RIVALS, STEPS_NEIGHBOUR
@@ -127,7 +127,7 @@ class Neighbourhood:
         """
         for c in found.ranking:
             missing = found.verdict != NONE and c.confirmed and c.id != refused
-            better = missing and worth(c, self.search)
+            better = missing and is_significant(c, self.search)
             verdict = BETTER if better else WORSE if c.evidence < -RULED_OUT else EQUAL
             errors = c.nrmse, c.nrmse_holdout
             self.screened.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))

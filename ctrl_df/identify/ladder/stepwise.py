@@ -27,7 +27,7 @@ from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.long_prediction import LongPrediction, long_prediction
 from ..selection.search import Search
 from ..selection.thresholds import CONFIRMED, SHOWS_HARDLY
-from ..selection.verdict import Diagnosed, diagnosed, worth
+from ..selection.verdict import Diagnosed, diagnosed, is_significant
 from ..thresholds import FLOOR
 from .neighbours import Alternatives, Neighbourhood
 from .revision import Revision, revised
@@ -69,7 +69,7 @@ class Node:
         long = self._long_prediction
         if long is not None and long.better:  # the best of them, or nothing where that is the model without
             return next((c for c in ranking if c.id == long.better[0]), None)
-        return plainest(ranking) if worth(ranking[0], self.search) else None
+        return plainest(ranking) if is_significant(ranking[0], self.search) else None
 
     @cached_property
     def _long_prediction(self) -> LongPrediction | None:
@@ -412,7 +412,7 @@ def _exchange(n: Neighbour) -> dict:
 
 def _alternatives_at(node: Node, old) -> Alternatives:
     """Return the diagnosis of a node as the candidates in the place of an effect that was then added."""
-    first = {t.key: t.evidence for t in node.search.first_look}
+    first = {t.key: t.evidence for t in node.search.screened}
     own = next(
         (c for c in node.diagnosis.ranking if c.confirmed and c.id == old.id), node.diagnosis.ranking[0]
     )

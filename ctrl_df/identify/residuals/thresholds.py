@@ -76,3 +76,15 @@ spread); times after which the input has forgotten, in those of a first-order si
 
 HUM_FINER, HUM_LEAST = 4, 3
 """Parts of a line of a spectrum into which it is divided; periods of a hum in a record at least."""
+
+COARSE = 0.4
+"""rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
+
+FINEST = 0.02
+"""Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
+
+STRAY = 1e-3
+"""Share of rounded samples that may lie on any line."""
+
+ROUNDING_SPREAD = (-5.0, 0.0)
+"""Logarithms between which the error of a model lies that rounding hides, over the step."""

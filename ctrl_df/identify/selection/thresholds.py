@@ -39,8 +39,8 @@ it to be tried: the special case of a right law is right over a part of the moti
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
 """Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
 
-LITTLE_LUCK = 0.1
-"""Error held out, of the baseline's, below which it does not matter whether luck has made a part of it: 99 %
+LITTLE_CHANCE = 0.1
+"""Error held out, of the baseline's, below which it does not matter whether a part of it is chance: 99 %
 of the power are explained in any case (rig "stop, open" of `benchmarks/verdicts.py`: 3 %)."""
 
 STRUCTURE_LEAST = 0.1
@@ -89,21 +89,12 @@ ANOTHER_START = (1.5, 0.02)
 """Share of the residual that a start leaves from which none is begun: over that of the best, and beyond it
 (rigs). Only work depends on it."""
 
-COARSE = 0.4
-"""rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
-
-FINEST = 0.02
-"""Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
-
 FINE = 0.1
 """Step of a grid over the spread of the values up to which it is fine: a loop sees in it a gain of one within
 1 % (describing function of a quantizer, over amplitudes about the square root of two of the spread)."""
 
 SAME_STEP = 0.01
 """Relative difference of two steps of the same grid."""
-
-STRAY = 1e-3
-"""Share of rounded samples that may lie on any line."""
 
 EXACT = 10 * NOISE_FREE
 """Error over the spread of the output that is no error."""
@@ -127,7 +118,7 @@ LONG_RIVALS = 2
 """Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 
-EFFORT_TRIED, EFFORT_BENT, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
+EFFORT_TRIED, EFFORT_ILL_CONDITIONED, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
 """Steps of the fit of an effect at most, and the relative gain of its cost that is none: one whose minimum
 may be long and bent takes more; from segments to others less (rigs)."""
 
@@ -150,6 +141,3 @@ RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
 
 STEPS_LONGER = 6
 """Steps over longer segments of fits that have begun there."""
-
-ROUNDING_SPREAD = (-5.0, 0.0)
-"""Logarithms between which the error of a model lies that rounding hides, over the step."""

@@ -218,7 +218,7 @@ class MissingForce:
         ]
         rest = f" Of the rest {', '.join(curves)}." if curves else ""
         return (
-            f"Missing {words['force']} in {self.name!r}: {size}. Other values of the model's parameters could "
+            f"Missing {words['force']} in {self.name!r}: {size}. Other parameter values of the model could "
             f"explain {own:.0%} of its mean square, a constant {words['force']} {constant:.0%}.{rest}"
         )
 

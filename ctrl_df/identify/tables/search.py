@@ -18,7 +18,7 @@ from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
 from ..starting.extend import applicable
-from ..thresholds import TOLD_APART
+from ..thresholds import DISTINGUISHED
 from .candidate import fit_either, try_effect
 from .compare import comparison_of_tables, plane_regions, scatter
 from .errors import log_density, outlying, rms
@@ -205,14 +205,14 @@ class TableSearch(Search):
 
     # --- judging --------------------------------------------------------------------------------------
 
-    def ranked(self, base, judged: Sequence[TableTrial]):
+    def ranked(self, base, candidates: Sequence[TableTrial]):
         """Return models with their evidence over `base`, best first.
 
         That is the likelihood ratio of independent complex errors, less Schwarz's price of parameters.
         """
         price, before = 0.5 * math.log(2 * len(self.points)), self._likelihood(base)[0]
         found = []
-        for t in judged:
+        for t in candidates:
             gain = self._likelihood(t)[0] - before
             validation = float(np.sum(gain[~self.train]))
             found.append(
@@ -229,29 +229,29 @@ class TableSearch(Search):
             self.points.weight * tried.error, max(0.5 * self.points.stated, SCATTER_LEAST) ** 2
         )
 
-    def alike(self, a, b):
+    def equivalent(self, a, b):
         """Whether two candidates' tables differ by less than the scatter lets one see."""
         both = np.isfinite(a.table) & np.isfinite(b.table)
         if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
             return False
         sigma2 = min(self._likelihood(a)[1], self._likelihood(b)[1])
         gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
-        return float(np.sum(gap[both] ** 2)) / sigma2 < TOLD_APART
+        return float(np.sum(gap[both] ** 2)) / sigma2 < DISTINGUISHED
 
-    def errors(self, judged):
+    def errors(self, candidate):
         """Return the rms of the relative errors of the points fitted, and of those held out."""
-        good = ~outlying(judged.error)
-        return rms(judged.error[self.train & good]), rms(judged.error[~self.train & good])
+        good = ~outlying(candidate.error)
+        return rms(candidate.error[self.train & good]), rms(candidate.error[~self.train & good])
 
-    def standard_errors(self, judged):
+    def standard_errors(self, candidate):
         """Return the standard errors of a candidate fitted to all points."""
-        return uncertainty(judged.fitted)[1] if judged.confirmed else {}
+        return uncertainty(candidate.fitted)[1] if candidate.confirmed else {}
 
-    def undetermined(self, judged):
+    def undetermined(self, candidate):
         """Return the parameters of the newest effect at a bound, or known to worse than their size."""
-        if not judged.confirmed:
+        if not candidate.confirmed:
             return ()
-        own, fitted = judged.block.newest + ".", judged.fitted
+        own, fitted = candidate.block.newest + ".", candidate.fitted
         table, doubtful = fitted.block.parameters, uncertainty(fitted)[2]
         named = [v for v in fitted.variables if v.name.startswith(own)]
         return tuple(
