@@ -296,7 +296,7 @@ def _best(attempts, count) -> list[Attempt]:
 
 
 def _joint_attempts(job) -> list[Attempt]:
-    """Return the attempts at a joint with a share of the mass behind it; none where the effect is no joint."""
+    """Return the attempts at a joint with a share of the mass behind it; none of other effects."""
     cls, share, screen, free = job
     found = []
     for near in resonating(cls, screen, share, JOINTS):
