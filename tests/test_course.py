@@ -139,7 +139,7 @@ def test_progress_and_log(told, caplog, capsys):
 
 
 def test_a_stage_that_lasts_tells_that_it_goes_on(monkeypatch):
-    monkeypatch.setattr("ctrl_df.identify.course.SILENT_MOST", 0.05)
+    monkeypatch.setattr("ctrl_df.identify.course.PROGRESS_EVERY", 0.05)
     monkeypatch.setattr(Course, "beat", 0.02)
     lines = []
     course = Course("improve", lines.append)

@@ -61,7 +61,7 @@ def test_windows_that_go_on_from_one_another_are_one_run(name):
     if name == "gap":
         starts[:, 2] = 0.5
     for w in range(1, len(windows)):
-        starts[w] = simulator.carried_on(windows, None, starts)[w]
+        starts[w] = simulator.continued_from(windows, None, starts)[w]
     # worst of these four: 6.2e-8, of the bristle
     assert simulator.run(windows, None, starts) == pytest.approx(data.y[windows.samples], abs=2e-7)
 
@@ -70,7 +70,7 @@ def test_an_input_of_steps_is_decimated_without_loss():
     # measured 1.2e-12, and 7.9e-6 where the input changes at every sample
     for steps, bound in ((True, 1e-11), (False, 3e-5)):
         data = record(PLAIN, steps)
-        error = np.max(np.abs(free_run(PLAIN, data, thin=4) - free_run(PLAIN, data)))
+        error = np.max(np.abs(free_run(PLAIN, data, decimation=4) - free_run(PLAIN, data)))
         assert error < bound * np.ptp(data.y)
 
 
@@ -125,7 +125,7 @@ def test_a_pendulum_starts_from_its_own_inertia():
     assert dict(begun.values)["inertia"] == pytest.approx(0.01, rel=0.15)
 
     # the laws that a model has already take their share of the force
-    fit = force_fit(motion_of(data.train, data.thin, true), data.scales, true, [])
+    fit = force_fit(motion_of(data.train, data.decimation, true), data.scales, true, [])
     assert fit.values["gravity.torque"] == pytest.approx(0.5, rel=0.05)
     assert fit.values["inertia"] == pytest.approx(0.01, rel=0.15)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..data.moving_base import moves_base, seen_from_base, told_in_space
+from ..data.moving_base import measured_in_space, moves_base, seen_from_base
 from ..selection.kinematic_searches import MovingBaseSearch
 from .over_time import TimeDataset
 
@@ -26,7 +26,7 @@ class MovingBaseDataset(TimeDataset):
                     f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
                     "the other."
                 )
-        self.in_space = any(told_in_space(r) for r in (*records, *validation))
+        self.in_space = any(measured_in_space(r) for r in (*records, *validation))
         super().__init__(*([seen_from_base(model, r) for r in rs] for rs in (records, validation)))
 
     def free_parameters(self, block, free=None):

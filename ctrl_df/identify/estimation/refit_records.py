@@ -124,7 +124,7 @@ class _Beside:
 
     def __call__(self, model, names, *, starts, iterations, give_up=math.inf) -> FitResult:
         return fit_segments(
-            model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
+            model, self.records, self.segments, names, decimation=1, starts=starts, iterations=iterations,
             give_up=give_up, about=self.about,
         )  # fmt: skip
 
@@ -153,7 +153,7 @@ def undetermined(found: FitResult) -> set[str]:
     return names | {k for k, own in found.own.items() if not any(v.determined for v in own.values())}
 
 
-def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:
+def indistinguishable_parameters(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every null direction of several parameters."""
     lines = []
     for parts in _directions(found):
@@ -176,9 +176,9 @@ def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:
 
 def doubts(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every direction the data do not determine."""
-    lines, told, alone = list(cannot_be_told_apart(found)), set(), {}
+    lines, covered, alone = list(indistinguishable_parameters(found)), set(), {}
     for parts in _directions(found):
-        told |= {(k, r) for k, r, _ in parts}
+        covered |= {(k, r) for k, r, _ in parts}
         if len({k for k, _, _ in parts}) == 1:
             for k, record, _ in parts:
                 alone.setdefault(k, {})[record] = None
@@ -190,13 +190,13 @@ def doubts(found: FitResult) -> tuple[str, ...]:
     for k in found.names:
         if k in found.own:
             open_ = [r for r, own in found.own[k].items() if not own.determined]
-            left = [r for r in open_ if not {(k, r), (k, None)} & told]
+            left = [r for r in open_ if not {(k, r), (k, None)} & covered]
             if left and len(left) < len(found.own[k]):
                 lines.append(f"{k} is not determined by {' and '.join(left)}.")
                 continue
             doubt = bool(left)
         else:
-            doubt = k in doubtful and (k, None) not in told
+            doubt = k in doubtful and (k, None) not in covered
         if doubt:
             lines.append(f"{k} has a standard error larger than its value: these data do not determine it.")
     return tuple(lines)

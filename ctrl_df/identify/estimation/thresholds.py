@@ -113,7 +113,7 @@ FREEDOM_MOST = 1e6
 # --- steps of fits that begin beside another ----------------------------------------------------------
 
 GLANCE, GLANCED_ON = 2, 4
-"""Steps of initial states alone, after which starts are told from each other, and steps by which the best of
+"""Steps of initial states alone, after which starts are compared, and steps by which the best of
 them go on: those that lead nowhere show it by then."""
 
 NEAR_STATES, NEAR = 4, 6
@@ -125,10 +125,10 @@ NEXT_TO_NOTHING = 1e-3
 at most, is then below it."""
 
 ITERATIONS, TOLERANCE = 12, 1e-3
-"""Steps of a fit and relative gain of the cost at which it ends, unless told otherwise."""
+"""Steps of a fit and relative gain of the cost at which it ends, by default."""
 
-THIN = 4
-"""Samples to a step of the input before the full rate, unless told otherwise."""
+DECIMATION = 4
+"""Samples to a step of the input before the full rate, by default."""
 
 EFFORT_MOVED_ON = (6, 5e-3)
 """Of a fit that goes on over other segments."""

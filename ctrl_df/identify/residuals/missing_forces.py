@@ -1,4 +1,4 @@
-"""What a fitted model still misses, told by free forces.
+"""What a fitted model still misses, estimated by free forces.
 
 Each kind adds forces of no particular law: over time, place, speed or load, after reversals, at one
 frequency (bumps along the record, along the stroke, ...). Their effect on the output is simulated, what the

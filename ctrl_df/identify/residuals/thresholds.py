@@ -55,12 +55,12 @@ HUM_WINDOW = 161
 """Frequencies whose median is the power beside a hum."""
 
 HORIZON_TOLERANCE = 1e-2
-"""Relative gain at which initial states of a stretch are found."""
+"""Relative gain at which initial states of a segment have converged."""
 
 HORIZON_LEAST = 50
 """Samples of the shortest horizon at least."""
 
-HORIZON_THIN, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
+HORIZON_DECIMATION, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
 """Initial states for a horizon: decimation of the first fit, its steps, those where a shorter one is known,
 and those at the full rate."""
 

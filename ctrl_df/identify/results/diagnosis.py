@@ -48,7 +48,7 @@ def which_errors(measure: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Predicting:
-    """A model and the records by which its free prediction is judged.
+    """A model and the records that its free prediction is compared with.
 
     Attributes
     ----------

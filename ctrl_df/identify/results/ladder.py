@@ -147,8 +147,8 @@ class Study(Brief):
     @property
     def story(self) -> list[str]:
         """What became of effects on the way, and what the neighbours come to, in sentences."""
-        told = [s.sentence for s in self.steps if s.sentence]
-        return [*told, self.neighbours.sentence] if self.neighbours else told
+        notes = [s.sentence for s in self.steps if s.sentence]
+        return [*notes, self.neighbours.sentence] if self.neighbours else notes
 
     @property
     def measure(self) -> str:
@@ -171,8 +171,8 @@ class Study(Brief):
         head = self._outcome()
         if self.status != COMPLETE:
             head = f"Not complete ({self.status}): the ladder would have continued. {head}"
-        told = [line for line in (which_errors(self.measure),) if line]
-        lines = [" ".join([head, *self.story]), "", self.table(), *told, ""]
+        notes = [line for line in (which_errors(self.measure),) if line]
+        lines = [" ".join([head, *self.story]), "", self.table(), *notes, ""]
         if self.neighbours:
             lines += [str(self.neighbours.table()), ""]
         for name, p in self.model.parameters.items():
@@ -186,7 +186,7 @@ class Study(Brief):
                 f"Nothing is missing: with refitted parameters the model errs by {percent(first.nrmse)}, "
                 "the noise of these data."
             )
-        far, told = ("", last.diagnosis) if self.status == COMPLETE else (" so far", None)
+        far, notes = ("", last.diagnosis) if self.status == COMPLETE else (" so far", None)
         held = math.isfinite(first.nrmse_holdout + last.nrmse_holdout)
         if self.effects:
             on = f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
@@ -201,9 +201,9 @@ class Study(Brief):
                 f"Nothing is added{far}: with refitted parameters the model errs by {percent(last.nrmse)} "
                 f"({on}noise {percent(self.noise)})."
             )
-        if self.verdict == UNKNOWN and told is not None:
-            left = f"Something outside the library is missing. {told.remains}"
-            head += f" {left if told.remains else told.explanation}"
+        if self.verdict == UNKNOWN and notes is not None:
+            left = f"Something outside the library is missing. {notes.remains}"
+            head += f" {left if notes.remains else notes.explanation}"
         elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
             head += f" {last.diagnosis.explanation}"
         return head

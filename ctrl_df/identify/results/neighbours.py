@@ -34,7 +34,7 @@ class Neighbour:
     verdict : {'better', 'equal', 'worse'}
         ``equal``: within what chance makes. A model that has an effect more needs the evidence of any effect.
     refitted : bool
-        Whether it was fitted to all data. If not, a first look has shown that it comes nowhere near.
+        Whether it was fitted to all data. If not, screening has shown that it comes nowhere near.
     given : bool
         Whether the effect dropped is the user's own: such effects stay, whatever the data say.
     parameters : dict

@@ -59,7 +59,7 @@ def confirmed(
         From screening, best first.
     staged : callable
         ``staged(at, fits)``, such as `stages`.
-    told, stage : callable
+    report, stage : callable
         See `Screening.run`.
     """
     span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)

@@ -27,7 +27,7 @@ def matching_along(data: SegmentedData, block) -> Callable:
 
     `data`, `block`: the motion, and the model that is driven along it.
     """
-    motion = motion_of(data.train, data.thin, block)
+    motion = motion_of(data.train, data.decimation, block)
     return lambda tried, other: like_another(
         tried.block.effects[-1], other.block.effects[-1], motion.x, motion.v
     )

@@ -129,7 +129,7 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     shortest, data = segmentations[:2]
     begins = [block]
     names = (inertia(block), dry_level(block), viscous_slope(block))
-    plain, own, *_ = force_regression(motion_of(data.train, data.thin, block), data.scales, block)
+    plain, own, *_ = force_regression(motion_of(data.train, data.decimation, block), data.scales, block)
     guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:

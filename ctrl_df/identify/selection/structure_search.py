@@ -10,7 +10,7 @@ import numpy as np
 
 from ..course import Course
 from ..estimation.fit import in_null_directions
-from ..estimation.refit_records import cannot_be_told_apart, undetermined
+from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
@@ -188,7 +188,7 @@ class StructureSearch(Search):
 
     def open_directions(self):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
-        return cannot_be_told_apart(self.at.base.train)
+        return indistinguishable_parameters(self.at.base.train)
 
     def predicted(self, candidate):
         """Return the model and the records held out (angles as these have them), or those fitted."""

@@ -23,7 +23,7 @@ STOPPED_EARLY = 3 * SIGNIFICANT
 which fits gained on the rigs when brought to their end. More costs time, less the right one now and then."""
 
 PROMISING = 0.2
-"""Share of the best one's evidence, at the first look, from which a candidate is confirmed: there records are
+"""Share of the best one's evidence, at screening, from which a candidate is confirmed: there records are
 decimated fourfold and fits unfinished, so that the right one may show a fifth of its evidence (rigs)."""
 
 FORCE_ALIKE = 0.98
@@ -56,10 +56,11 @@ FOLLOWED = 0.05
 law leaves that where the input is not known exactly (a moving base read by an accelerometer: 0.015), one that
 stands in for another law more (rigs with something unknown hidden: 0.07 and more)."""
 
-CURVE_TOLD = 0.15
-"""Share of a missing force that is a curve over one quantity from which on that quantity is told. On 40 rigs
-with something unknown hidden 19 came to it, and for 16 of them the quantity was the right one; under steps of
-force three had a curve after reversals in the place of one over time or position, of 0.37 to 0.54."""
+CURVE_SHARE = 0.15
+"""Share of a missing force that is a curve over one quantity from which on that quantity is reported. On 40
+rigs with something unknown hidden 19 came to it, and for 16 of them the quantity was the right one; under
+steps of force three had a curve after reversals in the place of one over time or position, of 0.37 to
+0.54."""
 
 SIZE_KNOWN = 0.5
 """Standard error over the size of an effect, beyond which it may be none: two of them reach zero."""
@@ -107,15 +108,16 @@ away."""
 # --- work -------------------------------------------------------------------------------------------
 
 CONFIRMED, CONFIRMED_FORCED = 6, 10
-"""Most candidates that are refitted at the full rate: two, and all that the first look left near the best;
-where disturbance forces let it tell little."""
+"""Most candidates that are refitted at the full rate: two, and all that screening left near the best;
+where disturbance forces let it distinguish little."""
 
 REFUTED_MOST = 2
-"""Candidates that long stretches refute, after each of which all others are looked at again without it: a
-joint and a gap, which have the hidden states that follow short segments. Each look is a whole search."""
+"""Candidates that long horizons refute, after each of which the search is repeated without it: a
+joint and a gap, which have the hidden states that follow short segments. Each repetition is a whole
+search."""
 
 LONG_RIVALS = 2
-"""Rivals that the best one is compared with over long stretches, beside the baseline: each costs as much as a
+"""Rivals that the best one is compared with over long horizons, beside the baseline: each costs as much as a
 comparison at eight lengths."""
 
 EFFORT_TRIED, EFFORT_ILL_CONDITIONED, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
@@ -126,15 +128,15 @@ EFFORT_CONFIRMED, EFFORT_ENDED = (3, 1e-3), (8, 1e-6)
 """The same at the full rate, and of near equals: a gain of a millionth is 0.005 nats of 10,000 samples."""
 
 BEGUN, KEPT, JOINTS = 2, 2, 3
-"""Steps of every fit before the first look, fits of an effect that go on after it; joints of a share of load
-that begin."""
+"""Steps of every fit before the first comparison, fits of an effect that go on after it; joints of a share of
+load that begin."""
 
 LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
 """Of the mass behind the joints that are tried."""
 
 BASE_STEPS, BASE_LONGER_STEPS = 8, 12
-"""Steps of the refitted model over short segments, and moved to longer ones: every candidate is judged beside
-it, so that it goes on for twice as long as a candidate does at first."""
+"""Steps of the refitted model over short segments, and moved to longer ones: every candidate is compared
+with it, so that it goes on for twice as long as a candidate does at first."""
 
 RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
 """Steps of the models among which rivals of one more effect are sought: their errors are compared only."""

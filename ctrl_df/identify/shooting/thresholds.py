@@ -78,7 +78,7 @@ BEGINNINGS = (16, 8, 4, 2)
 over twice that."""
 
 NOISE_ORDER = 12
-"""Largest order of the noise model of a residual that others are judged by."""
+"""Largest order of the noise model of a residual that evidence is whitened by."""
 
 IMPULSE_GONE = 1e-6
 """Over its peak, an impulse response that has died out."""

@@ -96,7 +96,7 @@ class MissingForce:
 
     @property
     def known(self) -> np.ndarray:
-        """Where the record tells of the force, (n,) bool."""
+        """Where the record determines the force, (n,) bool."""
         return self.std < FORCE_KNOWN * self.size
 
     @cached_property

@@ -121,7 +121,7 @@ class FrequencyComparison(ComparisonBase):
 
     @property
     def over(self) -> str:
-        """What the model was judged over, in words."""
+        """What the errors are over, in words."""
         return "the plane"
 
     def plot(self, record=None, **keywords):

@@ -203,7 +203,7 @@ class TableSearch(Search):
         found = fit_table(block, self.inside, names, self.scales, iterations=iterations)
         return self._trial(block.newest if block.effects else "", found, len(names))
 
-    # --- judging --------------------------------------------------------------------------------------
+    # --- evidence -------------------------------------------------------------------------------------
 
     def ranked(self, base, candidates: Sequence[TableTrial]):
         """Return models with their evidence over `base`, best first.
@@ -263,7 +263,7 @@ class TableSearch(Search):
     # --- what it comes to -----------------------------------------------------------------------------
 
     def remainder(self, best, significant):
-        """Split the error into scatter and structure, and judge whether the latter is explained."""
+        """Split the error into scatter and structure, and decide whether the latter is explained."""
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
