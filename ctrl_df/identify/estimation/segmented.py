@@ -258,9 +258,9 @@ class SegmentedData:
         view = view or self.train
         return fit_segments(
             block, view.records, view.segments, names, decimation=self.decimation, starts=starts,
-            iterations=iterations, tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
-            error_filter=self.error_filter, begins=self.begins, give_up=give_up, steps_left=steps_left,
-            robust=self.robust, rtol=self.rtol_of(block), followed=followed,
+            iterations=iterations, tolerance=tolerance, limits=self.limits_of(block), about=self.about,
+            errors=self.step > 0, error_filter=self.error_filter, begins=self.begins, give_up=give_up,
+            steps_left=steps_left, robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
     def states_of(
