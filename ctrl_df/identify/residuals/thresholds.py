@@ -84,7 +84,9 @@ FINEST = 0.02
 """Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
 
 STRAY = 1e-3
-"""Share of rounded samples that may lie on any line."""
+"""Share of rounded samples that may lie on any line: one that no model explains then costs log 1000 = 7 nats,
+and does not refute the grid alone."""
 
 ROUNDING_SPREAD = (-5.0, 0.0)
-"""Logarithms between which the error of a model lies that rounding hides, over the step."""
+"""Logarithms between which the error of a model lies that rounding hides, over the step: below e^-5, 0.007
+steps, no line is uncertain; beyond a whole step rounding hides nothing (`COARSE`)."""

@@ -37,7 +37,8 @@ PROMISES = 0.25
 it to be tried: the special case of a right law is right over a part of the motion."""
 
 EXPLAINS_LITTLE, SHOWS_HARDLY = 0.8, 0.97
-"""Error of the best candidate over the baseline's from which it explains little, and next to nothing."""
+"""Error of the best candidate over the baseline's from which it explains little, a third of the power (1 -
+0.8^2), and next to nothing: 3 % are one standard deviation of that ratio for 1,000 effective samples."""
 
 LITTLE_CHANCE = 0.1
 """Error held out, of the baseline's, below which it does not matter whether a part of it is chance: 99 %
@@ -95,7 +96,8 @@ FINE = 0.1
 1 % (describing function of a quantizer, over amplitudes about the square root of two of the spread)."""
 
 SAME_STEP = 0.01
-"""Relative difference of two steps of the same grid."""
+"""Relative difference of two steps of the same grid: the resolutions of two sensors differ by a factor of two
+or more, and a step that thousands of samples keep to is known far better."""
 
 EXACT = 10 * NOISE_FREE
 """Error over the spread of the output that is no error."""
@@ -108,8 +110,9 @@ away."""
 # --- work -------------------------------------------------------------------------------------------
 
 CONFIRMED, CONFIRMED_FORCED = 6, 10
-"""Most candidates that are refitted at the full rate: two, and all that screening left near the best;
-where disturbance forces let it distinguish little."""
+"""Most candidates that are refitted at the full rate: two, and all that screening left near the best; where
+disturbance forces let it distinguish little. Each costs as much as the whole screening of several effects;
+half and twice were not tried."""
 
 REFUTED_MOST = 2
 """Candidates that long horizons refute, after each of which the search is repeated without it: a
@@ -121,18 +124,23 @@ LONG_RIVALS = 2
 comparison at eight lengths."""
 
 EFFORT_TRIED, EFFORT_ILL_CONDITIONED, EFFORT_MOVED = (6, 1e-2), (14, 3e-3), (4, 1e-2)
-"""Steps of the fit of an effect at most, and the relative gain of its cost that is none: one whose minimum
-may be long and bent takes more; from segments to others less (rigs)."""
+"""Iterations of the fit of an effect at most, and the relative gain of its cost at which it ends: a gain of
+1e-2 is 12 nats of 2,500 samples (`SCREEN_SAMPLES`), less than what makes an effect; an ill-conditioned one
+gains less a step, and takes more of them down to 4 nats; from segments to others fewer are left. Numbers of
+iterations were chosen on the rigs."""
 
 EFFORT_CONFIRMED, EFFORT_ENDED = (3, 1e-3), (8, 1e-6)
-"""The same at the full rate, and of near equals: a gain of a millionth is 0.005 nats of 10,000 samples."""
+"""The same at the full rate, and of near equals: a gain of 1e-3 is 5 nats of 10,000 samples, which rules out
+a rival (`RULED_OUT`), one of 1e-6 0.005 nats."""
 
 BEGUN, KEPT, JOINTS = 2, 2, 3
-"""Steps of every fit before the first comparison, fits of an effect that go on after it; joints of a share of
-load that begin."""
+"""Iterations of every fit before the first comparison: one of Gauss and Newton, one that corrects what it did
+not foresee; fits of an effect that are continued after it; joints of a share of load that fits start from.
+Only work depends on the first while the right start is among the best."""
 
 LOAD_SHARES = (0.15, 0.35, 0.6, 0.85)
-"""Of the mass behind the joints that are tried."""
+"""Shares of the mass behind the joints that fits start from, a quarter apart or less, so that a share is off
+by an eighth of the mass; at the ends a part of 0.15 changes the motion little."""
 
 BASE_STEPS, BASE_LONGER_STEPS = 8, 12
 """Steps of the refitted model over short segments, and moved to longer ones: every candidate is compared
@@ -142,4 +150,5 @@ RIVAL_STEPS, RIVAL_BASE_STEPS = 4, 3
 """Steps of the models among which rivals of one more effect are sought: their errors are compared only."""
 
 STEPS_LONGER = 6
-"""Steps over longer segments of fits that have begun there."""
+"""Iterations over longer segments of fits that were started there: as many as an effect is tried with
+(`EFFORT_TRIED`)."""
