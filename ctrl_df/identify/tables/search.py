@@ -167,7 +167,7 @@ class TableSearch(Search):
                 found.append(self._trial(*r, work=WORK_MEDIUM))
                 course.known((self, self.ranked(self.base, found)))
         ranked = self.ranked(self.base, found)
-        return self.after(first_look=ranked), ranked
+        return self.after(screened=ranked), ranked
 
     def confirm(self, found, course=None):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
