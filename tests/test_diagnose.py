@@ -242,7 +242,7 @@ def test_a_joint_that_is_found_says_which_side_the_sensor_sees():
         model = axis.with_measured(side)
         first = SimpleNamespace(model=model.with_effect(cdf.Backlash(0.02)))
         text = explain.sensed_side(SimpleNamespace(model=model), first)
-        assert f"to see the {side}" in text and f'measured="{other}"' in text
+        assert f"to measure the {side}" in text and f'measured="{other}"' in text
         assert explain.sensed_side(SimpleNamespace(model=model), SimpleNamespace(model=model)) == ""
 
 
