@@ -97,7 +97,7 @@ def over_the_truth(rig, train, held, model):
     free = [k for k in default_free(rig.true_block) if k not in rig.known]
     true = data.level(4).moved(data.level(16).fit(rig.true_block, free))
     same = data.level(4).fine
-    return same.judged(model)[2] / same.judged(same.moved(true, 3).model)[2]
+    return same.evaluated(model)[2] / same.evaluated(same.moved(true, 3).model)[2]
 
 
 def nothing(kind, seed, peers):

@@ -15,7 +15,7 @@ building's engineers want a model that holds at other strokes and frequencies th
 
 **Method.** Motion goes in, force comes out: the model is a `Massless` and every error is one of force. Start
 from dry and viscous friction, look at the force that is missing, let `improve` name it on one record, held
-against another of half the stroke, and judge the answer at another frequency too.
+against another of half the stroke, and validate the answer at another frequency too.
 """
 
 import sys

@@ -17,7 +17,7 @@ when the site is built.
 
 **Equations.** Published: :math:`M \ddot x = F - F_v \dot x - F_c \operatorname{sign} \dot x - F_0`.
 
-**Method.** ``improve``: one effect after another, judged on the record with pulses. Then what a drive has
+**Method.** ``improve``: one effect after another, validated on the record with pulses. Then what a drive has
 anew every day, from half of that record; then an effect of our own.
 """
 
@@ -56,7 +56,7 @@ def controller(folder) -> tuple[float, float, float]:
 
 
 # %%
-# Two figures judge a model. **Force error**: the force that the measured motion demands of the model, against
+# Two figures of merit. **Force error**: the force that the measured motion demands of the model, against
 # the force recorded; once as published, and once counting that a force held over a sample acts half a sample
 # late (at the pulses of the test record that matters). **Free run**: the model alone on the recorded force,
 # from rest at the first sample; nothing holds a mass on a rail in place, so every tenth of a newton adds up

@@ -18,7 +18,7 @@ known: a drive with a stop of rubber, a spring that hardens with the cube of the
 
 the last term unknown to the model.
 
-**Method.** ``diagnose``: the model refitted, every effect of the library tried in it, judged on data held
+**Method.** ``diagnose``: the model refitted, every effect of the library tried in it, validated on data held
 back.
 """
 

@@ -10,16 +10,16 @@ measured force drops to nothing for a while, and only then builds up on the othe
 
     motion x(t) ---->[ rod | pin with play | dry friction | oil ]----> force F(t) of the machine
 
-**Equations.** No mass moves freely, so nothing is integrated but what the damper hides, the stretch z of its
-linkage, of which the gap g is taken off at either side:
+**Equations.** No mass moves freely, so nothing is integrated but what the damper hides, the deflection z of
+its linkage, of which the gap g is taken off at either side:
 
 .. math::
 
     F = k\, b + d\, \dot b + c\, \dot x, \qquad b = z \mp g/2, \qquad
     \dot z = \dot x - |\dot x|\, |q|\, q, \qquad q = k\, b / F_c
 
-**Method.** A block without mass (`Massless`) is given the motion and judged by its force. The motion is read
-as carefully as a force would be: the comparison says how.
+**Method.** A block without mass (`Massless`) is given the motion and compared by its force. The motion is
+read as carefully as a force would be: the comparison says how.
 """
 
 import matplotlib.pyplot as plt
@@ -44,7 +44,7 @@ record, other = tested(0.02, 2.6, 0, "20 mm"), tested(0.03, 1.7, 1, "30 mm, slow
 print(cdf.compare(model, record))
 
 # %%
-# **Result.** Three laws that build up after a reversal are tried; a record of another amplitude judges.
+# **Result.** Three laws that build up after a reversal are tried; a record of another amplitude decides.
 
 laws = ["bristle", "hysteresis", "loose_linkage"]
 diagnosis = cdf.diagnose(model, record, holdout=other, candidates=laws)

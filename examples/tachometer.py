@@ -1,9 +1,9 @@
 r"""
-A fan judged by its tachometer
-==============================
+A fan identified from its tachometer
+====================================
 
 **Problem.** A motor drives a fan; all that is measured is its speed, by a tachometer, in rpm. The drive is
-told volts. The model in use knows the motor, dry and viscous friction. The air does not brake like that:
+given volts. The model in use knows the motor, dry and viscous friction. The air does not brake like that:
 does a record of voltage and speed show it, with no angle measured?
 
 .. code-block:: text
@@ -17,8 +17,9 @@ does a record of voltage and speed show it, with no angle measured?
     J \dot \Omega = \frac{k}{R} (u - k\, \Omega) - d\, \Omega - \tau_c \operatorname{sign} \Omega
     - c\, \Omega |\Omega|
 
-**Method.** The unit says that the output is a speed; the model is then judged by its own speed. Constant and
-resistance of the motor are on its plate: they are held, as the speed alone tells no torque from an inertia.
+**Method.** The unit says that the output is a speed; the model is then compared by its own speed. Constant
+and resistance of the motor are on its plate: they are held, as the speed alone tells no torque from an
+inertia.
 """
 
 import matplotlib.pyplot as plt

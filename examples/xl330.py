@@ -24,7 +24,7 @@ where none does, a share of each in between.
 
 **Method.** Weight and arm are known, and so is the torque of gravity: it is the scale by which volts become
 torques. The rest is refitted on the records of the lower gain, over segments of half a second, with and
-without the friction that carries load, and judged on those of the higher gain; beside it, refitted in the
+without the friction that carries load, and validated on those of the higher gain; beside it, refitted in the
 same way, the law that BAM prefers, whose bump at low speed grows with the load as well. Then the same as if
 nobody had weighed the pendulum: the published constant of the motor is the scale, and inertia and torque of
 gravity are fitted as well.
@@ -109,7 +109,7 @@ added = {
 }
 
 
-def judge(baseline, free):
+def validate(baseline, free):
     """Refit a model with each law of friction in turn, print and return what it does on records held out."""
     errors, compared, torque = {}, {}, {}
     for name, (effects, more) in added.items():
@@ -134,9 +134,9 @@ def judge(baseline, free):
 # **Result.**
 
 print("Weight and arm known:")
-first, second, _ = judge(plain, ("inertia", "torque_constant.constant", "coulomb", "viscous")).values()
+first, second, _ = validate(plain, ("inertia", "torque_constant.constant", "coulomb", "viscous")).values()
 print("\nWeight and arm unknown:")
-judge(unweighed, ("inertia", "gravity.torque", "coulomb", "viscous"))
+validate(unweighed, ("inertia", "gravity.torque", "coulomb", "viscous"))
 first.plot(beside=second, labels=list(added)[:2])
 
 # %%

@@ -29,8 +29,8 @@ def test_simulation_agrees_with_the_rig(hidden):
     y = Simulator(rig.true_block, measured).run(make_segments(measured))
     # The start is estimated from noisy data: worst 0.3 of the noise; decimated 1.3.
     assert np.std(y - record.clean) < 0.6 * record.noise
-    thin = Simulator(rig.true_block, measured, thin=4).run(make_segments(measured))
-    assert np.std(thin - record.clean) < 2 * record.noise
+    decimation = Simulator(rig.true_block, measured, decimation=4).run(make_segments(measured))
+    assert np.std(decimation - record.clean) < 2 * record.noise
 
 
 def test_delays_offset_and_drift_are_exact():

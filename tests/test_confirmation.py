@@ -17,9 +17,9 @@ class Fit:
 
 def test_a_fit_over_short_segments_errs_no_more_than_over_longer_ones():
     shorter = SimpleNamespace(moved=lambda f: Fit(0.9 * f.rmse))
-    near, far = confirmation._begun_again(shorter, None, Fit(2.0), Fit(1.0), 5.0)
+    near, far = confirmation._reconciled(shorter, None, Fit(2.0), Fit(1.0), 5.0)
     assert (near.rmse, far.rmse) == (0.9, 1.0)
-    near, _ = confirmation._begun_again(shorter, None, Fit(0.95), Fit(1.0), 5.0)
+    near, _ = confirmation._reconciled(shorter, None, Fit(0.95), Fit(1.0), 5.0)
     assert near.rmse == 0.95
 
 

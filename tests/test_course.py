@@ -28,7 +28,7 @@ def ask(**keywords):
     return cdf.diagnose(RIG.baseline, TRAIN, holdout=HELD, candidates=FEW, **keywords)
 
 
-def climb(**keywords):
+def interrupted_ladder(**keywords):
     return cdf.improve(RIG.baseline, TRAIN, HELD, candidates=FEW, max_effects=1, **keywords)
 
 
@@ -64,7 +64,7 @@ def test_what_a_callback_raises_ends_the_diagnosis():
     with pytest.raises(Enough):
         ask(callback=stop)
     with pytest.raises(Enough):
-        climb(callback=stop)
+        interrupted_ladder(callback=stop)
 
 
 @pytest.mark.parametrize("budget", [1e-3, 0.8])
@@ -74,7 +74,7 @@ def test_a_budget_returns_what_is_known(budget):
     assert time.perf_counter() - began < 20
     assert found.status == "budget spent" and found.ranking
     assert found.verdict in ("ambiguous", "unknown")
-    study = climb(budget=budget)
+    study = interrupted_ladder(budget=budget)
     text = study.summary()
     assert study.status == "budget spent" and study.steps and "budget spent" in text
     # no fall of an error that did not fall, nothing outside the library that was not tried
@@ -110,7 +110,7 @@ def test_ctrl_c_in_a_ladder_keeps_the_steps_made():
         if len(study.steps) == 2:
             raise KeyboardInterrupt
 
-    study = climb(callback=stop)
+    study = interrupted_ladder(callback=stop)
     assert study.status == "interrupted" and study.effects == ("linear_spring",)
     assert study.verdict == "effect" and study.model is study.steps[-1].model
 
@@ -139,7 +139,7 @@ def test_progress_and_log(told, caplog, capsys):
 
 
 def test_a_stage_that_lasts_tells_that_it_goes_on(monkeypatch):
-    monkeypatch.setattr("ctrl_df.identify.course.SILENT_MOST", 0.05)
+    monkeypatch.setattr("ctrl_df.identify.course.PROGRESS_EVERY", 0.05)
     monkeypatch.setattr(Course, "beat", 0.02)
     lines = []
     course = Course("improve", lines.append)
@@ -154,11 +154,11 @@ def test_errors_are_clear():
     with pytest.raises(ValueError, match="budget > 0"):
         ask(budget=0)
     with pytest.raises(TypeError, match="budget"):
-        climb(budget="a minute")
+        interrupted_ladder(budget="a minute")
     with pytest.raises(TypeError, match="callback"):
         ask(callback=3)
     with pytest.raises(TypeError, match="progress"):
-        climb(progress="yes")
+        interrupted_ladder(progress="yes")
 
 
 def test_error_of_free_prediction_against_its_length(told):

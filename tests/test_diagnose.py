@@ -242,7 +242,7 @@ def test_a_joint_that_is_found_says_which_side_the_sensor_sees():
         model = axis.with_measured(side)
         first = SimpleNamespace(model=model.with_effect(cdf.Backlash(0.02)))
         text = explain.sensed_side(SimpleNamespace(model=model), first)
-        assert f"to see the {side}" in text and f'measured="{other}"' in text
+        assert f"to measure the {side}" in text and f'measured="{other}"' in text
         assert explain.sensed_side(SimpleNamespace(model=model), SimpleNamespace(model=model)) == ""
 
 
@@ -250,7 +250,7 @@ def test_what_every_record_has_for_itself_is_not_told_as_one_number():
     phases = PerRecord.angles(["a", "b"], [0.3, 2.1])
     model = cdf.Mass(1.0).with_effect(cdf.PositionRipple(2.0, 0.1, phases))
     text = explain.values_of(SimpleNamespace(model=model, parameters=model.effects[-1].parameters))
-    assert text == "amplitude 2 N, wavelength 0.1 m, phase of each record its own"
+    assert text == "amplitude 2 N, wavelength 0.1 m, phase a value for each record"
 
 
 def test_a_hysteresis_that_motion_does_not_bend_is_a_spring():
@@ -277,7 +277,7 @@ def test_errors_are_clear():
 
 @pytest.mark.parametrize("second, verdict", [("constant_force", "effect"), ("quadratic_drag", "unknown")])
 def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
-    """A spring and a constant force: the spring is named, and that something is missing beside it."""
+    """A spring and a constant force: the spring is named, and that something else is missing, too."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60)).with_effect(cdf.ConstantForce(0.4))
     t = 2e-3 * np.arange(2000)
 
@@ -292,8 +292,8 @@ def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
     found = diagnose(cdf.friction_mass(2.2, 3, 6), recorded(1), holdout=recorded(2), candidates=few)
     assert found.verdict == verdict and found.best.id == "linear_spring"
     told = " ".join(found.doubts)
-    assert "What linear spring leaves is more than noise" in told
-    assert ("constant force is missing beside it" in told) == (verdict == "effect")
+    assert "The residual with linear spring is more than noise" in told
+    assert ("constant force is missing as well" in told) == (verdict == "effect")
 
 
 @pytest.mark.parametrize(
@@ -328,7 +328,7 @@ def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
     stated = cdf.friction_mass(2, 2.5, 5).with_effect(cdf.TorqueConstant(1.0))
     found = diagnose(stated, record, candidates=["linear_spring"])
     assert found.verdict == "effect" and found.best.determined
-    assert any("mass" in s and "cannot be told apart" in s for s in found.doubts)
+    assert any("mass" in s and "cannot be distinguished" in s for s in found.doubts)
     model = {k: p.value for k, p in found.best.model.parameters.items()}
     scale = model["torque_constant.constant"] / 0.8
     # measured: one part in ten thousand

@@ -12,7 +12,7 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
 from ctrl_df.identify.selection.evidence import ranked
-from ctrl_df.identify.selection.verdict import favoured_held_out, worth
+from ctrl_df.identify.selection.verdict import favoured_held_out, is_significant
 from ctrl_df.identify.shooting.variables import Variable
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
@@ -64,8 +64,8 @@ def test_one_segment_held_out_speaks_for_no_effect(fitted):
     for segment in range(held):
         unlucky = with_error(base, segment, 100.0)
         lucky = replace(base, key="linear_spring", extra=1)
-        judged = ranked(unlucky, [lucky])[0][0]
-        assert judged.evidence < 0 and judged.evidence_validation == pytest.approx(0, abs=1e-6)
+        ranking = ranked(unlucky, [lucky])[0][0]
+        assert ranking.evidence < 0 and ranking.evidence_validation == pytest.approx(0, abs=1e-6)
         # what all segments speak for is found all the same, whatever the baseline does in one of them
         assert ranked(unlucky, [spring])[0][0].evidence > 100
 
@@ -73,18 +73,18 @@ def test_one_segment_held_out_speaks_for_no_effect(fitted):
 def test_a_failure_in_one_segment_counts(fitted):
     _, base, spring = fitted
     failed = with_error(spring, 0, 1e4)
-    judged = ranked(base, [failed])[0][0]
-    assert judged.evidence < 0 and judged.evidence_validation < 0
+    ranking = ranked(base, [failed])[0][0]
+    assert ranking.evidence < 0 and ranking.evidence_validation < 0
 
 
 def test_evidence_is_the_least_of_those_without_one_segment(fitted):
     data, base, spring = fitted
-    judged = ranked(base, [spring])[0][0]
+    ranking = ranked(base, [spring])[0][0]
     # white noise: what all tell, less the share of one segment
     total = np.concatenate(base.residuals), np.concatenate(spring.residuals)
     whole = 0.5 * len(total[0]) * np.log(np.sum(total[0] ** 2) / np.sum(total[1] ** 2))
     count = sum(map(len, (data.train.segments[0], data.validation.segments[0])))
-    assert 0.6 * (1 - 1 / count) * whole < judged.evidence < whole
+    assert 0.6 * (1 - 1 / count) * whole < ranking.evidence < whole
 
 
 def test_sigma_points_are_a_standard_deviation_off():
@@ -116,11 +116,11 @@ def test_a_fit_has_the_sigma_points_of_its_covariance(fitted):
 def test_whole_steps_of_a_sensor_are_no_growing_error():
     """A model right to a part of a step errs by whole ones: the probability of the lines has judged it."""
     search = SimpleNamespace(
-        base=None, errors=lambda judged: (1.0, 1.0), significant=20, significant_validation=5
+        base=None, errors=lambda ranking: (1.0, 1.0), significant=20, significant_validation=5
     )
     told = dict(nrmse_holdout=1.1, evidence_fitted=100.0, evidence_holdout=50.0)
-    assert worth(SimpleNamespace(effect=cdf.SensorQuantization(1e-3), **told), search)  # type: ignore[arg-type]
-    assert not worth(SimpleNamespace(effect=cdf.LinearSpring(1.0), **told), search)  # type: ignore[arg-type]
+    assert is_significant(SimpleNamespace(effect=cdf.SensorQuantization(1e-3), **told), search)  # type: ignore[arg-type]
+    assert not is_significant(SimpleNamespace(effect=cdf.LinearSpring(1.0), **told), search)  # type: ignore[arg-type]
 
 
 def test_an_encoder_fitted_to_small_motions_is_found_in_large_ones():

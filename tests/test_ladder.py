@@ -8,8 +8,8 @@ import pytest
 
 import ctrl_df as cdf
 from ctrl_df.identify.course import Course
-from ctrl_df.identify.ladder.climb import Climb
 from ctrl_df.identify.ladder.revision import revised
+from ctrl_df.identify.ladder.stepwise import StepwiseSelection
 from ctrl_df.identify.ladder.structure import Structure
 from ctrl_df.identify.selection.long_prediction import LongPrediction
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
@@ -62,7 +62,7 @@ class Given(Search):
         blocks = [extended(self.block, effect) for effect in made]
         found = [self.fitted(b, (), 0) for b in blocks if b is not None]
         ranked = self.ranked(self.base, [replace(t, extra=1) for t in found])
-        return self.after(first_look=ranked), ranked
+        return self.after(screened=ranked), ranked
 
     def confirm(self, found, course=None):
         return self, [replace(t, confirmed=True) for t in found]
@@ -88,7 +88,7 @@ class Given(Search):
     def so_far(self, judged):
         return Remainder(0.0, 0.0, False)
 
-    def alike(self, a, b):
+    def equivalent(self, a, b):
         return {a.key, b.key} in self.data.alike
 
     def remainder(self, best, significant):
@@ -124,24 +124,24 @@ class Data:
         return Given(self, block, free)
 
 
-def climb(data, names=tuple(MADE), most=5, course=None):
+def ladder_of(data, names=tuple(MADE), most=5, course=None):
     def free(block):
         return [k for k, p in block.parameters.items() if p.free]
 
     classes = [cdf.effect_class(n) for n in names]
     course = course or Course("improve")
-    ladder = Climb(data, data.start, classes, free, most, None, course)
-    return course.run(ladder.to_the_end)
+    ladder = StepwiseSelection(data, data.start, classes, free, most, None, course)
+    return course.run(ladder.run)
 
 
 def test_one_effect_and_its_neighbours():
-    study = climb(Data({"": 0, "linear_spring": 900, "constant_force": 300}))
+    study = ladder_of(Data({"": 0, "linear_spring": 900, "constant_force": 300}))
     assert study.effects == ("linear_spring",) and study.verdict == "effect"
     around = {n.name: n for n in study.neighbours}
     assert around["- linear_spring"].verdict == "worse"
     assert around["- linear_spring + constant_force"].evidence == pytest.approx(-600, abs=10)
     assert around["+ coulomb"].verdict == "equal" and around["+ coulomb"].change == "add"
-    assert study.neighbours.complete and "none does better" in study.summary()
+    assert study.neighbours.complete and "none is better" in study.summary()
     table = study.neighbours.to_pandas()
     assert len(table) == len(study.neighbours) and set(table["verdict"]) <= {"better", "equal", "worse"}
 
@@ -150,11 +150,11 @@ def test_what_stood_in_gives_way_beside_a_later_effect():
     # one curve over speed looks like dry friction and drag together
     levels = {"": 0, "stribeck": 500, "coulomb": 400, "quadratic_drag": 300, "stribeck quadratic_drag": 800,
               "coulomb quadratic_drag": 1000}  # fmt: skip
-    study = climb(Data(levels))
+    study = ladder_of(Data(levels))
     assert set(study.effects) == {"coulomb", "quadratic_drag"}
     last = study.steps[-1]
     assert (last.effect, last.dropped, last.instead) == ("quadratic_drag", ("stribeck",), ("coulomb",))
-    assert "coulomb does what stribeck stood in for" in study.summary()
+    assert "coulomb explains the data better than stribeck" in study.summary()
 
 
 def test_the_end_is_exchanged_for_a_better_neighbour():
@@ -162,7 +162,7 @@ def test_the_end_is_exchanged_for_a_better_neighbour():
     levels = {"": 0, "stribeck": 500, "constant_force": 100, "coulomb": 40, "stiction": 480,
               "hysteresis": 470, "asymmetric_coulomb": 460, "stribeck constant_force": 700,
               "coulomb constant_force": 900}  # fmt: skip
-    study = climb(Data(levels))
+    study = ladder_of(Data(levels))
     assert set(study.effects) == {"coulomb", "constant_force"}
     assert "coulomb" in study.story[0] and not study.neighbours.of("better")
     # no structure is asked about twice for what it misses
@@ -182,7 +182,7 @@ def test_two_that_stood_in_for_one_are_merged():
         return 150 if bad else 700 if "hysteresis" in data.added(block) else found(block)
 
     data.level = level
-    study = climb(data)
+    study = ladder_of(data)
     assert study.effects == ("hysteresis",)
     assert any(len(n.dropped) == 1 and n.change == "drop" for n in study.neighbours)
 
@@ -198,10 +198,10 @@ def test_a_step_has_to_hold_on_the_data_that_judge_it():
             return 0.0 if not self.short else super().level(block)
 
     data = Short({"": 0, "linear_spring": 900})
-    study = climb(data)
+    study = ladder_of(data)
     assert study.effects == () and study.verdict == "unknown"
     last = study.steps[-1].diagnosis
-    assert last.doubts and "It was not added" in last.explanation and last.explanation in study.summary()
+    assert last.doubts and "was not added" in last.explanation and last.explanation in study.summary()
     assert not study.neighbours.of("better")
 
 
@@ -209,13 +209,13 @@ def test_equals_are_told_by_fewer_parameters_and_plain_terms_whatever_the_order(
     levels = {"": 0, "constant_force": 500, "asymmetric_coulomb": 501, "hysteresis": 503}
     data = Data(levels, alike=[{"constant_force", "asymmetric_coulomb"}])
     for names in (tuple(MADE), tuple(reversed(MADE))):
-        assert climb(data, names).effects == ("constant_force",)
+        assert ladder_of(data, names).effects == ("constant_force",)
 
 
 def test_where_something_remains_the_ladder_begins_again_from_what_was_not_followed():
     levels = {"": 0, "hysteresis": 600, "linear_spring": 500, "quadratic_drag": 100,
               "linear_spring quadratic_drag": 2000}  # fmt: skip
-    study = climb(Data(levels))
+    study = ladder_of(Data(levels))
     assert set(study.effects) == {"linear_spring", "quadratic_drag"} and study.verdict == "effect"
     back = next(s for s in study.steps if not s.effect and s.changes)
     assert back.dropped == ("hysteresis",) and back.instead == ("linear_spring",)
@@ -234,7 +234,7 @@ def test_what_an_earlier_step_has_seen_is_tried_again():
             return super().level(block.without_effect("position_ripple") if wrong else block)
 
     levels = {"": 0, "coulomb": 900, "position_ripple": 300, "coulomb position_ripple": 1500}
-    study = climb(Blind(levels))
+    study = ladder_of(Blind(levels))
     assert set(study.effects) == {"coulomb", "position_ripple"} and study.verdict == "effect"
     assert [s.effect for s in study.steps] == ["", "coulomb", "position_ripple"]
 
@@ -245,7 +245,7 @@ def test_of_two_that_hide_each_other_neither_need_be_significant():
     # errors fall, evidence does not reach what chance does
     Given.errors, before = (lambda self, t: (math.exp(-t.level / 100),) * 2), Given.errors
     try:
-        study = climb(data)
+        study = ladder_of(data)
     finally:
         Given.errors = before
     assert set(study.effects) == {"coulomb", "constant_force"}
@@ -260,8 +260,8 @@ def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):
         better = ("linear_spring", "") if "linear_spring" in [c.id for c in ranking] else ()
         return LongPrediction(1.0, {"hysteresis": 0.7, "linear_spring": 0.1, "": 0.3}, better)
 
-    monkeypatch.setattr("ctrl_df.identify.ladder.climb.long_prediction", long_prediction)
-    study = climb(Data(levels))
+    monkeypatch.setattr("ctrl_df.identify.ladder.stepwise.long_prediction", long_prediction)
+    study = ladder_of(Data(levels))
     assert [s.effect for s in study.steps[1:]] == ["linear_spring", "constant_force"]
     assert set(study.effects) == {"linear_spring", "constant_force"}
 
@@ -278,14 +278,14 @@ def test_several_of_a_kind_are_known_by_their_places():
     found = revised(Structure(block, 1, ((), (), ())), search, lambda b: ["mass"])
     assert found.dropped == ("position_ripple", "position_ripple")
     assert found.structure.block.effects == (start.effects[0], added[2])
-    assert climb(Data({"": 0, "position_ripple": 500}, start=start)).effects == ("position_ripple",)
+    assert ladder_of(Data({"": 0, "position_ripple": 500}, start=start)).effects == ("position_ripple",)
 
 
 def test_no_exchange_makes_a_second_of_what_can_be_there_once():
     # each is a rival of the other's step
     levels = {"": 0, "stribeck": 500, "quadratic_drag": 480, "quadratic_drag stribeck": 900,
               "quadratic_drag coulomb": 1000, "coulomb": 470}  # fmt: skip
-    study = climb(Data(levels))
+    study = ladder_of(Data(levels))
     assert len(set(study.effects)) == len(study.effects) == 2
 
 
@@ -296,7 +296,7 @@ def test_what_the_user_gave_stays_and_is_told_of():
             return max(v for k, v in self.levels.items() if k <= mine)
 
     start = cdf.Mass(1.0, [cdf.Viscous(1.0)])
-    study = climb(Idle({"": 0, "linear_spring": 500}, start=start))
+    study = ladder_of(Idle({"": 0, "linear_spring": 500}, start=start))
     own = next(n for n in study.neighbours if n.given)
     assert own.dropped == ("viscous",) and own.verdict == "equal"
     assert study.model.effects[0] == start.effects[0]
@@ -304,7 +304,7 @@ def test_what_the_user_gave_stays_and_is_told_of():
 
 
 def test_a_longest_ladder_of_nothing():
-    study = climb(Data({"": 0, "linear_spring": 500}), most=0)
+    study = ladder_of(Data({"": 0, "linear_spring": 500}), most=0)
     assert study.effects == () and not [n for n in study.neighbours if n.change != "drop"]
 
 
@@ -318,6 +318,6 @@ def test_ctrl_c_keeps_the_best_so_far(after):
             raise KeyboardInterrupt
 
     data = Data({"": 0, "linear_spring": 900, "constant_force": 300, "constant_force linear_spring": 1200})
-    study = climb(data, course=Course("improve", False, stop, None))
+    study = ladder_of(data, course=Course("improve", False, stop, None))
     assert study.status in ("interrupted", "complete") and study.model is study.steps[-1].model
     assert study.summary() and str(study.neighbours) is not None

@@ -1,10 +1,10 @@
-"""What long stretches refute is left out, and all others are tried again without it."""
+"""A candidate that long horizons refute is left out, and the search repeated without it."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_ladder import Data, climb
+from test_ladder import Data, ladder_of
 
 import ctrl_df as cdf
 from ctrl_df.identify.selection import verdict
@@ -52,7 +52,7 @@ def test_who_is_refuted(first, rival, base, ahead, refuted):
 
 
 def refuting(*ids):
-    """Return what long stretches say of a ranking where these effects come to nothing over them."""
+    """Return the long prediction of a ranking where these effects explain nothing over long horizons."""
 
     def judged(ranking, base, significant):
         first, better = ranking[0].id, ("",)
@@ -68,19 +68,19 @@ def level(added):
     return 500.0 if "linear_spring" in added else 600.0 if "hysteresis" in added else 0.0
 
 
-def test_others_are_tried_again_without_what_is_refuted(monkeypatch):
+def test_the_search_is_repeated_without_what_is_refuted(monkeypatch):
     monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
     data = Data({"": 0, "hysteresis": 600, "linear_spring": 500})
     data.top = 500
     monkeypatch.setattr(Data, "level", lambda self, block: level(self.added(block)))
-    study = climb(data)
+    study = ladder_of(data)
     assert study.effects == ("linear_spring",)
     first = study.steps[0].diagnosis
     assert first.verdict == "effect" and "hysteresis" not in [c.id for c in first.ranking]
-    assert "again without hysteresis" in first.explanation
+    assert "repeated without hysteresis" in first.explanation
 
 
 def test_where_nothing_else_explains_it_something_is_missing(monkeypatch):
     monkeypatch.setattr(verdict, "long_prediction", refuting("hysteresis"))
-    first = climb(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
+    first = ladder_of(Data({"": 0, "hysteresis": 900})).steps[0].diagnosis
     assert first.verdict == "unknown" and first.ranking[0].id == "hysteresis"

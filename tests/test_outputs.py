@@ -42,8 +42,11 @@ def test_several_outputs_are_one_record():
     assert dict(record.units) == {"velocity": "rad/s", "position": "rad"}
     for part in (record.slice(0.4, 0.8), record.windows(0.5)[1], pickle.loads(pickle.dumps(record))):
         assert len(part.outputs["velocity"]) == len(part.y) == len(part)
-    thin = record.decimate(4)
-    assert np.allclose(thin.outputs["velocity"], V[::4], atol=0.02) and len(thin.y) == len(thin) == 250
+    decimation = record.decimate(4)
+    assert (
+        np.allclose(decimation.outputs["velocity"], V[::4], atol=0.02)
+        and len(decimation.y) == len(decimation) == 250
+    )
     alone = record.only("velocity")
     assert alone.output == "velocity" and list(alone.outputs) == ["velocity"] and alone.y is not None
     assert "rad/s, rad" in repr(record)

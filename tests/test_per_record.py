@@ -288,13 +288,13 @@ def test_directions_are_told_by_record():
     )
     told = doubts(fit)
     assert told[0].startswith(
-        "m and k of a cannot be told apart on these data: raising m while lowering k of a"
+        "m and k of a cannot be distinguished on these data: raising m while lowering k of a"
     )
-    assert told[1] == "k of a and b leaves no trace in these data: its value is the start value."
+    assert told[1] == "k of a and b has no influence on these data: its value is the start value."
     assert len(told) == 2 and undetermined(fit) == {"m"}
     own["k"]["c"] = own["k"]["a"]
     fit.null = [(0.0, [("k", r, 1.0)]) for r in "abc"]
-    assert doubts(fit) == ("k leaves no trace in these data: its value is the start value.",)
+    assert doubts(fit) == ("k has no influence on these data: its value is the start value.",)
     assert undetermined(fit) == {"k"}
 
 

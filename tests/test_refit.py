@@ -68,7 +68,7 @@ def test_directions_that_cannot_be_told_apart_are_named():
     rig = rigs.draw_none(4)
     fit = refit(rig.baseline.with_effect(InputGain(1.0)), rig.train[0].measurement())
     assert len(fit.unidentifiable) == 1
-    assert "cannot be told apart" in fit.unidentifiable[0] and "mass" in fit.unidentifiable[0]
+    assert "cannot be distinguished" in fit.unidentifiable[0] and "mass" in fit.unidentifiable[0]
     assert not any(p.identifiable for p in fit.parameters.values())
     assert "not determined" in fit.report()
 
@@ -125,7 +125,7 @@ def test_errors_name_the_remedy():
 
 
 def test_a_fit_tells_what_is_correlated():
-    """Motion at nearly constant speed: Coulomb and viscous friction are hardly told apart."""
+    """Motion at nearly constant speed: Coulomb and viscous friction are hardly distinguished."""
     t = np.arange(0, 4, 0.01)
     force = 8.0 + 0.4 * np.sin(5 * t)
     machine = cdf.friction_mass(1.0, 3.0, 5.0)

@@ -115,7 +115,7 @@ def test_what_is_not_determined_has_an_infinite_error():
     """Of a gain of the drive and all forces together: it had an error of 0.1 % and correlations of 1.86."""
     fit = refitted(PLAIN.with_effect(cdf.InputGain(1.0)))
     assert all(p.standard_error == np.inf and not p.identifiable for p in fit.parameters.values())
-    assert np.all(np.isnan(fit.correlation)) and "cannot be told apart" in fit.report()
+    assert np.all(np.isnan(fit.correlation)) and "cannot be distinguished" in fit.report()
     held = cdf.refit(fit.model, fit.comparison.records[0].record, free=["mass", "coulomb", "viscous"])
     assert all(p.standard_error < 1e-4 for p in held.parameters.values())  # seen: 2e-5
 

@@ -10,9 +10,9 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
-from ctrl_df.identify.selection.alike import begun_like_better
-from ctrl_df.identify.selection.attempts import _begin, _Places
-from ctrl_df.identify.selection.rounding import rounding_evidence
+from ctrl_df.identify.residuals.rounding import rounding_evidence
+from ctrl_df.identify.selection.attempts import _attempts_of, _Places
+from ctrl_df.identify.selection.equivalence import restarted_from_better
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
@@ -61,7 +61,7 @@ def test_windows_that_go_on_from_one_another_are_one_run(name):
     if name == "gap":
         starts[:, 2] = 0.5
     for w in range(1, len(windows)):
-        starts[w] = simulator.carried_on(windows, None, starts)[w]
+        starts[w] = simulator.continued_from(windows, None, starts)[w]
     # worst of these four: 6.2e-8, of the bristle
     assert simulator.run(windows, None, starts) == pytest.approx(data.y[windows.samples], abs=2e-7)
 
@@ -70,7 +70,7 @@ def test_an_input_of_steps_is_decimated_without_loss():
     # measured 1.2e-12, and 7.9e-6 where the input changes at every sample
     for steps, bound in ((True, 1e-11), (False, 3e-5)):
         data = record(PLAIN, steps)
-        error = np.max(np.abs(free_run(PLAIN, data, thin=4) - free_run(PLAIN, data)))
+        error = np.max(np.abs(free_run(PLAIN, data, decimation=4) - free_run(PLAIN, data)))
         assert error < bound * np.ptp(data.y)
 
 
@@ -125,7 +125,7 @@ def test_a_pendulum_starts_from_its_own_inertia():
     assert dict(begun.values)["inertia"] == pytest.approx(0.01, rel=0.15)
 
     # the laws that a model has already take their share of the force
-    fit = force_fit(motion_of(data.train, data.thin, true), data.scales, true, [])
+    fit = force_fit(motion_of(data.train, data.decimation, true), data.scales, true, [])
     assert fit.values["gravity.torque"] == pytest.approx(0.5, rel=0.05)
     assert fit.values["inertia"] == pytest.approx(0.01, rel=0.15)
 
@@ -172,7 +172,7 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
     # the bump as it was found, and a fit that was lost
     bump, lost = PLAIN.with_effect(cdf.Stribeck(0.9, 1e-3)), PLAIN.with_effect(cdf.Stiction(0.5))
     found = [CandidateFit(b.newest, data.fit(b, tuple(b.parameters), iterations=0)) for b in (bump, lost)]
-    again = {t.key: t.train for t in begun_like_better(found, data, PLAIN)}
+    again = {t.key: t.train for t in restarted_from_better(found, data, PLAIN)}
     # 26 times the noise as it was lost, 0.95 begun again
     assert again["stiction"].rmse < 1.1 * data.noise < found[1].train.rmse / 10
 
@@ -205,6 +205,6 @@ def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     user, bent = (Screen(data.fit(machine, free, iterations=n), data) for n in (0, 12))
     assert bent.base.model.parameters["viscous.coefficient"].value > 5 * 1.6e-4
     places = _Places(bent, None, user, tuple((k, machine.parameters[k].value) for k in free))
-    _, begun = _begin((cdf.Drift, bent, places, free, False))
+    _, begun = _attempts_of((cdf.Drift, bent, places, free, False))
     rates = [a.block.effects[-1].rate for a in begun if a.nominal]
     assert len(rates) == 1 and abs(rates[0] - 1.1) < 0.1

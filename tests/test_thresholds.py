@@ -12,6 +12,7 @@ import pytest
 import ctrl_df
 from ctrl_df.identify import thresholds
 from ctrl_df.identify.estimation import thresholds as estimation
+from ctrl_df.identify.residuals import thresholds as residuals
 from ctrl_df.identify.selection import thresholds as selection
 
 PACKAGE = Path(ctrl_df.__file__).parent
@@ -93,7 +94,7 @@ def test_what_follows_follows():
     assert 0.1 * thresholds.FALSE_ALARM < chance < thresholds.FALSE_ALARM
     bump = math.exp(-((selection.PASSED / 1e-3) ** 2))
     assert 0.9 * selection.BUMP_LEFT < bump < selection.BUMP_LEFT
-    assert selection.COARSE > 1 / math.sqrt(12)
+    assert residuals.COARSE > 1 / math.sqrt(12)
     assert max(estimation.LEVELS) == estimation.SHORTEST < estimation.SHORT
 
 

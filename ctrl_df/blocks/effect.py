@@ -91,6 +91,9 @@ class Effect:
     multimodal : bool
         Whether the error has many local minima over its parameters in long segments: fits begin in short
         ones.
+    ill_conditioned : bool
+        Whether changes of its parameters and of those of the machine nearly cancel, along a long and curved
+        valley of the error: fits take more iterations there.
     repeatable : bool
         Whether a block may hold several; a second of any other is the first one again.
     turns : bool
@@ -129,6 +132,7 @@ class Effect:
     proportional: ClassVar[bool] = False
     nonsmooth: ClassVar[bool] = False
     multimodal: ClassVar[bool] = False
+    ill_conditioned: ClassVar[bool] = False
     repeatable: ClassVar[bool] = False
     turns: ClassVar[bool] = False
     input_unit = ""
@@ -215,11 +219,13 @@ class Effect:
     def from_spring(
         cls, stiffness: float, damping: float, load_fraction: float, usual: Callable[[str], float]
     ) -> Effect | None:
-        """Return a joint that is nearly a spring [N/m] with a damper [N s/m], or None.
+        """Return a joint that is nearly a spring [N/m] with a damper [N s/m]; None for all other effects.
 
         The base class goes by units: the first parameter of each takes it, others are left at their defaults
         or take sizes that are `usual` for their unit in the records. None where no parameter is a stiffness.
         """
+        if cls.role != "coupling":
+            return None
         given = {"N/m": stiffness, "N s/m": damping}
         values, defaults = {}, {f.name: f.default for f in dataclasses.fields(cls)}
         for name, spec in stated_parameters(cls):

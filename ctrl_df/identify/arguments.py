@@ -182,7 +182,7 @@ def check_quantities(model, records) -> None:
             )
         if units.keys() != _units(records[0]).keys():
             raise ValueError(
-                f"records that are judged together need the same outputs; {records[0].name!r} has "
+                f"records that are fitted together need the same outputs; {records[0].name!r} has "
                 f"{', '.join(_units(records[0]))} and {record.name!r} {', '.join(units)}. Study them apart."
             )
 

@@ -1,4 +1,4 @@
-"""The course of a long computation: what is known so far, who hears of it, and how long it may go on.
+"""The course of a long computation: what is known so far, to whom it is reported, how long it may last.
 
 Work is done in units, between which it may end: where the time given is over, or at Ctrl-C, it is left where
 it stands, and what was known last is the answer.
@@ -16,7 +16,7 @@ from typing import Any
 from ..checks import CHECK_VALUE, positive, shown
 from ..df.work import progress_bar
 from ..simulate import parallel
-from .thresholds import BEAT, SILENT_MOST
+from .thresholds import PROGRESS_EVERY, PROGRESS_POLL
 
 COMPLETE, UNDER_WAY, BUDGET_SPENT, INTERRUPTED = "complete", "under way", "budget spent", "interrupted"
 """How far an answer has come."""
@@ -62,7 +62,7 @@ class Course:
             seconds = positive(owner, "budget", budget, "s", remedy=CHECK_VALUE)
             self._until = self.began + seconds
         self._jobs, self._stage, self._bar = 0, "", None
-        self._told = self.began
+        self._reported = self.began
 
     # --- what happens on the way ----------------------------------------------------------------------
 
@@ -77,7 +77,7 @@ class Course:
     def _tell(self, text: str) -> None:
         """Log a line, and hand it to who takes lines."""
         line = f"{self.owner}: {time.perf_counter() - self.began:.1f} s, {text}"
-        self._told = time.perf_counter()
+        self._reported = time.perf_counter()
         _log.info(line)
         if callable(self._progress):
             self._progress(line)
@@ -100,7 +100,7 @@ class Course:
 
     # --- parallel.Watch -----------------------------------------------------------------------------------
 
-    beat = BEAT
+    beat = PROGRESS_POLL
 
     def left(self) -> float | None:
         """Return how many seconds are left; None: no end is set, or nothing is known yet."""
@@ -117,7 +117,7 @@ class Course:
 
     def waiting(self) -> None:
         """Tell of a stage that lasts how many jobs it has made."""
-        if time.perf_counter() - self._told > SILENT_MOST:
+        if time.perf_counter() - self._reported > PROGRESS_EVERY:
             self._tell(f"{self._stage} ({self._jobs} jobs done)")
 
     # --- from begin to end ----------------------------------------------------------------------------

@@ -119,13 +119,13 @@ def diagnose(
 
     kept = frozenset(block.parameters) - set(names)
 
-    def beside(model):
+    def search_with(model):
         return dataset.search(model, [k for k in dataset.free_parameters(model) if k not in kept])
 
     def work():
         course.stage("the model refitted")
         part = course.within(attrgetter("diagnosis"))
         search = dataset.search(block, names)
-        return diagnosed(search, classes, executor, part, limits, beside).diagnosis
+        return diagnosed(search, classes, executor, part, limits, search_with).diagnosis
 
     return course.run(work)

@@ -14,7 +14,7 @@ from .arguments import (
 )
 from .course import Course
 from .datasets.choice import dataset_of
-from .ladder.climb import Climb
+from .ladder.stepwise import StepwiseSelection
 from .results.ladder import Step, Study
 
 __all__ = ["Step", "Study", "improve"]
@@ -95,5 +95,5 @@ def improve(
     def free_of(block) -> list[str]:
         return [k for k in dataset.free_parameters(block) if k not in kept]
 
-    climb = Climb(dataset, start, classes, free_of, max_effects, executor, course)
-    return course.run(climb.to_the_end)
+    selection = StepwiseSelection(dataset, start, classes, free_of, max_effects, executor, course)
+    return course.run(selection.run)

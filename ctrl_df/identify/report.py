@@ -1,4 +1,4 @@
-"""One self-contained HTML file that tells the story of a ladder: text, tables, pictures inside."""
+"""One self-contained HTML file that reports a ladder: text, tables and pictures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..numerals import percent
 from .thresholds import REPORT_BUDGET, REPORT_DPI
 
 _ERRORS = {
-    "output": "over the rms of the centred output, over segments each of which starts from a fitted state",
+    "output": "over the rms of the centred output, over segments each from a fitted initial state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
     "model has, such as friction that varies, are larger here than the noise of the sensor",
     "N": "of |N|",
@@ -33,7 +33,7 @@ def write_report(study, path) -> str:
     Raises
     ------
     OSError
-        The folder does not exist, or the file cannot be written; said before any picture is drawn.
+        The folder does not exist, or the file cannot be written; raised before any picture is drawn.
     """
     target = place_to_write("report", "path", path)
     target.write_text(render(study), encoding="utf-8")
@@ -107,7 +107,7 @@ def _steps(study, drawn):
         seen = percent(drawn[0 if i == 0 else -1].nrmse) if i in (0, last) else "–"
         rows.append([_did(s), percent(s.nrmse), percent(s.nrmse_holdout), seen, evidence, same])
     rows.append(["noise floor", percent(study.noise), "", "", "", ""])
-    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Not told apart from"]
+    head = ["Step", "Error", "Held out", "As drawn", "Evidence", "Indistinguishable from"]
     return _table(head, rows, numeric=(1, 2, 3, 4))
 
 

@@ -28,8 +28,8 @@ SIGNIFICANT = float(math.ceil(math.log(SHAPES / FALSE_ALARM)))
 RULED_OUT = float(round(math.log(150)))
 """Evidence behind the first beyond which a candidate is no rival: odds of 150 to 1."""
 
-TOLD_APART = float(round(math.log(400)))
-"""Log likelihood ratio that tells two candidates apart: odds of 400 to 1."""
+DISTINGUISHED = float(round(math.log(400)))
+"""Log likelihood ratio that distinguishes two candidates: odds of 400 to 1."""
 
 QUARTILE = round(NormalDist().inv_cdf(0.75), 4)
 """Of a normal distribution: half the values lie within so many standard deviations, 0.6745."""
@@ -70,7 +70,7 @@ NOISE_FREE = 1e-7
 
 UNPLACED = 0.2
 """Error of a place that is an integral of the velocity, over the spread of places: where a record began is
-told by laws that know the place alone, and fits let a place be five of its errors off."""
+determined by laws that depend on the place alone, and fits let a place be five of its errors off."""
 
 SLOWLY = 0.05
 """Speed, over its rms, below which a record hardly moves."""
@@ -114,6 +114,6 @@ EXPONENT = 700.0
 REPORT_BUDGET, REPORT_DPI = 200, 130
 """Simulations of the refit that tells standard errors; dots per inch of its pictures."""
 
-SILENT_MOST, BEAT = 10.0, 2.0
-"""Seconds for which a stage goes on without a line: an attention is kept no longer (Nielsen 1993). How often
-that is looked at while jobs go on: five times in them."""
+PROGRESS_EVERY, PROGRESS_POLL = 10.0, 2.0
+"""Seconds for which a stage goes on without a line: attention is kept no longer (Nielsen 1993). How often
+that is checked while jobs run: five times in them."""

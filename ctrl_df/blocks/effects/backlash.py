@@ -45,6 +45,7 @@ class Backlash(Effect):
     role: ClassVar[str] = "contact"
     nonsmooth: ClassVar[bool] = True
     multimodal: ClassVar[bool] = True
+    ill_conditioned: ClassVar[bool] = True
     divides: ClassVar[bool] = True
     table_starts: ClassVar[int] = 4
     shows: ClassVar[str] = "error after reversals that lasts as long as the gap is crossed"

@@ -44,6 +44,7 @@ class Compliance(Effect):
 
     role: ClassVar[str] = "coupling"
     multimodal: ClassVar[bool] = True
+    ill_conditioned: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     table_starts: ClassVar[int] = 2
     shows: ClassVar[str] = "a resonance in the error spectrum, ringing after every step of force"

@@ -42,6 +42,7 @@ class HardStop(Effect):
     role: ClassVar[str] = "contact"
     nonsmooth: ClassVar[bool] = True
     multimodal: ClassVar[bool] = True
+    ill_conditioned: ClassVar[bool] = True
     shows: ClassVar[str] = "error at the ends of the stroke only: the measured position stops short"
     source: ClassVar[str] = "Newton's law of restitution"
 

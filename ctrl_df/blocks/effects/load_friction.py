@@ -30,6 +30,7 @@ class LoadFriction(Effect):
     proportional: ClassVar[bool] = True
     nonsmooth: ClassVar[bool] = True
     multimodal: ClassVar[bool] = True
+    ill_conditioned: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     side: ClassVar[str] = "load"
     shows: ClassVar[str] = "a step in the error when the load reverses, later than the motor does"

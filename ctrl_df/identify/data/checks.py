@@ -112,7 +112,8 @@ def check_input(owner: str, u: np.ndarray) -> None:
     """Check that the input moves at all."""
     if np.ptp(u) == 0:
         raise ValueError(
-            f"{owner} needs an input that varies; u is {u[0]:g} throughout, which teaches nothing. "
+            f"{owner} needs an input that varies; u is {u[0]:g} throughout, from which nothing can be "
+            "identified. "
             "Check the column, or excite the drive."
         )
 

@@ -268,7 +268,7 @@ class Measurement:
 
         Several outputs by quantity: ``outputs={"x": 0, "v": 1}``, or ``{"x": "x", "v": ("v", "m/s")}``.
         The input of python-control's simulations runs straight between samples: ``input_hold='linear'``
-        unless told otherwise.
+        unless stated otherwise.
         """
         cls._check_keywords(keywords, cls.from_response)
         if outputs is not None:

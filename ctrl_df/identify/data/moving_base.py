@@ -28,7 +28,7 @@ def moves_base(model, record) -> bool:
     return quantity_of(record.input_unit) in _DERIVATIVES and all(q in _DERIVATIVES for q in outputs)
 
 
-def told_in_space(record: Measurement) -> bool:
+def measured_in_space(record: Measurement) -> bool:
     """Return whether a record of a base that moves has its outputs in space, not relative to the base."""
     return quantity_of(record.input_unit) != "acceleration"
 
@@ -46,7 +46,7 @@ def seen_from_base(model, record: Measurement) -> Measurement:
         that the motion of the base does not tell.
     """
     mass, moves = _inertia(model), model.coordinates
-    _check_channels(model, told_in_space(record))
+    _check_channels(model, measured_in_space(record))
     given = _DERIVATIVES.index(quantity_of(record.input_unit))
     turns = dimension(record.input_unit).get("rad", 0) == 1
     if turns != (moves.unit == "rad"):

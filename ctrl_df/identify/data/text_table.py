@@ -50,32 +50,18 @@ class Table(dict):
 
 def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> Table:
     """Return the columns of a text table by header name; without a header by ``0``, ``1``, ..."""
-    if delimiter is not None and not (isinstance(delimiter, str) and len(delimiter) == 1):
-        raise (ValueError if isinstance(delimiter, str) else TypeError)(
-            f"a table needs delimiter as one character, such as ';'; got {shown(delimiter)}. Leave it out to "
-            "have it found."
-        )
-    if decimal is not None:
-        choice("a table", "decimal", decimal, (".", ","))
+    _check_format(delimiter, decimal)
     text = _decoded(path_of("a table", "path", path))
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     at = [i for i, s in enumerate(lines) if s and not s.isspace() and s.lstrip()[0] != "#"]
-    if at and re.fullmatch("sep=.", lines[at[0]].strip(), re.I):  # what spreadsheets are told with
+    if at and re.fullmatch("sep=.", lines[at[0]].strip(), re.I):  # a line for spreadsheets
         delimiter = delimiter or lines[at[0]].strip()[-1]
         at = at[1:]
     if not at:
         raise ValueError(f"a CSV file needs a header and rows of numbers; {path} is empty. Record again.")
     mark = delimiter or _delimiter([lines[i] for i in at[:20]])
     quoted = '"' in text
-
-    def rows(some):
-        if mark == " ":
-            return [[c.strip('"') for c in lines[i].split()] for i in some]
-        if quoted:
-            return list(csv.reader((lines[i] for i in some), delimiter=mark))
-        return [lines[i].split(mark) for i in some]
-
-    sample = [[c.strip() for c in row] for row in rows(at[: SAMPLE_ROWS + 2])]
+    sample = [[c.strip() for c in row] for row in _rows(lines, at[: SAMPLE_ROWS + 2], mark, quoted)]
     header, used = _header(sample, path)
     data, at = sample[used:], at[used:]
     if not any(_plain(c) or _is_clock(c) for row in data for c in row):
@@ -89,12 +75,7 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
     table = Table()
     for k in range(0, len(at), BLOCK):
         some = at[k : k + BLOCK]
-        if mark == " " or quoted:
-            split = rows(some)
-            sizes, cells = list(map(len, split)), [cell for row in split for cell in row]
-        else:  # a list for each of a million rows takes longer than the numbers
-            block = [lines[i] for i in some]
-            sizes, cells = [line.count(mark) + 1 for line in block], mark.join(block).split(mark)
+        sizes, cells = _cells(lines, some, mark, quoted)
         if set(sizes) != {width}:
             wrong = next(i for i, size in enumerate(sizes) if size != width)
             raise ValueError(
@@ -115,6 +96,36 @@ def read_csv(path, delimiter: str | None = None, decimal: str | None = None) -> 
             values, name = _since_first(values), _in_seconds(name, table)
         table[name] = values
     return table
+
+
+def _check_format(delimiter, decimal) -> None:
+    """Raise unless delimiter and decimal mark are one character each, or None."""
+    if delimiter is not None and not (isinstance(delimiter, str) and len(delimiter) == 1):
+        raise (ValueError if isinstance(delimiter, str) else TypeError)(
+            f"a table needs delimiter as one character, such as ';'; got {shown(delimiter)}. Leave it out to "
+            "have it found."
+        )
+    if decimal is not None:
+        choice("a table", "decimal", decimal, (".", ","))
+
+
+def _rows(lines, some, mark: str, quoted: bool) -> list[list[str]]:
+    """Return the cells of some of the lines, row by row."""
+    if mark == " ":
+        return [[c.strip('"') for c in lines[i].split()] for i in some]
+    if quoted:
+        return list(csv.reader((lines[i] for i in some), delimiter=mark))
+    return [lines[i].split(mark) for i in some]
+
+
+def _cells(lines, some, mark: str, quoted: bool) -> tuple[list[int], list[str]]:
+    """Return how many cells each of some lines has, and all their cells in turn."""
+    if mark == " " or quoted:
+        split = _rows(lines, some, mark, quoted)
+        return list(map(len, split)), [cell for row in split for cell in row]
+    # a list for each of a million rows takes longer than the numbers
+    block = [lines[i] for i in some]
+    return [line.count(mark) + 1 for line in block], mark.join(block).split(mark)
 
 
 def refuse_text(table, column: str, source: str) -> None:

@@ -1,4 +1,4 @@
-"""Records of an imposed motion and the force that it took: judged in force."""
+"""Records of an imposed motion and the force that it took: compared in force."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class ImposedDataset(TimeDataset):
         for record in (*self.records, *self.validation):
             if not imposes_motion(record):
                 raise ValueError(
-                    "records with motion as input and such with force as input are judged apart; got "
+                    "records with motion as input cannot be combined with records with force as input; got "
                     f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
                     "the other."
                 )
@@ -28,5 +28,5 @@ class ImposedDataset(TimeDataset):
         """Refuse: inputs are planned as forces."""
         raise ValueError(
             "next_experiment plans forces, and motion is imposed here; record other amplitudes and speeds, "
-            "with pauses and small reversals within large ones: they tell laws of friction apart."
+            "with pauses and small reversals within large ones: they distinguish laws of friction."
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..data.moving_base import moves_base, seen_from_base, told_in_space
+from ..data.moving_base import measured_in_space, moves_base, seen_from_base
 from ..selection.kinematic_searches import MovingBaseSearch
 from .over_time import TimeDataset
 
@@ -22,11 +22,11 @@ class MovingBaseDataset(TimeDataset):
         for record in (*records, *validation):
             if not moves_base(model, record):
                 raise ValueError(
-                    "records of a base that moves and such with a force as input are judged apart; got "
+                    "records of a moving base cannot be combined with records with a force as input; got "
                     f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
                     "the other."
                 )
-        self.in_space = any(told_in_space(r) for r in (*records, *validation))
+        self.in_space = any(measured_in_space(r) for r in (*records, *validation))
         super().__init__(*([seen_from_base(model, r) for r in rs] for rs in (records, validation)))
 
     def free_parameters(self, block, free=None):

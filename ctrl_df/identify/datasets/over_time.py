@@ -1,4 +1,4 @@
-"""Records over time: judged by what a model simulates, in segments that begin anew."""
+"""Records over time: compared by simulation of the model, in segments with initial states of their own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables N(A, omega): judged by the describing function, all points at once."""
+"""Tables N(A, omega): compared by the describing function, all points at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What nearly every model has, told by its laws: an inertia, a dry friction level, a viscous slope."""
+"""What nearly every model has, recognized by its laws: an inertia, a dry friction level, a viscous slope."""
 
 from __future__ import annotations
 

@@ -46,18 +46,23 @@ def covariance_of(stage: Stage, found: Solution, sensitivity: OutputSensitivity)
     size[size <= DEPENDENT * max(float(size.max()), NOTHING)] = 1.0
     eigen, vectors = np.linalg.eigh(h / np.outer(size, size))
     top = max(float(eigen[-1]), NOTHING)
-    told = eigen >= UNDETERMINED * top
+    determined = eigen >= UNDETERMINED * top
     # of what the data leave open they tell less than derivatives err by: only what is stated counts there
     vectors = vectors / size[:, None]
-    tilted, turn = np.linalg.eigh(error * vectors[:, ~told].T @ np.diag(problem.stated) @ vectors[:, ~told])
-    left, known = vectors[:, ~told] @ turn, tilted > DEPENDENT * max(np.max(tilted, initial=0.0), NOTHING)
+    tilted, turn = np.linalg.eigh(
+        error * vectors[:, ~determined].T @ np.diag(problem.stated) @ vectors[:, ~determined]
+    )
+    left, known = (
+        vectors[:, ~determined] @ turn,
+        tilted > DEPENDENT * max(np.max(tilted, initial=0.0), NOTHING),
+    )
     null = [
         (math.sqrt(max(e, 0.0) / top), v / max(float(np.max(np.abs(v))), NOTHING))
         for e, v in zip(tilted[~known], left[:, ~known].T, strict=True)
     ]
     # the information is (root root')^-1 over what is determined: all that follows is a product of factors
-    eigen = np.concatenate([eigen[told], tilted[known]])
-    root = np.column_stack([vectors[:, told], left[:, known]]) / np.sqrt(eigen)
+    eigen = np.concatenate([eigen[determined], tilted[known]])
+    root = np.column_stack([vectors[:, determined], left[:, known]]) / np.sqrt(eigen)
     middle = error**2 * root.T @ np.diag(problem.stated) @ root
     variances = [(np.zeros(len(h)), np.zeros(len(h)))]
     for k, e in enumerate(residual):

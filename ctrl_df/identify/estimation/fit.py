@@ -30,6 +30,7 @@ from .own_values import OwnValue, at_bounds, by_name, merged, own_values, parts_
 from .sensitivity import OutputSensitivity
 from .sigma_points import sigma_points
 from .thresholds import (
+    DECIMATION,
     EFFORT_SHORT,
     FIRST_PERIODS,
     FIRST_STROKES,
@@ -39,7 +40,6 @@ from .thresholds import (
     STAGE_FACTOR,
     STAGE_LEAST,
     STAGES,
-    THIN,
     TOLERANCE,
     UNCOUNTED,
 )
@@ -256,7 +256,7 @@ def fit_records(
     budget: int = 120,
     mode: str = "auto",
     window: float | None = None,
-    thin: int = THIN,
+    decimation: int = DECIMATION,
     polish: int = 2,
     coarse: bool | None = None,
     robust: bool = True,
@@ -281,7 +281,7 @@ def fit_records(
         Bound on the simulations of all records.
     mode, window
         As for `compare`.
-    thin : int
+    decimation : int
         Samples a step of the input in all but the last iterations, at most; 1: never decimated.
     polish : int
         Iterations at full rate at the end; 0 leaves the fit at the decimated input.
@@ -301,7 +301,7 @@ def fit_records(
         Value and standard deviation of parameters known beforehand; of the others see `Prior`.
     """
     records = list(records)
-    thin = decimable(records, thin)
+    decimation = decimable(records, decimation)
     model = with_values(model, start)
     first, block = simulator_of(model, records[0]), block_of(model)
     names = tuple(default_free(block) if free is None else free)
@@ -313,11 +313,11 @@ def fit_records(
         coarse = start is None
     if coarse and names and not first.closed:
         for short in _short_segments(first, records, lengths):
-            stage = Stage(problem, _cut(records, short), thin)
+            stage = Stage(problem, _cut(records, short), decimation)
             theta = stage.solve(theta, *EFFORT_SHORT, robust=False).theta
-    stage = Stage(problem, _cut(records, lengths), thin if polish else max(thin, 1), starts)
+    stage = Stage(problem, _cut(records, lengths), decimation if polish else max(decimation, 1), starts)
     found = stage.solve(theta, iterations=iterations, tolerance=tolerance, robust=robust)
-    if polish and thin > 1:
+    if polish and decimation > 1:
         stage = Stage(problem, stage.segments, 1, found.states.values)
         found = stage.solve(found.theta, iterations=polish, tolerance=tolerance, robust=robust)
     if names:
@@ -331,7 +331,7 @@ def fit_segments(
     segments: Sequence[Segments],
     names: Sequence[str],
     *,
-    thin: int = THIN,
+    decimation: int = DECIMATION,
     starts: Sequence[np.ndarray] | None = None,
     iterations: int = ITERATIONS,
     tolerance: float = TOLERANCE,
@@ -355,7 +355,7 @@ def fit_segments(
         Records and the parts of each that count.
     names : sequence of str
         Parameters to move; an empty one fits the initial states alone.
-    thin : int
+    decimation : int
         Samples a step of the input.
     starts : sequence of arrays or None
         Initial states to begin with.
@@ -389,7 +389,7 @@ def fit_segments(
         model, records, names, UNCOUNTED, limits, error_filter, begins, (give_up, steps_left), about,
         followed,
     )  # fmt: skip
-    stage = Stage(problem, list(segments), thin, starts, rtol)
+    stage = Stage(problem, list(segments), decimation, starts, rtol)
     found = stage.solve(
         problem.start(), iterations=iterations, tolerance=tolerance, robust=robust, restarts=iterations > 0
     )

@@ -103,7 +103,7 @@ def _short_segment(model, records: Sequence[Measurement]) -> float | None:
         data.segmentations[0].states_of(model),
         data.with_process_noise,
     )
-    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.carries(model):
+    if near.rmse <= PROCESS_NOISE * data.noise or data.noise_free or disturbed.continues(model):
         return None
     segments = disturbed.short_segments.train.segments
     spans = [r.t[w.ends - 1] - r.t[w.begins] for r, w in zip(records, segments, strict=True)]
@@ -124,7 +124,7 @@ class _Beside:
 
     def __call__(self, model, names, *, starts, iterations, give_up=math.inf) -> FitResult:
         return fit_segments(
-            model, self.records, self.segments, names, thin=1, starts=starts, iterations=iterations,
+            model, self.records, self.segments, names, decimation=1, starts=starts, iterations=iterations,
             give_up=give_up, about=self.about,
         )  # fmt: skip
 
@@ -153,7 +153,7 @@ def undetermined(found: FitResult) -> set[str]:
     return names | {k for k, own in found.own.items() if not any(v.determined for v in own.values())}
 
 
-def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:
+def indistinguishable_parameters(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every null direction of several parameters."""
     lines = []
     for parts in _directions(found):
@@ -168,37 +168,37 @@ def cannot_be_told_apart(found: FitResult) -> tuple[str, ...]:
         down = ", ".join(names[k] for k, d in moves.items() if d * first <= 0)
         change = f"raising {up}" + (f" while lowering {down}" if down else "") + " together"
         lines.append(
-            f"{' and '.join(names.values())} cannot be told apart on these data: {change} leaves the "
-            "output as it is. Fix one of them, or excite the drive otherwise."
+            f"{' and '.join(names.values())} cannot be distinguished on these data: {change} leaves the "
+            "output unchanged. Fix one of them, or excite the drive otherwise."
         )
     return tuple(lines)
 
 
 def doubts(found: FitResult) -> tuple[str, ...]:
     """Return a sentence for every direction the data do not determine."""
-    lines, told, alone = list(cannot_be_told_apart(found)), set(), {}
+    lines, covered, alone = list(indistinguishable_parameters(found)), set(), {}
     for parts in _directions(found):
-        told |= {(k, r) for k, r, _ in parts}
+        covered |= {(k, r) for k, r, _ in parts}
         if len({k for k, _, _ in parts}) == 1:
             for k, record, _ in parts:
                 alone.setdefault(k, {})[record] = None
     for k, records in alone.items():
         lines.append(
-            f"{_of(k, [*records], found)} leaves no trace in these data: its value is the start value."
+            f"{_of(k, [*records], found)} has no influence on these data: its value is the start value."
         )
     doubtful = undetermined(found)
     for k in found.names:
         if k in found.own:
             open_ = [r for r, own in found.own[k].items() if not own.determined]
-            left = [r for r in open_ if not {(k, r), (k, None)} & told]
+            left = [r for r in open_ if not {(k, r), (k, None)} & covered]
             if left and len(left) < len(found.own[k]):
                 lines.append(f"{k} is not determined by {' and '.join(left)}.")
                 continue
             doubt = bool(left)
         else:
-            doubt = k in doubtful and (k, None) not in told
+            doubt = k in doubtful and (k, None) not in covered
         if doubt:
-            lines.append(f"{k} is less certain than it is large: these data do not determine it.")
+            lines.append(f"{k} has a standard error larger than its value: these data do not determine it.")
     return tuple(lines)
 
 

@@ -26,7 +26,7 @@ from ..shooting.variables import Prior, RecordScales, priors
 from ..thresholds import FULL_SAMPLES, GROWTH, NOISE_FREE, NOTHING, RTOL
 from .fit import FitResult, fit_segments
 from .per_record import own_values_of, reestimated
-from .starts import carried, least_begins, same_begins
+from .starts import continued_states, least_begins, same_begins
 from .thresholds import (
     EFFORT_MOVED_ON,
     EFFORT_OWN,
@@ -96,7 +96,7 @@ class SegmentedData:
 
     train: SegmentedRecords
     validation: SegmentedRecords
-    thin: int
+    decimation: int
     scales: Scales
     limits: Mapping[str, tuple[float, float]]  # of the model's own parameters
     about: Mapping[str, Prior]  # what is known of these before any data
@@ -130,7 +130,7 @@ class SegmentedData:
 
     @property
     def noise_free(self) -> bool:
-        """Whether the records hold no noise that a sensor would make: then nothing can be told from it."""
+        """Whether the records lack the noise of any sensor: then evidence has no scale."""
         outputs = [y for r in self.train.records for y in sensed(r).values]
         return all(derivatives.grain(y) < NOISE_FREE * max(float(np.std(y)), NOTHING) for y in outputs)
 
@@ -147,8 +147,8 @@ class SegmentedData:
         several outputs that one counts whose accelerations have less noise.
         """
         length = float(np.median(np.concatenate([w.ends - w.begins for w in self.train.segments])))
-        thin = max(self.thin // 2, 1)
-        step = max(thin, round(length / FILTERED), 2)
+        decimation = max(self.decimation // 2, 1)
+        step = max(decimation, round(length / FILTERED), 2)
         record = self.train.records[0]
         held, span = sensed(record), step * facts(record).dt
         order = [2 - column for column in held.columns]
@@ -159,7 +159,7 @@ class SegmentedData:
         return replace(
             self._only(held.quantities[best])._sampled_by(1),
             error_filter=acceleration_filter(step, held.columns[best]),
-            thin=thin,
+            decimation=decimation,
             begins=MEASURED,
         )
 
@@ -181,7 +181,7 @@ class SegmentedData:
         """The same by position over segments in which slow forces move nothing far: for parameters alone.
 
         Disturbance forces blur parameters least there. What hides in a joint or in bristles is not told:
-        their states, fitted anew in every segment, pass for it. No limits: models of any rung of a ladder
+        their states, fitted anew in every segment, pass for it. No limits: models of any step of a ladder
         begin near.
         """
         return replace(self.level(SHORT), error_filter=None, begins=FREE, limits={})
@@ -193,18 +193,18 @@ class SegmentedData:
 
     @property
     def sampled(self) -> SegmentedData:
-        """The same with every second segment to fit, for a first look."""
+        """The same with every second segment to fit, for screening."""
         return replace(self, train=self.train.every(2))
 
     @property
     def fine(self) -> SegmentedData:
         """The same at the records' full rate, or as many steps of a longer one as do."""
         longest = max(len(r) for view in (self.train, self.validation) for r in view.records)
-        thin = min(max(1, round(longest / FULL_SAMPLES)), self.thin)
-        return replace(self._sampled_by(1), thin=thin, step=self.thin, rtol=RTOL)
+        decimation = min(max(1, round(longest / FULL_SAMPLES)), self.decimation)
+        return replace(self._sampled_by(1), decimation=decimation, step=self.decimation, rtol=RTOL)
 
-    def coarse(self, thin: int, step: int) -> SegmentedData:
-        """Return the same with `thin` samples a step of the input, and every `step`-th one of the output.
+    def coarse(self, decimation: int, step: int) -> SegmentedData:
+        """Return the same with `decimation` samples a step of the input, every `step`-th one of the output.
 
         A filter of errors sees all samples. Simulations need not err less than the sensors by more than
         derivatives ask for.
@@ -215,7 +215,7 @@ class SegmentedData:
             rtol = min(max(RTOL_OVER_NOISE * min(k.noise / k.spread for k in known), RTOL), RTOL_COARSE)
         else:
             step = 1
-        return replace(self._sampled_by(step), thin=thin, rtol=rtol)
+        return replace(self._sampled_by(step), decimation=decimation, rtol=rtol)
 
     def _sampled_by(self, step: int) -> SegmentedData:
         train, validation, *whole = [
@@ -228,10 +228,11 @@ class SegmentedData:
     def simulator(self, block, record, **keywords) -> Simulator:
         """Return a model on one of the records, as these fits run it."""
         return simulator_of(
-            block, record, thin=self.thin, begins=self.begins, rtol=self.rtol_of(block), **keywords
+            block, record, decimation=self.decimation, begins=self.begins, rtol=self.rtol_of(block),
+            **keywords,
         )  # fmt: skip
 
-    def carries(self, block) -> bool:
+    def continues(self, block) -> bool:
         """Whether the block has hidden states that go on from segment to segment."""
         return any(self.simulator(block, r).continued for r in self.train.records)
 
@@ -256,10 +257,10 @@ class SegmentedData:
         """Fit the named parameters over the segments fitted (or those of `view`)."""
         view = view or self.train
         return fit_segments(
-            block, view.records, view.segments, names, thin=self.thin, starts=starts, iterations=iterations,
-            tolerance=tolerance, limits=self.limits_of(block), about=self.about, errors=self.step > 0,
-            error_filter=self.error_filter, begins=self.begins, give_up=give_up, steps_left=steps_left,
-            robust=self.robust, rtol=self.rtol_of(block), followed=followed,
+            block, view.records, view.segments, names, decimation=self.decimation, starts=starts,
+            iterations=iterations, tolerance=tolerance, limits=self.limits_of(block), about=self.about,
+            errors=self.step > 0, error_filter=self.error_filter, begins=self.begins, give_up=give_up,
+            steps_left=steps_left, robust=self.robust, rtol=self.rtol_of(block), followed=followed,
         )  # fmt: skip
 
     def states_of(
@@ -304,11 +305,11 @@ class SegmentedData:
     def as_it_is(self, found: FitResult) -> FitResult:
         """Return a model found over other segments over these, with initial states of its own alone.
 
-        Each segment begins as the fit found does or as short ones tell, whichever errs less.
+        Each segment begins as the fit found does or as short ones give, whichever errs less.
         """
         begun = self.states_of(found.model, starts=same_begins(found, self.train.segments))
-        told = self._ran(found.model, "train")
-        begins = (begun.starts, told.starts, least_begins(begun, told))
+        free = self._ran(found.model, "train")
+        begins = (begun.starts, free.starts, least_begins(begun, free))
         fits = [self.fit(found.model, found.names, starts=starts, iterations=0) for starts in begins]
         return min(fits, key=lambda f: f.rmse)
 
@@ -334,11 +335,11 @@ class SegmentedData:
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""
         return [
-            carried(self.simulator(block, r), w, self.simulator(other.model, r), starts)
+            continued_states(self.simulator(block, r), w, self.simulator(other.model, r), starts)
             for r, w, starts in zip(records, other.segments, other.starts, strict=True)
         ]
 
-    def judged(self, model) -> tuple[Any, float, float]:
+    def evaluated(self, model) -> tuple[Any, float, float]:
         """Return a model as it is with its nrmse over the segments fitted and those held out.
 
         It then knows what the records held out have for themselves: by that their error is.
@@ -355,8 +356,8 @@ class SegmentedData:
 
     def _ran(self, model, name, give_up: float = math.inf) -> FitResult:
         """Fit the initial states alone: short segments first, found without fail; the others begin there."""
-        thin = self.step or self.thin
-        rough, view = self.coarse(thin, thin), getattr(self, name)
+        decimation = self.step or self.decimation
+        rough, view = self.coarse(decimation, decimation), getattr(self, name)
         short = getattr(rough.level(SHORTEST), name)
         near = rough.states_of(model, view=short)
         if name == "validation" and view.records is not self.train.records:
@@ -392,9 +393,11 @@ def prepare(
             )
         learn = SegmentedRecords(records, tuple(w.only(~t) for w, t in zip(whole, third, strict=True)))
         judge = SegmentedRecords(records, tuple(w.only(t) for w, t in zip(whole, third, strict=True)))
-    thin = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
-    thin = min(thin, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records))
-    step, thin = thin, decimable((*records, *validation), thin)
+    decimation = max(1, round(float(np.mean([len(r) for r in records])) / SCREEN_SAMPLES))
+    decimation = min(
+        decimation, *(max(1, int(facts(r).swing / (STROKE_SAMPLES * facts(r).dt))) for r in records)
+    )
+    step, decimation = decimation, decimable((*records, *validation), decimation)
     known = {k: p.value for k, p in block.parameters.items() if p.value > 0 and p.lower >= 0}
     limits = {k: (v / PARAMETER_RANGE, v * PARAMETER_RANGE) for k, v in known.items()}
     scales = scales_of(block, records)
@@ -403,7 +406,7 @@ def prepare(
         max(r.duration for r in records),
     )  # fmt: skip
     about = priors(block, prior)
-    return SegmentedData(learn, judge, 1, scales, limits, about, seen).coarse(thin, step)
+    return SegmentedData(learn, judge, 1, scales, limits, about, seen).coarse(decimation, step)
 
 
 def _within(own, shown) -> tuple[float, float]:

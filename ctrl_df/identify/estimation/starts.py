@@ -31,7 +31,9 @@ def least_begins(one: FitResult, other: FitResult) -> list[np.ndarray]:
     return starts
 
 
-def carried(simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray) -> np.ndarray:
+def continued_states(
+    simulator: Simulator, segments: Segments, before: Simulator, starts: np.ndarray
+) -> np.ndarray:
     """Return one model's initial states as those of another: what the first lacks begins as usual."""
     given = dict(zip(before.free_states, starts.T, strict=True))
     columns = []

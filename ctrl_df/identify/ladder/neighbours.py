@@ -9,22 +9,22 @@ from typing import Any
 from ..results.diagnosis import NONE, Diagnosis
 from ..results.neighbours import ADD, BETTER, DROP, EQUAL, EXCHANGE, WORSE, Neighbour
 from ..selection.search import Search
-from ..selection.verdict import worth
+from ..selection.verdict import is_significant
 from ..thresholds import RULED_OUT
 from .structure import Structure, exchanged, parameters_of, plainness
 from .thresholds import RIVALS, STEPS_NEIGHBOUR
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """What was tried in the place of an effect.
+class Alternatives:
+    """The candidates in the place of an effect.
 
     Attributes
     ----------
     less : Structure
         The model without it.
-    trials : sequence of Judged
-        Blocks with another effect at their end, roughly fitted, best first; evidence over the model.
+    trials : sequence of Candidate
+        Blocks with another last effect, roughly fitted, best first; evidence over the model.
     errors : callable
         Errors of a trial, on the data fitted and on those held out.
     """
@@ -36,7 +36,7 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A neighbour to be fitted: what was done, and the structure it then is."""
+    """A neighbour to be fitted: the change, and the structure after it."""
 
     change: str
     dropped: tuple[str, ...]
@@ -45,8 +45,8 @@ class Trial:
     given: bool = False
 
 
-class Around:
-    """The neighbours of a model, fitted as far as they come near.
+class Neighbourhood:
+    """The neighbours of a model, refitted where screening leaves them near.
 
     Parameters
     ----------
@@ -61,53 +61,55 @@ class Around:
     def __init__(self, structure: Structure, search: Search, free: Callable):
         self.structure, self.search, self.free = structure, search, free
         self.own = self._fitted(structure.block, STEPS_NEIGHBOUR)
-        self.near: list[tuple[Trial, Any]] = []
-        self.far: list[Neighbour] = []
+        self.refitted: list[tuple[Trial, Any]] = []
+        self.screened: list[Neighbour] = []
 
     def _fitted(self, block, iterations):
         return self.search.fitted(block, self.free(block), iterations)
 
     def fit(self, trial: Trial) -> None:
-        """Fit one to the data that judge the model."""
-        self.near.append((trial, self._fitted(trial.structure.block, STEPS_NEIGHBOUR)))
+        """Fit one to the data on which the model is validated."""
+        self.refitted.append((trial, self._fitted(trial.structure.block, STEPS_NEIGHBOUR)))
 
-    # --- an effect less -------------------------------------------------------------------------------
+    # --- an effect less ---------------------------------------------------------------------------------
 
     def drop_each(self) -> None:
-        """Leave out every effect in turn, the user's own too: those are told of, and stay."""
+        """Leave out every effect in turn; those of the user's model are reported only, and stay."""
         at = self.structure
         for place, effect in enumerate(at.block.effects):
             own = place < at.given
             less = at.at(at.bare(place)) if own else at.without(place - at.given)
             self.fit(Trial(DROP, (effect.id,), "", less, own))
 
-    # --- another in its place -------------------------------------------------------------------------
+    # --- another in its place ---------------------------------------------------------------------------
 
-    def exchange(self, place: int, look: Look) -> None:
-        """Fit what comes nearest to an effect in its place; keep what the first look says of the others."""
+    def exchange(self, place: int, alternatives: Alternatives) -> None:
+        """Fit the nearest alternatives to an effect; of the others keep the result of screening."""
         old = self.structure.added[place]
-        others = [t for t in look.trials if t.block.effects[-1].id != old.id]
+        others = [t for t in alternatives.trials if t.block.effects[-1].id != old.id]
         again = [
             t
-            for t in look.trials
+            for t in alternatives.trials
             if t.block.effects[-1].id == old.id and t.evidence > self.search.significant
         ]
         nearest = others[:RIVALS]
         for t in [*again, *nearest]:
             rivals = (old, *(o.block.effects[-1] for o in nearest if o is not t))
-            self.fit(Trial(EXCHANGE, (old.id,), t.block.effects[-1].id, look.less.plus(t.block, rivals)))
+            self.fit(
+                Trial(EXCHANGE, (old.id,), t.block.effects[-1].id, alternatives.less.plus(t.block, rivals))
+            )
         for t in others[RIVALS:]:
             added = t.block.effects[-1].id
-            self.far.append(
-                _row(EXCHANGE, (old.id,), added, t.evidence, look.errors(t), WORSE, False, t.block)
+            self.screened.append(
+                _row(EXCHANGE, (old.id,), added, t.evidence, alternatives.errors(t), WORSE, False, t.block)
             )
 
     def merge(self) -> None:
-        """Let what does as well in the place of one effect stand for another one, too.
+        """Drop a second effect where an exchange is no worse than the model: one effect may replace two.
 
-        An effect more never fits worse: only exchanges that are no worse can be such.
+        A model with an effect less never fits better, so that other exchanges need no such trial.
         """
-        for trial, t in self._judged():
+        for trial, t in self._ranked():
             if trial.change != EXCHANGE or t.evidence < -self.search.significant:
                 continue
             structure = trial.structure.at(t.block)
@@ -116,41 +118,41 @@ class Around:
                     replace(trial, dropped=(*trial.dropped, other.id), structure=structure.without(place))
                 )
 
-    # --- one more -------------------------------------------------------------------------------------
+    # --- one more ---------------------------------------------------------------------------------------
 
     def add(self, found: Diagnosis, refused: str = "") -> None:
-        """Take what the diagnosis of the model says of every effect besides; one may have been `refused`.
+        """Add what the diagnosis of the model says of every additional effect; one may have been `refused`.
 
-        Where nothing is missing none is better: it takes away noise, such as the rounding of a record.
+        Where nothing is missing none is better: it explains noise, such as the rounding of a record.
         """
         for c in found.ranking:
             missing = found.verdict != NONE and c.confirmed and c.id != refused
-            better = missing and worth(c, self.search)
+            better = missing and is_significant(c, self.search)
             verdict = BETTER if better else WORSE if c.evidence < -RULED_OUT else EQUAL
             errors = c.nrmse, c.nrmse_holdout
-            self.far.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
+            self.screened.append(_row(ADD, (), c.id, c.evidence, errors, verdict, c.confirmed, c.model))
 
-    def add_again(self, effects) -> None:
-        """Begin effects besides with values that they had at earlier steps."""
+    def add_restarted(self, effects) -> None:
+        """Fit additional effects from the values that they had at earlier steps."""
         for effect in effects:
             block = exchanged(self.structure.block, effect)
             if block is not None:
                 self.fit(Trial(ADD, (), effect.id, self.structure.plus(block)))
 
-    # --- what they come to ----------------------------------------------------------------------------
+    # --- results ----------------------------------------------------------------------------------------
 
-    def _judged(self) -> list[tuple[Trial, Any]]:
-        ranked = self.search.ranked_over(self.own, [t for _, t in self.near])
+    def _ranked(self) -> list[tuple[Trial, Any]]:
+        ranked = self.search.ranked_over(self.own, [t for _, t in self.refitted])
         by_block = {id(t.block): t for t in ranked}
-        return [(trial, by_block[id(t.block)]) for trial, t in self.near]
+        return [(trial, by_block[id(t.block)]) for trial, t in self.refitted]
 
     def rows(self) -> tuple[Neighbour, ...]:
         """Return all of them, those that were fitted first, by evidence."""
-        others = [(trial, t) for trial, t in self._judged() if trial.structure.key != self.structure.key]
-        near = [self._told(trial, t) for trial, t in others]
-        return tuple(sorted([*near, *self.far], key=lambda n: (not n.refitted, -n.evidence)))
+        others = [(trial, t) for trial, t in self._ranked() if trial.structure.key != self.structure.key]
+        refitted = [self._row_of(trial, t) for trial, t in others]
+        return tuple(sorted([*refitted, *self.screened], key=lambda n: (not n.refitted, -n.evidence)))
 
-    def _told(self, trial: Trial, t) -> Neighbour:
+    def _row_of(self, trial: Trial, t) -> Neighbour:
         errors = self.search.errors(t)
         verdict = self._verdict(trial, t)
         return _row(
@@ -158,7 +160,7 @@ class Around:
         )
 
     def _verdict(self, trial: Trial, t) -> str:
-        """Return how a neighbour does: what has an effect more needs the evidence of any effect."""
+        """Return the verdict on a neighbour: an additional effect needs the evidence of any effect."""
         fewer = len(trial.dropped) > bool(trial.added)
         more = len(trial.dropped) < bool(trial.added)
         alone = t.evidence_validation > self.search.significant_validation
@@ -167,13 +169,13 @@ class Around:
         return WORSE if t.evidence < -(self.search.significant if fewer else RULED_OUT) else EQUAL
 
     def better(self, known, again: bool = True) -> tuple[Structure, Neighbour] | None:
-        """Return the neighbour to go to: the best of those that do better, else the plainest of the equals.
+        """Return the neighbour to go to: the best of those that do better, else the simplest of the equals.
 
-        `known`: keys of structures that the ladder has been at; `again`: whether the model itself with other
-        values, in a better minimum, may be one.
+        `known`: keys of structures that the ladder has visited; `again`: whether the model itself in a better
+        minimum, with other values, counts.
         """
         found = []
-        for trial, t in self._judged():
+        for trial, t in self._ranked():
             verdict = self._verdict(trial, t)
             same = trial.structure.key == self.structure.key
             if trial.given or verdict == WORSE or not (again if same else trial.structure.key not in known):
@@ -182,12 +184,12 @@ class Around:
             if verdict == EQUAL and _plain(structure) >= _plain(self.structure):
                 continue
             order = (0, -t.evidence, ()) if verdict == BETTER else (1, 0.0, _plain(structure))
-            found.append((order, structure, self._told(trial, t)))
+            found.append((order, structure, self._row_of(trial, t)))
         return min(found, key=lambda f: f[0])[1:] if found else None
 
 
 def _plain(structure: Structure) -> tuple:
-    """Return the order of structures as good as each other."""
+    """Return the key that sorts equally good structures, the simplest first."""
     kinds = sorted(plainness(e) for e in structure.added)
     return sum(parameters_of(e) for e in structure.added), len(structure.added), tuple(kinds)
 

@@ -1,4 +1,4 @@
-"""A later effect may do what earlier ones stood in for: they are looked at again beside it."""
+"""Backward elimination: effects added earlier are examined again with the last one in the model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .thresholds import RIVALS, STEPS_NEIGHBOUR, STEPS_SAME
 
 @dataclass(frozen=True)
 class Revision:
-    """A model of a ladder after each of its effects was looked at again.
+    """A model of a ladder after each of its effects was examined again.
 
     Attributes
     ----------
@@ -27,10 +27,10 @@ class Revision:
 
 
 def revised(structure: Structure, search: Search, free: Callable) -> Revision:
-    """Look again at effects added earlier, beside the last one.
+    """Examine effects added earlier again, with the last one in the model.
 
-    Those without which the error stays as it is are dropped. Those that stood in for something else, too,
-    give way to a rival of their own step that does better now, or as well with fewer parameters.
+    Those without which the error stays the same are dropped. Those that also stood in for the last one are
+    replaced by a rival of their own step that is better now, or as good with fewer parameters.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ def revised(structure: Structure, search: Search, free: Callable) -> Revision:
             other = exchanged(less.block, effect)
             if other is not None:
                 tried.append((effect, fitted(other, STEPS_NEIGHBOUR)))
-        judged = search.ranked_over(less, [own, *(t for _, t in tried)])
-        own = next(t for t in judged if t.block is own.block)
-        best = judged[0]
+        ranked = search.ranked_over(less, [own, *(t for _, t in tried)])
+        own = next(t for t in ranked if t.block is own.block)
+        best = ranked[0]
         if best.evidence < search.significant:
             structure = structure.without(place).at(less.block)
             dropped.append(old.id)

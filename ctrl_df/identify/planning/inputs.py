@@ -146,9 +146,9 @@ class _Free:
         self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
 
     def __call__(self, u):
-        thin = max(1, len(self.t) // PLAN_SAMPLES)
+        decimation = max(1, len(self.t) // PLAN_SAMPLES)
         played = _played(self.record, self.t, u, self.scale)
-        ys = [free_run(m, played, position=self.centre, thin=thin) for m in self.models]
+        ys = [free_run(m, played, position=self.centre, decimation=decimation) for m in self.models]
         gaps = [_apart(self.record, self.t, a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
         return ys, float(np.max(np.abs(u))), gaps
 
@@ -175,7 +175,7 @@ class _Loop:
         self.moves = parts.block.coordinates
         self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
         self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]
-        self.thin = max(1, len(t) // PLAN_SAMPLES)
+        self.decimation = max(1, len(t) // PLAN_SAMPLES)
         # The controller passes the noise of the sensor on to the drive.
         self.noise_peak = PLAN_PEAK * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 
@@ -184,11 +184,11 @@ class _Loop:
 
         ys, forces = [], []
         for loop in self.loops:
-            # a drive at rest at `centre`: what it is told is relative to that
+            # a drive at rest at `centre`: its reference is relative to that
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", RuntimeWarning)  # its status tells the same
-                    found = event_response(loop, self.t, (u - self.centre)[:: self.thin])
+                    found = event_response(loop, self.t, (u - self.centre)[:: self.decimation])
             except (ValueError, RuntimeError):
                 return [np.full(2, np.inf)], math.inf, [0.0]
             if not found.status.ok:

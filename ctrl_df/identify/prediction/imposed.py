@@ -1,4 +1,4 @@
-"""A model under a recorded motion, judged by the force that it answers with."""
+"""A model under a recorded motion, compared by the force that it answers with."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class ImposedSimulator(Simulator):
 
     @property
     def continued(self) -> bool:
-        """Whether initial states of segments have to be carried on: they are, always, within a run."""
+        """Whether initial states of segments have to be continued: they are, always, within a run."""
         return False
 
     def run_all(self, asked, *, rounded: bool = False) -> list[np.ndarray]:
@@ -91,6 +91,6 @@ class ImposedSimulator(Simulator):
         """Return the usual initial states: nothing is known of rest."""
         return np.zeros((len(segments), len(self.free_states)))
 
-    def carried_on(self, segments, values, start):
-        """Return that no segment needs to be told where the one before it ended."""
+    def continued_from(self, segments, values, start):
+        """Return that no segment needs the state in which the one before it ended."""
         return np.full_like(start, np.nan)

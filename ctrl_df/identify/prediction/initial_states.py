@@ -19,7 +19,7 @@ from ..thresholds import NOTHING
 from .thresholds import BEND_REACH, FRICTION_SLOPE, PLACE_REACH, RATE_REACH, SPEED_REACH
 
 SEEN: tuple[str, ...] = ("x", "v")
-"""Names of those that the record tells of; all others are hidden."""
+"""Names of those that the record shows; all others are hidden."""
 
 FREE, CONTINUED, MEASURED = "fitted", "chained", "measured"
 """How segments begin: every state is fitted, segment by segment; all but those that settle are, which go on
@@ -33,13 +33,13 @@ def names(core) -> tuple[str, ...]:
     if core.joint == IMPACT:
         found += ["slack", "slack_rate"]
     elif core.joint == ELASTIC:
-        found += ["stretch", "stretch_rate"]
+        found += ["deflection", "deflection_rate"]
     return (*found, *(name for name, _, _ in _inner(core)))
 
 
 def settling(core) -> frozenset[str]:
     """Return the names of those hidden that come to be what the motion makes them, wherever they began."""
-    return frozenset(("stretch", "stretch_rate", *(name for name, _, _ in _inner(core))))
+    return frozenset(("deflection", "deflection_rate", *(name for name, _, _ in _inner(core))))
 
 
 def fitted_names(core, begins: str) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ def fitted_names(core, begins: str) -> tuple[str, ...]:
     return tuple(n for n in names(core) if begins == FREE or n not in settling(core))
 
 
-def carried_names(core, begins: str) -> tuple[str, ...]:
+def continued_names(core, begins: str) -> tuple[str, ...]:
     """Return the names of those that go on from one segment into the next."""
     fitted = fitted_names(core, begins)
     return tuple(n for n in names(core) if n not in fitted and n not in SEEN)
@@ -76,7 +76,7 @@ def reach(which, core, known, segments) -> np.ndarray:
         if stiff > NOTHING:
             bend = known.force / stiff
             rate = bend * math.sqrt(stiff / core.reduced_mass)
-        table["stretch"], table["stretch_rate"] = BEND_REACH * bend * one, BEND_REACH * rate * one
+        table["deflection"], table["deflection_rate"] = BEND_REACH * bend * one, BEND_REACH * rate * one
     return np.column_stack([table[name] for name in which])
 
 
@@ -90,19 +90,19 @@ def fill(states, core, given: Mapping[str, Any], usual, speed: float) -> None:
     x, v = x + given.get("x", 0.0), v + given.get("v", 0.0)
     if core.stop is not None:
         x = np.clip(x, *core.stop.span)
-    stretch, rate = _joint(core, a)
+    deflection, rate = _joint(core, a)
     if core.joint == IMPACT:
-        stretch = np.clip(given.get("slack", stretch / core.gap), 0.0, 1.0) * core.gap
+        deflection = np.clip(given.get("slack", deflection / core.gap), 0.0, 1.0) * core.gap
         rate = given.get("slack_rate", 0.0)
     elif core.joint == ELASTIC:
-        stretch, rate = stretch + given.get("stretch", 0.0), given.get("stretch_rate", 0.0)
+        deflection, rate = deflection + given.get("deflection", 0.0), given.get("deflection_rate", 0.0)
     if core.bodies == 2 and core.measured == 1:
         states[:, 2], states[:, 3] = x, v
-        states[:, 0], states[:, 1] = x - stretch, v - rate
+        states[:, 0], states[:, 1] = x - deflection, v - rate
     else:
         states[:, 0], states[:, 1] = x, v
         if core.bodies == 2:
-            states[:, 2], states[:, 3] = x + stretch, v + rate
+            states[:, 2], states[:, 3] = x + deflection, v + rate
     if core.bodies == 2 and core.stop is not None:
         beyond = np.clip(states[:, 2], *core.stop.span) - states[:, 2]
         states[:, 2] += beyond
@@ -125,9 +125,9 @@ def corrections(states, core, usual, speed: float) -> dict[str, float]:
     at = 2 if core.bodies == 2 and core.measured == 1 else 0
     found = {"x": states[at] - x, "v": states[at + 1] - v}
     if core.bodies == 2:
-        stretch, rate = states[2] - states[0], states[3] - states[1]
-        found |= {"slack": stretch / core.gap if core.gap else 0.0, "slack_rate": rate}
-        found |= {"stretch": stretch - _joint(core, a)[0], "stretch_rate": rate}
+        deflection, rate = states[2] - states[0], states[3] - states[1]
+        found |= {"slack": deflection / core.gap if core.gap else 0.0, "slack_rate": rate}
+        found |= {"deflection": deflection - _joint(core, a)[0], "deflection_rate": rate}
     for name, term, at in _inner(core):
         slip, full = _settled(states, core, term, at)
         share = states[term.state + at] / full if full > 0 else 0.0

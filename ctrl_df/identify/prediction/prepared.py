@@ -52,8 +52,8 @@ def of_loop(loop, record, u, mechanism: bool) -> PreparedModel:
     return PreparedModel(Engine(loop), core, offset, *_before(record, record.t, reference))
 
 
-def of_block(block, record, u, thin: int) -> PreparedModel:
-    """Return a mechanism, driven by the input `u` (n,) in steps of `thin` samples."""
+def of_block(block, record, u, decimation: int) -> PreparedModel:
+    """Return a mechanism, driven by the input `u` (n,) in steps of `decimation` samples."""
     t, held, static = record.t, u, record.input_hold == "zoh"
     outside, input_delay = [], 0.0
     for key, effect in block.named_effects.items():
@@ -87,7 +87,7 @@ def of_block(block, record, u, thin: int) -> PreparedModel:
     if outside:
         kept = [e for k, e in block.named_effects.items() if k not in outside]
         inner = block.with_effects(kept)
-    time, value, hold = _driven(record, held, thin)
+    time, value, hold = _driven(record, held, decimation)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
     return PreparedModel(
         Engine(inner),
@@ -102,18 +102,18 @@ def of_block(block, record, u, thin: int) -> PreparedModel:
     )
 
 
-def _driven(record, held, thin):
-    """Return times and values of an input in steps of `thin` samples, and how to join them.
+def _driven(record, held, decimation):
+    """Return times and values of an input in steps of `decimation` samples, and how to join them.
 
     Kept for as long as the record lives where no law has changed its input.
     """
     known = _DRIVES.setdefault(record, {}) if held is record.u else {}
-    if thin not in known:
+    if decimation not in known:
         time, value, hold = record.t, held, record.input_hold
-        if thin > 1:
-            time, value, hold = decimated(time, held, thin)
-        known[thin] = (*_before(record, time, value), hold)
-    return known[thin]
+        if decimation > 1:
+            time, value, hold = decimated(time, held, decimation)
+        known[decimation] = (*_before(record, time, value), hold)
+    return known[decimation]
 
 
 def _lags(core, record, signal):

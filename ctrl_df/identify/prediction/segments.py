@@ -21,7 +21,7 @@ from .thresholds import HALF_LEAST, HALF_MOST, HALF_PERIOD, PART_LEAST, TURNS_SA
 class Facts:
     """Scales of one record: spread of output, speed and force, noise, time between reversals, usable band.
 
-    Also what it tells of position and force, whichever of them is the output.
+    Also what it shows of position and force, whichever of them is the output.
     """
 
     dt: float

@@ -1,7 +1,7 @@
 """What a record holds of a model's outputs, as one vector of values, each output over its own noise.
 
 Outputs lie one after the other, the leading one first and as it is; the others are scaled so that their noise
-is as large as its. A fit then minimizes one sum of squares, and judges by one noise, whatever was measured.
+is as large as its. A fit then minimizes one sum of squares, with one noise, whatever was measured.
 """
 
 from __future__ import annotations

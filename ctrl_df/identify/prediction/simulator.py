@@ -45,7 +45,7 @@ class Simulator:
         ``reference`` of the record, or its input where there is none. It has this record's own values.
     record : Measurement
         The run.
-    thin : int
+    decimation : int
         The input is given in steps of that many samples (their impulse and its moment kept), which makes the
         run as many times faster and the result a little coarser; for first iterations.
     rtol : float
@@ -66,7 +66,7 @@ class Simulator:
         model,
         record: Measurement,
         *,
-        thin: int = 1,
+        decimation: int = 1,
         rtol: float = RTOL,
         force: np.ndarray | None = None,
         begins: str = initial_states.FREE,
@@ -77,7 +77,9 @@ class Simulator:
         self.closed = getattr(model, "parts", None) is not None
         self.block = block_of(model)
         self.mechanism = isinstance(self.block, Mechanism)
-        self.thin = thin if record.regular and record.input_hold == "zoh" and not self.closed else 1
+        self.decimation = (
+            decimation if record.regular and record.input_hold == "zoh" and not self.closed else 1
+        )
         self.facts, self.sensed = facts_of(self.block, record), sensed(record)
         self.runs = 0
         self._prepared: dict[Any, PreparedModel] = {}
@@ -122,7 +124,7 @@ class Simulator:
     @cached_property
     def continued(self) -> bool:
         """Whether some of the initial states go on from one segment into the next."""
-        return self.mechanism and bool(initial_states.carried_names(self.block.core, self.begins))
+        return self.mechanism and bool(initial_states.continued_names(self.block.core, self.begins))
 
     @property
     def apart(self) -> bool:
@@ -162,9 +164,9 @@ class Simulator:
             Parameters that differ from the model's.
         start : (nw, number of them) array or None
             Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
-            slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its stretch
-            [m] and rate [m/s] beyond the steady one, for bristles the share of full deflection beyond the
-            steady one.
+            slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its
+            deflection [m] and rate [m/s] beyond the steady one, for bristles the share of full deflection
+            beyond the steady one.
         rounded : bool
             Whether an encoder of the model rounds the output. Fits leave it out: its steps have no slope.
 
@@ -199,7 +201,7 @@ class Simulator:
         record, inside = self.record, segments.samples
         out = np.empty((len(self.sensed.columns), len(inside)))
         drive, hidden = self._drive(part), {}
-        carried = initial_states.carried_names(part.core, self.begins)
+        continued_states = initial_states.continued_names(part.core, self.begins)
         on = self._followed(segments)
         for w, where in enumerate(segments.slices[: len(segments)]):
             t, follows = record.t[inside[where]], w in on
@@ -215,7 +217,7 @@ class Simulator:
                             row[where.start + run.recorded : where.stop] = np.nan
                 if follows and run.status.ok and delay == self.late(part):
                     came = self._arrival(part, segments, w + 1, run)
-            hidden = {k: came[k] for k in carried if k in came}
+            hidden = {k: came[k] for k in continued_states if k in came}
         return out.reshape(-1)
 
     def _together(self, parts: Sequence[PreparedModel], asked: Sequence[Request]) -> list[np.ndarray]:
@@ -351,7 +353,7 @@ class Simulator:
             rows.append([given.get(name, 0.0) for name in self.free_states])
         return np.array(rows)
 
-    def carried_on(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
+    def continued_from(self, segments: Segments, values, start: np.ndarray) -> np.ndarray:
         """Return the initial states that let every segment go on where the one before it ends.
 
         Returns
@@ -410,7 +412,7 @@ class Simulator:
         if self.closed:
             part = of_loop(model, self.record, self.input, self.mechanism)
         elif self.mechanism:
-            part = of_block(model, self.record, self.input, self.thin)
+            part = of_block(model, self.record, self.input, self.decimation)
         else:
             part = of_system(model, self.record, self.input)
         require_compiled(part.engine)
@@ -439,7 +441,7 @@ class Simulator:
 
 
 def free_run(
-    model, record: Measurement, *, position=0.0, velocity=0.0, slack=0.5, thin: int = 1
+    model, record: Measurement, *, position=0.0, velocity=0.0, slack=0.5, decimation: int = 1
 ) -> np.ndarray:
     """Return the output of a model over a whole record, shape (n,), from a state that is known.
 
@@ -451,10 +453,10 @@ def free_run(
         Reported by the model at the first sample [m], [m/s].
     slack : float
         Share of a gap taken up there, 0 to 1.
-    thin : int
+    decimation : int
         Samples a step of the input; 1 is exact.
     """
-    simulator = Simulator(model, record, thin=thin)
+    simulator = Simulator(model, record, decimation=decimation)
     known = {"x": position, "v": velocity, "slack": slack}
     one = np.zeros(1)
     whole = Segments(np.array([0]), np.array([len(record)]), one, one, one, one, one)

@@ -89,11 +89,11 @@ def knowing(model, other, records: Iterable[str], others: Iterable[str]):
     As a number each value stays what it was, and so does one that all of them have.
     """
     block, found = block_of(model), {}
-    table, told = getattr(block, "parameters", {}), getattr(block_of(other), "parameters", {})
+    table, shared = getattr(block, "parameters", {}), getattr(block_of(other), "parameters", {})
     for k, p in table.items():
         if is_own(p):
             each = {r: in_record(p.value, r) for r in records}
-            each |= {r: in_record(told[k].value, r) for r in others}
+            each |= {r: in_record(shared[k].value, r) for r in others}
             if any(v != float(p.value) for v in each.values()):
                 found[k] = PerRecord(p.value, each)
     return with_block(model, block.with_parameters(found)) if found else model

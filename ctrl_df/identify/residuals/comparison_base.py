@@ -54,8 +54,9 @@ class ComparisonBase(Brief):
         where, error = self.stands_out, self.worst.nrmse
         if not where.significant and error > UNMOVED:
             return (
-                f"The model misses the motion as a whole: it errs by {error:.0%} of the measured, in "
-                "no region more than in others.",
+                f"The model does not follow the motion at all: its error is {error:.0%} of the measured "
+                "motion, "
+                "in no region more than in others.",
             )
         return where.sentences
 

@@ -20,11 +20,11 @@ from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
 from ..thresholds import FULL_SAMPLES, NOTHING
 from .thresholds import (
+    HORIZON_DECIMATION,
     HORIZON_FIRST,
     HORIZON_LAST,
     HORIZON_LEAST,
     HORIZON_ON,
-    HORIZON_THIN,
     HORIZON_TOLERANCE,
     HORIZONS,
     SHORTEST_HORIZON,
@@ -35,7 +35,7 @@ from .thresholds import (
 class ErrorByHorizon:
     """Error of a model's free prediction against its length.
 
-    The records are cut into stretches of every length. In each the model runs freely from a position and a
+    The records are divided into segments of every length. In each the model runs freely from a position and a
     speed that are fitted; what hides in joints, gaps and bristles goes on from one into the next. The longest
     is the whole record, a free run, as `compare` makes it with ``mode="free"``.
 
@@ -79,7 +79,7 @@ class ErrorByHorizon:
 
 
 def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS) -> ErrorByHorizon:
-    """Return the error of a model as it is over stretches of every length.
+    """Return the error of a model as it is over segments of every length.
 
     Parameters
     ----------
@@ -106,27 +106,27 @@ def error_by_horizon(model, records: Sequence[Measurement], most: int = HORIZONS
 
 
 def _ladder(model, records, most) -> list[FitResult]:
-    """Return the initial states fitted over stretches of every length, the shortest first."""
-    thin = max(1, round(max(map(len, records)) / FULL_SAMPLES))
+    """Return the initial states fitted over segments of every length, the shortest first."""
+    decimation = max(1, round(max(map(len, records)) / FULL_SAMPLES))
     first, found = simulator_of(model, records[0]), []
     if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
         least = [max(SHORTEST_HORIZON * facts(r).swing, HORIZON_LEAST * facts(r).dt) for r in records]
         halvings = min(int(math.log2(max(r.duration / s, 1.0))) for r, s in zip(records, least, strict=True))
         for k in range(min(halvings, most - 1), 0, -1):
-            found.append(_fitted(model, records, 2**k, thin, CONTINUED, found))
-    return [*found, _fitted(model, records, 1, thin, FREE, found)]
+            found.append(_fitted(model, records, 2**k, decimation, CONTINUED, found))
+    return [*found, _fitted(model, records, 1, decimation, FREE, found)]
 
 
-def _fitted(model, records, parts, thin, begins, shorter) -> FitResult:
-    """Fit where stretches begin: roughly from those of shorter ones, then once at the full rate."""
+def _fitted(model, records, parts, decimation, begins, shorter) -> FitResult:
+    """Fit initial states of segments: roughly from those of shorter ones, then once at the full rate."""
     segments = [cut(r, parts) for r in records]
     near: Any = same_begins(shorter[-1], segments) if shorter else None
     for rate, iterations in (
-        (HORIZON_THIN * thin, HORIZON_ON if shorter else HORIZON_FIRST),
-        (thin, HORIZON_LAST),
+        (HORIZON_DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST),
+        (decimation, HORIZON_LAST),
     ):
         found = fit_segments(
-            model, records, segments, (), thin=rate, starts=near, iterations=iterations,
+            model, records, segments, (), decimation=rate, starts=near, iterations=iterations,
             tolerance=HORIZON_TOLERANCE, begins=begins,
         )  # fmt: skip
         near = found.starts

@@ -1,4 +1,4 @@
-"""What a fitted model still misses, told by free forces.
+"""What a fitted model still misses, estimated by free forces.
 
 Each kind adds forces of no particular law: over time, place, speed or load, after reversals, at one
 frequency (bumps along the record, along the stroke, ...). Their effect on the output is simulated, what the
@@ -116,10 +116,11 @@ def _regressed(kind, matrix, spans, residual, noise, segments, units, beside) ->
 
 
 _SENTENCES = {
-    "time": "a force that changes along the record, most between {0:.3g} and {1:.3g} s",
-    "position": "a force bound to the place, most between {0:.3g} and {1:.3g} {x}",
-    "low_speed": "a force over speed of a shape not in the library, most between {0:.3g} and {1:.3g} {x}/s",
-    "load": "a force that goes with the load, most between {0:.3g} and {1:.3g} {f}",
+    "time": "a force that varies over time, largest between {0:.3g} and {1:.3g} s",
+    "position": "a force that depends on the position, largest between {0:.3g} and {1:.3g} {x}",
+    "low_speed": "a force that depends on the velocity, of a form not in the library, largest between "
+    "{0:.3g} and {1:.3g} {x}/s",
+    "load": "a force that depends on the load, largest between {0:.3g} and {1:.3g} {f}",
     "after_reversal": "a force that builds up after each reversal, over {1:.3g} {x}",
     "frequency": "a force at one frequency, {0:.4g} Hz",
 }

@@ -377,7 +377,7 @@ _PLACE = {
 
 def _sentence(region: Region, words: dict[str, str]) -> str:
     place = _PLACE[region.kind].format(label=region.label, word=words.get(region.kind))
-    of = "its neighbours suggest" if region.kind == "frequency" else "of the samples"
+    of = "expected from its neighbours" if region.kind == "frequency" else "of the samples"
     text = (
         f"{region.share:.0%} of the squared error lies in {place}, against {region.expected_share:.0%} {of}"
     )

@@ -55,12 +55,12 @@ HUM_WINDOW = 161
 """Frequencies whose median is the power beside a hum."""
 
 HORIZON_TOLERANCE = 1e-2
-"""Relative gain at which initial states of a stretch are found."""
+"""Relative gain at which initial states of a segment have converged."""
 
 HORIZON_LEAST = 50
 """Samples of the shortest horizon at least."""
 
-HORIZON_THIN, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
+HORIZON_DECIMATION, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
 """Initial states for a horizon: decimation of the first fit, its steps, those where a shorter one is known,
 and those at the full rate."""
 
@@ -76,3 +76,17 @@ spread); times after which the input has forgotten, in those of a first-order si
 
 HUM_FINER, HUM_LEAST = 4, 3
 """Parts of a line of a spectrum into which it is divided; periods of a hum in a record at least."""
+
+COARSE = 0.4
+"""rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""
+
+FINEST = 0.02
+"""Spread about the lines of a grid, over its step, that still counts: finer is a grid of its own."""
+
+STRAY = 1e-3
+"""Share of rounded samples that may lie on any line: one that no model explains then costs log 1000 = 7 nats,
+and does not refute the grid alone."""
+
+ROUNDING_SPREAD = (-5.0, 0.0)
+"""Logarithms between which the error of a model lies that rounding hides, over the step: below e^-5, 0.007
+steps, no line is uncertain; beyond a whole step rounding hides nothing (`COARSE`)."""

@@ -269,7 +269,7 @@ class Comparison(ComparisonBase):
 
     @property
     def over(self) -> str:
-        """What the model was judged over, in words."""
+        """What the errors are over, in words."""
         return "a free run" if self.mode == "free" else f"{self.windows} segments"
 
     def report(self) -> str:
@@ -283,7 +283,7 @@ class Comparison(ComparisonBase):
         test = self.worst.input_test
         if test is not None:
             if not test:
-                so = "A correlation of the residual with the input is found: something is missing"
+                so = "The residual is correlated with the input: something is missing"
             elif self.white:
                 so = "The residual is white, and not correlated with the input: nothing is missing"
             else:

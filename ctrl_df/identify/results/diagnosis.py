@@ -20,18 +20,21 @@ from ..thresholds import RULED_OUT
 from .thresholds import SHOWN_PROBABILITY
 
 CALIBRATED = (
-    "Probabilities are those of the candidates and of nothing missing, all equal beforehand, by the "
-    "likelihood of whitened residuals. Checked on virtual rigs of an independent generator "
-    "(benchmarks/second.py; figures and rigs in docs/calibration.md): 219 with one hidden effect, named "
-    "first in 95 %; 86 with nothing hidden, none in 98 %; of what was said at 95 % and more, 96 % right. No "
-    "such count has been made on machines: there a probability holds as far as the true law is one of those "
-    "tried."
+    "Probabilities are posterior probabilities of the candidates and of nothing being missing, all equal a "
+    "priori, from the likelihood of whitened residuals. Checked on virtual rigs of an independent generator "
+    "(benchmarks/second.py; figures and rigs in docs/calibration.md): 219 rigs with one hidden effect, named "
+    "first in 95 %; 86 with nothing hidden, verdict none in 98 %; of the statements made with a "
+    "probability of "
+    "95 % or more, 96 % were right. This has not been counted on real machines: there a probability holds "
+    "only "
+    "if the true law is among the candidates."
 )
 """On what the probabilities rest, in words; the counts are those of docs/calibration.md."""
 
 _WHICH = (
-    "nrmse: rms error over rms of the {of}, in the segments of this search, each from a fitted start. "
-    "compare() takes segments of its own, or a free run: its nrmse of the same model is another number."
+    "nrmse: rms error over rms of the {of}, over the segments of this search, each from a fitted initial "
+    "state. "
+    "compare() uses segments of its own, or a free run, so that its nrmse of the same model differs."
 )
 """Why one model has several errors; said where they are printed."""
 
@@ -45,7 +48,7 @@ def which_errors(measure: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Predicting:
-    """A model and the records by which its free prediction is judged.
+    """A model and the records that its free prediction is compared with.
 
     Attributes
     ----------

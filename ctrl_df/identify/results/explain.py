@@ -13,7 +13,11 @@ from .thresholds import SHOWN_PROBABILITY
 
 def named(effect) -> str:
     """Return an effect's id as words."""
-    return effect.id.replace("_", " ")
+    return _words(effect.id)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def values_of(candidate) -> str:
@@ -25,7 +29,7 @@ def values_of(candidate) -> str:
 
 def _value(p) -> str:
     if isinstance(p.value, PerRecord):
-        return "of each record its own"
+        return "a value for each record"
     return f"{digits(p.value, 4)} {p.unit}".rstrip()
 
 
@@ -38,8 +42,9 @@ def unconfirmed(first) -> str:
     """Return that the held-out data do not confirm an effect that the fitted data favour."""
     return (
         f"The fitted data favour {named(first.effect)} (log-likelihood higher by "
-        f"{first.evidence_fitted:.0f}), the held-out data do not confirm it ({first.evidence_holdout:.1f}): "
-        "it may not act there. Hold out a record in which it acts."
+        f"{first.evidence_fitted:.0f}), but the held-out data do not confirm it "
+        f"({first.evidence_holdout:.1f}): "
+        "it may not act in them. Hold out a record in which it acts."
     )
 
 
@@ -63,7 +68,10 @@ def explain(d, words) -> str:
             "No effect of the library improves on it beyond chance."
         )
     if d.verdict == UNKNOWN:
-        tried = first and f"The best of the library, {named(first.effect)}, leaves {percent(first.nrmse)}."
+        tried = first and (
+            f"With the best effect of the library, {named(first.effect)}, the error is "
+            f"{percent(first.nrmse)}."
+        )
         tried = tried and tried + sensed_side(d, first)
         return (
             "Something outside the library is missing. The refitted model errs by "
@@ -76,7 +84,7 @@ def explain(d, words) -> str:
     same = ""
     if first.equivalents:
         same = (
-            " These data do not tell it from "
+            " These data cannot distinguish it from "
             + ", ".join(e.replace("_", " ") for e in first.equivalents)
             + "."
         )
@@ -88,7 +96,7 @@ def explain(d, words) -> str:
         doubts = "".join(f" {s}" for s in d.doubts)
         alone = len(open_ones) + len(shared) == 1
         which, it, separate = (
-            ("confirm it", "It", "tell") if alone else ("tell which", "The first", "separate them")
+            ("confirm it", "It", "decide") if alone else ("tell which", "The first", "separate them")
         )
         return (
             f"An effect is missing, and these {words.data} do not {which}: {names}. {it} reduces the error "
@@ -99,7 +107,7 @@ def explain(d, words) -> str:
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
         f"probability {sure(certainty(d.ranking))}.{same}{doubts}"
-        + (f" Before, {where[0].lower() + where[1:]}" if where else "")
+        + (f" Without it, {where[0].lower() + where[1:]}" if where else "")
     )
 
 
@@ -110,7 +118,8 @@ def sensed_side(d, first) -> str:
     side = first.model.measured
     other = "motor" if side == "load" else "load"
     return (
-        f' The sensor is taken to see the {side}; if it sees the {other}, the model needs measured="{other}".'
+        f" The sensor is assumed to measure the {side}; if it measures the {other}, give the model "
+        f'measured="{other}".'
     )
 
 
@@ -118,29 +127,33 @@ def falls_behind(first, long) -> str:
     """Return how the first of a ranking predicts over long horizons (`LongPrediction`)."""
     if long.horizon == 0:
         return (
-            f"In free prediction, internal states continued, neither {named(first.effect)} nor any other "
-            f"follows the motion for long: it errs by {long.errors[first.id]:.0%} over the shortest horizon."
+            "In free prediction, with internal states continued from segment to segment, neither "
+            f"{named(first.effect)} nor any other candidate follows the motion: with it the error is "
+            f"{long.errors[first.id]:.0%} already over the shortest horizon."
         )
-    who = [(n.replace("_", " ") or "the model without it", long.errors[n]) for n in long.better]
-    others = " and ".join(f"that of {name} {percent(error)}" for name, error in who)
+    who = [(f"with {_words(n)}" if n else "without it", long.errors[n]) for n in long.better]
+    others = " and ".join(f"{percent(error)} {name}" for name, error in who)
     return (
-        f"In free prediction over {long.horizon:.3g} s, internal states continued, the error with "
-        f"{named(first.effect)} is {percent(long.errors[first.id])}, {others}: short segments are no proof."
+        f"In free prediction over {long.horizon:.3g} s, with internal states continued from segment to "
+        "segment, "
+        f"the error is {percent(long.errors[first.id])} with {named(first.effect)}, but {others}: its "
+        "agreement "
+        "over short segments proves nothing."
     )
 
 
 def left_out(first, long) -> str:
-    """Return why the first of a ranking was left out, and all others tried without it (`LongPrediction`)."""
-    return f"{falls_behind(first, long)} All others were therefore tried again without {named(first.effect)}."
+    """Return why the search was repeated without the first of a ranking (`LongPrediction`)."""
+    return f"{falls_behind(first, long)} The search was therefore repeated without {named(first.effect)}."
 
 
 def leaves(first, second) -> str:
     """Return what the diagnosis `second` of the model with the first effect says of what that leaves."""
-    left = f"What {named(first.effect)} leaves is more than noise"
+    left = f"The residual with {named(first.effect)} is more than noise"
     if second.verdict == UNKNOWN or not second.ranking:
         return f"{left}, and no second effect of the library explains it."
     also = named(second.ranking[0].effect)
-    return f"{left}: {also} is missing beside it. improve adds one effect after the other."
+    return f"{left}: {also} is missing as well. improve() adds effects one after the other."
 
 
 def grows(short: float, error: float, seconds: float, effect=None) -> str:
@@ -149,28 +162,29 @@ def grows(short: float, error: float, seconds: float, effect=None) -> str:
     `effect`: what it was given, and what is therefore not all that is missing.
     """
     who = "The refitted model" if effect is None else f"With {named(effect)} the model"
-    more = "" if effect is None else ", so that more is missing"
+    more = "" if effect is None else ": something else is missing, too"
     return (
-        f"{who} follows short segments to {percent(short)}, but not long ones: over {seconds:.3g} s "
-        f"each, refitted to these, it errs by {percent(error)}{more}."
+        f"{who} follows short segments with an error of {percent(short)}, but not long ones: refitted to "
+        "segments "
+        f"of {seconds:.3g} s its error is {percent(error)}{more}."
     )
 
 
 def explains_nothing() -> str:
-    """Return that a model makes nothing of the motion, whatever its parameters."""
+    """Return that a model explains nothing of the motion, whatever its parameters."""
     return f"The model explains nothing of this motion. {_UNITS}"
 
 
-def far_off(judged, names, stated) -> str:
+def far_off(fitted, names, stated) -> str:
     """Return that the model without an effect explains more with parameters far from those stated."""
-    now, before = judged.block.parameters, stated.parameters
+    now, before = fitted.block.parameters, stated.parameters
     values = ", ".join(
         f"{k} {digits(now[k].value)} {now[k].unit} in place of {digits(before[k].value)}" for k in names
     )
-    return f"With {values} the model errs by {percent(judged.train.nrmse)} without any effect. {_UNITS}"
+    return f"Without any effect, but with {values}, the model errs by {percent(fitted.train.nrmse)}. {_UNITS}"
 
 
-_UNITS = "Do record and model agree in their units?"
+_UNITS = "Check the units of record and model."
 
 
 def undetermined(first) -> str:
@@ -184,8 +198,9 @@ def displaces(first) -> str:
     table = first.model.parameters
     values = " and ".join(f"{k} at {digits(table[k].value)} {table[k].unit}".strip() for k in first.displaced)
     return (
-        f"With {named(first.effect)} the model's own parameters come to a bound of their range ({values}): "
-        "it may stand in for them."
+        f"With {named(first.effect)}, parameters of the model itself reach a bound of their range "
+        f"({values}): "
+        f"{named(first.effect)} may stand in for wrong values of these."
     )
 
 
@@ -193,13 +208,18 @@ def explain_so_far(d, words) -> str:
     """Return what a `Diagnosis` under way knows."""
     size = f"So far: with its parameters refitted the model errs by {percent(d.nrmse)}{words.of}"
     if d.verdict == NONE:
-        return f"{size}; nothing is missing, as far as is known."
+        return f"{size}; so far nothing seems to be missing."
     if d.verdict == UNKNOWN:
-        return f"{size}; no effect tried yet explains that."
+        return f"{size}; no effect tried so far explains this error."
     first, *others = d.ranking[:4]
     behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
-    how = "It is refitted and tried on what is held out" if first.confirmed else "None of them is confirmed"
+    how = (
+        "It is refitted and validated on held-out data"
+        if first.confirmed
+        else "None of them is confirmed yet"
+    )
     return (
-        f"{size}; {named(first.effect)} explains most of that (it leaves {percent(first.nrmse)}){behind}. "
+        f"{size}; {named(first.effect)} explains most of this error (with it: "
+        f"{percent(first.nrmse)}){behind}. "
         f"{how}; the diagnosis is not complete."
     )

@@ -1,4 +1,4 @@
-"""The ladder, over time and over the (A, omega) plane alike: its steps, the study they make, the climb."""
+"""The ladder, over time and over the (A, omega) plane alike: its steps, and the study that they make."""
 
 from __future__ import annotations
 
@@ -76,28 +76,24 @@ class Step(Brief):
 
     @property
     def sentence(self) -> str:
-        """What became of effects added earlier, in plain words; empty where they all stayed."""
+        """What became of effects added earlier, in a sentence; empty where they all stayed."""
         if not self.changes:
             return ""
         gone, new = _named(self.dropped), _named(self.instead)
+        better, it = f"{new} {_explain(self.instead)} the data better than {gone}", _it(self.dropped)
         if self.effect:
-            beside = f"Beside {_words(self.effect)}"
+            beside = f"With {_words(self.effect)} in the model,"
             if not new:
                 return f"{beside} {gone} {_are(self.dropped)} no longer needed."
-            return (
-                f"{beside} {new} {_do(self.instead)} what {gone} stood in for, and took {_its(self.dropped)} "
-                "place."
-            )
+            return f"{beside} {better}, and replaced {it}."
         if not new:
-            return f"In the end {gone} {_are(self.dropped)} not needed, and {_were(self.dropped)} dropped."
+            return f"The final model does not need {gone}, which {_were(self.dropped)} dropped."
         if self.evidence > 0:
-            return (
-                f"In the end {new} {_do(self.instead)} better than {gone} (log-likelihood higher by "
-                f"{self.evidence:.0f}), and took {_its(self.dropped)} place."
-            )
+            gain = f"log-likelihood higher by {self.evidence:.0f}"
+            return f"At the end of the ladder {better} ({gain}), and replaced {it}."
         if not gone:
-            return f"The ladder went back, and on with {new}: what it had tried left more than noise."
-        return f"The ladder went back: {new} in place of {gone}, which had led to no end without remainder."
+            return f"The ladder went back and continued with {new}: the model before left more than noise."
+        return f"The ladder went back and took {new} in place of {gone}, with which more than noise was left."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,8 +147,8 @@ class Study(Brief):
     @property
     def story(self) -> list[str]:
         """What became of effects on the way, and what the neighbours come to, in sentences."""
-        told = [s.sentence for s in self.steps if s.sentence]
-        return [*told, self.neighbours.sentence] if self.neighbours else told
+        notes = [s.sentence for s in self.steps if s.sentence]
+        return [*notes, self.neighbours.sentence] if self.neighbours else notes
 
     @property
     def measure(self) -> str:
@@ -174,9 +170,9 @@ class Study(Brief):
         """Return the outcome in plain words."""
         head = self._outcome()
         if self.status != COMPLETE:
-            head = f"Not complete ({self.status}): the ladder would have gone on. {head}"
-        told = [line for line in (which_errors(self.measure),) if line]
-        lines = [" ".join([head, *self.story]), "", self.table(), *told, ""]
+            head = f"Not complete ({self.status}): the ladder would have continued. {head}"
+        notes = [line for line in (which_errors(self.measure),) if line]
+        lines = [" ".join([head, *self.story]), "", self.table(), *notes, ""]
         if self.neighbours:
             lines += [str(self.neighbours.table()), ""]
         for name, p in self.model.parameters.items():
@@ -190,7 +186,7 @@ class Study(Brief):
                 f"Nothing is missing: with refitted parameters the model errs by {percent(first.nrmse)}, "
                 "the noise of these data."
             )
-        far, told = ("", last.diagnosis) if self.status == COMPLETE else (" so far", None)
+        far, notes = ("", last.diagnosis) if self.status == COMPLETE else (" so far", None)
         held = math.isfinite(first.nrmse_holdout + last.nrmse_holdout)
         if self.effects:
             on = f", on held-out data from {percent(first.nrmse_holdout)} to {percent(last.nrmse_holdout)}"
@@ -205,9 +201,9 @@ class Study(Brief):
                 f"Nothing is added{far}: with refitted parameters the model errs by {percent(last.nrmse)} "
                 f"({on}noise {percent(self.noise)})."
             )
-        if self.verdict == UNKNOWN and told is not None:
-            left = f"Something outside the library is missing. {told.remains}"
-            head += f" {left if told.remains else told.explanation}"
+        if self.verdict == UNKNOWN and notes is not None:
+            left = f"Something outside the library is missing. {notes.remains}"
+            head += f" {left if notes.remains else notes.explanation}"
         elif last.diagnosis is not None and last.diagnosis.status != COMPLETE:
             head += f" {last.diagnosis.explanation}"
         return head
@@ -255,9 +251,9 @@ def _were(names) -> str:
     return "was" if len(names) == 1 else "were"
 
 
-def _do(names) -> str:
-    return "does" if len(names) == 1 else "do"
+def _explain(names) -> str:
+    return "explains" if len(names) == 1 else "explain"
 
 
-def _its(names) -> str:
-    return "its" if len(names) == 1 else "their"
+def _it(names) -> str:
+    return "it" if len(names) == 1 else "them"

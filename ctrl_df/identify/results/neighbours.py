@@ -34,7 +34,7 @@ class Neighbour:
     verdict : {'better', 'equal', 'worse'}
         ``equal``: within what chance makes. A model that has an effect more needs the evidence of any effect.
     refitted : bool
-        Whether it was fitted to all data. If not, a first look has shown that it comes nowhere near.
+        Whether it was fitted to all data. If not, screening has shown that it comes nowhere near.
     given : bool
         Whether the effect dropped is the user's own: such effects stay, whatever the data say.
     parameters : dict
@@ -106,24 +106,24 @@ class Neighbours(Sequence):
 
     @property
     def sentence(self) -> str:
-        """What they come to, in plain words."""
+        """The result in sentences."""
         if not self.rows:
             return ""
         how = f"{len(self.rows)} models that differ from it by one effect were tried"
-        how += "" if self.complete else " before the time was over"
+        how += "" if self.complete else " before the time ran out"
         better, equal = self.of(BETTER), [n for n in self.of(EQUAL) if n.change != ADD]
-        found = [f"{how}: {_listed(better)} would do better." if better else f"{how}: none does better."]
+        found = [f"{how}: {_listed(better)} would be better." if better else f"{how}: none is better."]
         own = [n for n in equal if n.given]
         others = [n for n in equal if not n.given]
         if others:
-            found.append(f"As good within chance: {_listed(others)}.")
+            found.append(f"As good, within what chance makes: {_listed(others)}.")
         if own:
             names = ", ".join(_words(n.dropped[0]) for n in own)
-            found.append(f"The data do not need {names}, which the model given has; it was left in.")
+            found.append(f"The data do not need {names} of the given model; given effects are never dropped.")
         nearest = next((n for n in self.rows if n.verdict == WORSE and n.change == EXCHANGE), None)
         if nearest is not None and not others and not better:
             found.append(
-                f"The best with one effect replaced, {_told(nearest)}, has a log-likelihood lower by "
+                f"The best with one effect replaced, {_described(nearest)}, has a log-likelihood lower by "
                 f"{-nearest.evidence:.0f}" + ("." if nearest.refitted else " (not refitted in full).")
             )
         return " ".join(found)
@@ -133,7 +133,7 @@ class Neighbours(Sequence):
         lines = [("final model", "", _percent(self.nrmse), _percent(self.nrmse_holdout), "")]
         for n in self.rows[:rows]:
             errors = _percent(n.nrmse), _percent(n.nrmse_holdout)
-            lines.append((_told(n), f"{n.evidence:.0f}", *errors, n.verdict))
+            lines.append((_described(n), f"{n.evidence:.0f}", *errors, n.verdict))
         return Table(("neighbour", "evidence", "error", "held out", "verdict"), tuple(lines), 60)
 
     def to_pandas(self):
@@ -154,17 +154,17 @@ class Neighbours(Sequence):
         return self.table()._repr_html_()
 
 
-def _told(n: Neighbour) -> str:
+def _described(n: Neighbour) -> str:
     gone = " and ".join(_words(d) for d in n.dropped)
     if n.change == ADD:
-        return f"with {_words(n.added)} besides"
+        return f"with {_words(n.added)} in addition"
     if n.change == DROP:
         return f"without {gone}"
     return f"{_words(n.added)} in place of {gone}"
 
 
 def _listed(rows) -> str:
-    return "; ".join(_told(n) for n in rows)
+    return "; ".join(_described(n) for n in rows)
 
 
 def _words(name: str) -> str:

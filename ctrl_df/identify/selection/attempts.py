@@ -1,8 +1,8 @@
-"""Every effect tried: fits from many starts begun, those with a chance brought to their end.
+"""The fits of all effects: started from many values, completed where they may still be the best.
 
-The fits of all effects run side by side in rounds: a few steps of every start, the two that are then ahead to
-their end, and the rest against them. Which fits these are follows from the data alone, so that
-results are the same however many run at once.
+They run in parallel, in rounds: a few steps from every start, then the two best until they converge, then the
+rest, each given up as soon as it is hopeless against these. Which fits these are follows from the data alone,
+so that results do not depend on how many run at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ..thresholds import GIVE_UP
 from .thresholds import (
     ANOTHER_START,
     BEGUN,
-    EFFORT_BENT,
+    EFFORT_ILL_CONDITIONED,
     EFFORT_MOVED,
     EFFORT_TRIED,
     JOINTS,
@@ -40,28 +40,28 @@ from .thresholds import (
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """One fit of one effect, on its way.
+    """One fit of one effect, not yet completed.
 
     Attributes
     ----------
     key : str
         Id of the effect.
     block : Mechanism
-        Where the fit begins, or has come to.
+        The model where the fit starts, or as fitted so far.
     names : tuple of str
-        Parameters that it moves.
+        Parameters that are fitted.
     data : SegmentedData
-        The segments it is in.
+        The segments that are fitted.
     steps, tolerance : int, float
-        Iterations left in these, and when to end them.
+        Iterations left in these, and the relative gain of the cost at which they end.
     extra : int
         Parameters beyond the baseline's.
     starts : list of arrays or None
-        Initial states with which it begins.
+        Initial states of segments at the start.
     fit : FitResult or None
-        What it has come to.
+        The result so far.
     nominal : bool
-        Whether it begins at the user's values.
+        Whether it starts from the user's values.
     """
 
     key: str
@@ -77,30 +77,30 @@ class Attempt:
 
     @property
     def error(self) -> float:
-        """Error it has come to."""
+        """Error of the fit so far."""
         assert self.fit is not None
         return self.fit.rmse
 
     @property
     def multimodal(self) -> bool:
-        """Whether fits of its effect begin in short segments."""
+        """Whether fits of its effect start in short segments."""
         return self.block.effects[-1].multimodal
 
     @property
     def trial(self) -> CandidateFit:
-        """What it has come to."""
+        """The fit so far, as a candidate."""
         assert self.fit is not None
         return CandidateFit(self.key, self.fit, extra=self.extra)
 
 
-def tried(
+def fit_effects(
     classes,
     screen: Screen,
     short: SegmentedData | None,
     free,
     nominal,
     executor=None,
-    screened=None,
+    on_screened=None,
     reached: float = math.inf,
 ) -> list[CandidateFit]:
     """Return every effect that can be added, fitted over the segments of the screen.
@@ -110,19 +110,19 @@ def tried(
     classes : sequence of effect classes
     screen : Screen
     short : SegmentedData or None
-        In short segments, where fits of effects with many minima begin; None: in those of the screen, with
+        Short segments, where fits of multimodal effects start; None: they start in those of the screen, with
         the initial states of the model without them.
     free : tuple of str
         Parameters of the baseline that are refitted.
     nominal : mapping
         Their values as the user has them.
     executor : concurrent.futures.Executor or None
-        Runs the fits side by side; None: threads do.
-    screened : callable or None
+        Runs the fits in parallel; None: threads do.
+    on_screened : callable or None
         Takes every effect by what its best start explains, before any fit.
     reached : float
-        Error of a model that is known: all begin at the nominal values, too, what cannot come near it is left
-        where that shows, and joints are not sought over the plane.
+        Error of a known model: all fits start from the nominal values, too, those that cannot come near it
+        are given up, and joints are not sought over a grid of resonances.
     """
     known = math.isfinite(reached)
     span = float(np.ptp(screen.motion.x))
@@ -135,11 +135,11 @@ def tried(
     states = screen.data.states_of(user)
     about = screen.data.fit(user, tuple(free), starts=states.starts, iterations=0)
     places = _Places(screen, short, Screen(about, screen.data), tuple(nominal.items()))
-    joints = [c for c in kinds if c.role == "coupling" and screen.block.core.bodies == 1 and not known]
-    begun = run(_begin, [(c, screen, places, free, known) for c in kinds])
-    if screened is not None:
-        screened(_screened(begun, screen))
-    resonating = run(_begin_joint, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
+    joints = kinds if screen.block.core.bodies == 1 and not known else []
+    begun = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
+    if on_screened is not None:
+        on_screened(_ranked_starts(begun, screen))
+    resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in begun for a in found]
     rounds = _Rounds(run, screen, span, 1 if known else KEPT, GIVE_UP * reached)
@@ -154,17 +154,17 @@ def tried(
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Where fits begin.
+    """Where fits start.
 
     Attributes
     ----------
     screen : Screen
     short : SegmentedData or None
-        Where those of effects with many minima do; None: where all others do.
+        Where those of multimodal effects start; None: where all others do.
     user : Screen
-        About the model as the user has it.
+        About the user's model without an effect.
     values : tuple of (str, float)
-        What the user has.
+        Values of the user's model.
     """
 
     screen: Screen
@@ -179,8 +179,8 @@ class _Places:
     def starts(self, block, values, multimodal: bool) -> list[np.ndarray] | None:
         """Return the initial states of the model without an effect as those of a block with one.
 
-        None where fits begin with what is measured. `values`: of the model, where the block has not those of
-        the screen.
+        None where fits start from the measured states. `values`: of the model, where the block has not those
+        of the screen.
         """
         if (self.short is not None and multimodal) or (values and values != self.values):
             return None
@@ -196,7 +196,7 @@ class _Best:
     least: float
 
     def promises(self, key: str, base: float) -> bool:
-        """Whether an effect has come so near that one which contains it may be the right one.
+        """Whether an effect fits so well that one which contains it may be the right one.
 
         `base`: error of the model without it.
         """
@@ -209,19 +209,19 @@ class _Best:
 
 @dataclass(frozen=True, eq=False)
 class _Rounds:
-    """How fits of many effects go against each other.
+    """Rounds in which the fits of many effects compete.
 
     Attributes
     ----------
     run : callable
-        Runs jobs side by side.
+        Runs jobs in parallel.
     screen : Screen
     span : float
         Stroke of the records [m].
     kept : int
-        Fits of an effect that go on after the first steps.
+        Fits of an effect that are continued after the first steps.
     near : float
-        Error that a fit must be able to come below.
+        Error above which a fit is given up.
     """
 
     run: Callable
@@ -231,21 +231,21 @@ class _Rounds:
     near: float
 
     def fitted(self, attempts: list[Attempt], best: _Best) -> _Best:
-        """Bring the attempts that have a chance against the best to their end; return the best then."""
-        # those of few steps first: what they come to tells of the others which need no long look
-        begun = self.run(_first, [(a, self.near) for a in attempts if not a.multimodal])
+        """Complete the attempts that may be the best of their effect; return the best of all effects."""
+        # those of few steps first: their errors show which of the others can be given up early
+        begun = self.run(_first_steps, [(a, self.near) for a in attempts if not a.multimodal])
         least = min([best.least, *(a.error for a in begun)])
-        begun += self.run(_first, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
+        begun += self.run(_first_steps, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
         begun = [a for a in begun if distinct(a.trial, self.span)]
         kept = _best(begun, self.kept)
-        # few steps from where the user begins tell little: the baseline may have ended in another minimum
+        # a few steps from the user's values show little: the baseline may have ended in another minimum
         own = _best([a for a in begun if a.nominal], 1)
         begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
         ahead = _best(begun, 1)[:2]
-        found = self.run(_finish, [(a, self.screen.data, self.near) for a in ahead])
+        found = self.run(_completed, [(a, self.screen.data, self.near) for a in ahead])
         least = min([least, *(t.train.rmse for t in found)])
         rest = [a for a in begun if not any(a is o for o in ahead)]
-        found += self.run(_finish, [(a, self.screen.data, GIVE_UP * least) for a in rest])
+        found += self.run(_completed, [(a, self.screen.data, GIVE_UP * least) for a in rest])
         fits = dict(best.fits)
         for t in found:
             known = fits.get(t.key)
@@ -254,10 +254,10 @@ class _Rounds:
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
 
-def _screened(begun, screen: Screen) -> list[CandidateFit]:
-    """Return every effect by what its best start explains, before any fit, that of most evidence first.
+def _ranked_starts(begun, screen: Screen) -> list[CandidateFit]:
+    """Return every effect with what its best start explains, before any fit, best evidence first.
 
-    The share of the residual that a start leaves is of a linear estimate: it ranks, and promises no more.
+    The share of the residual that a start leaves is a linear estimate: good enough for an order.
     """
     base, found = screen.base, []
     samples = len(screen.residual)
@@ -276,11 +276,11 @@ def _screened(begun, screen: Screen) -> list[CandidateFit]:
     return sorted(found, key=lambda t: -t.evidence)
 
 
-def distinct(tried: CandidateFit, span) -> bool:
+def distinct(fitted: CandidateFit, span) -> bool:
     """Whether the newest effect is what its name says over the stroke `span` [m]."""
-    own = tried.block.newest + "."
-    at_bound = {name.removeprefix(own) for name in tried.train.names_at_bound if name.startswith(own)}
-    return tried.block.effects[-1].distinct(span, at_bound)
+    own = fitted.block.newest + "."
+    at_bound = {name.removeprefix(own) for name in fitted.train.names_at_bound if name.startswith(own)}
+    return fitted.block.effects[-1].distinct(span, at_bound)
 
 
 def _best(attempts, count) -> list[Attempt]:
@@ -295,8 +295,8 @@ def _best(attempts, count) -> list[Attempt]:
 # --- jobs -----------------------------------------------------------------------------------------
 
 
-def _begin_joint(job) -> list[Attempt]:
-    """Return where fits of a joint begin that has a share of the load behind it."""
+def _joint_attempts(job) -> list[Attempt]:
+    """Return the attempts at a joint with a share of the mass behind it; none of other effects."""
     cls, share, screen, free = job
     found = []
     for near in resonating(cls, screen, share, JOINTS):
@@ -307,7 +307,7 @@ def _begin_joint(job) -> list[Attempt]:
                 near.model,
                 (*free, *names),
                 screen.data,
-                *EFFORT_BENT,
+                *EFFORT_ILL_CONDITIONED,
                 screen.data.count(near.model, names),
                 near.starts,
                 near,
@@ -316,8 +316,8 @@ def _begin_joint(job) -> list[Attempt]:
     return found
 
 
-def _begin(job) -> tuple[list[Start], list[Attempt]]:
-    """Return the starts of one effect class, and where fits begin there."""
+def _attempts_of(job) -> tuple[list[Start], list[Attempt]]:
+    """Return the start values of one effect class, and the attempts from them."""
     cls, screen, places, free, known = job
     proposed = proposals(cls, screen)
     found, starts = [], starts_for(cls, screen, proposed)
@@ -325,42 +325,42 @@ def _begin(job) -> tuple[list[Start], list[Attempt]]:
         # with the other parameters as the model has them, or as they are without the effect
         best = starts[: 1 + cls.multimodal]
         own = [replace(s, values=places.values) for s in best[:1]]
-        begun = [_from(s, screen, places, free) for s in (*own, *best)]
+        begun = [_attempt_at(s, screen, places, free) for s in (*own, *best)]
         return starts, [a for a in begun if a is not None]
     for i, start in enumerate(starts):
         share, beyond = ANOTHER_START
         if i and not starts[0].values and start.left > share * starts[0].left + beyond:
             break
-        found.append(_from(start, screen, places, free))
+        found.append(_attempt_at(start, screen, places, free))
     if not (cls.multimodal or screen.block.core.bodies == 2):
-        found.append(_from_user(cls, screen, places, free, starts))
+        found.append(_attempt_at_user(cls, screen, places, free, starts))
     else:
-        # The baseline may have bent far from the truth to make up for what is missing: begin where the user
-        # does. What changes in proportion to its size finds that within a step.
+        # What is missing may bias the baseline far from the truth: start from the user's values, too, once
+        # for an effect that is proportional to its size.
         several = cls.multimodal or not cls.proportional
         for effect in _spread(proposed, 1 + screen.block.core.bodies if several else 1):
-            attempt = _from(Start(effect, 0.0, places.values), screen, places, free)
+            attempt = _attempt_at(Start(effect, 0.0, places.values), screen, places, free)
             found.append(attempt and replace(attempt, nominal=True))
     return starts, [a for a in found if a is not None]
 
 
-def _from_user(cls, screen: Screen, places: _Places, free, starts) -> Attempt | None:
-    """Return the attempt that begins at the user's values; None where `starts` promise no larger error.
+def _attempt_at_user(cls, screen: Screen, places: _Places, free, starts) -> Attempt | None:
+    """Return the attempt from the user's values; None where `starts` promise no larger error.
 
-    A model without an effect as strong as all else is bent by the refit far from the truth, where nothing
-    that is small beside it explains much.
+    Without an effect as strong as all else, the refitted model is biased far from the truth, and there
+    nothing that is small beside that effect explains much.
     """
     about = places.user
     promised = [s.left * screen.power for s in starts if s.left > 0]
     own = [s for s in starts_for(cls, about, proposals(cls, about), 1) if s.left > 0]
     if not own or own[0].left * about.power >= min(promised, default=math.inf):
         return None
-    attempt = _from(Start(own[0].effect, own[0].left, places.values), screen, places, free)
+    attempt = _attempt_at(Start(own[0].effect, own[0].left, places.values), screen, places, free)
     return attempt and replace(attempt, nominal=True)
 
 
-def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:
-    """Return the attempt that begins at a start; None where the effect contradicts the block."""
+def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:
+    """Return the attempt from a start; None where the effect contradicts the block."""
     values = {k: v for k, v in start.values if k in free}
     base = screen.block.with_parameters(feasible(screen.block, values))
     block, key = extended(base, start.effect), start.effect.id
@@ -368,15 +368,13 @@ def _from(start: Start, screen: Screen, places: _Places, free) -> Attempt | None
         return None
     added, many = own_names(block), start.effect.multimodal
     names = (*free, *(n for n in added if not block.parameters[n].stepped))
-    # a joint changes everything at once, and so does what rubs behind it: their minima are long and bent
-    bent = many and (start.effect.role in ("contact", "coupling") or start.effect.side == "load")
     begin = places.starts(block, start.values, many)
-    effort = EFFORT_BENT if bent else EFFORT_TRIED
+    effort = EFFORT_ILL_CONDITIONED if start.effect.ill_conditioned else EFFORT_TRIED
     return Attempt(key, block, names, places.data(many), *effort, screen.data.count(block, added), begin)
 
 
-def _first(job) -> Attempt:
-    """Take the first steps, fewer where all would not lead to an error below `give_up` at their pace."""
+def _first_steps(job) -> Attempt:
+    """Take the first steps; fewer where the rate of descent excludes an error below `give_up`."""
     attempt, give_up = job
     data, block = attempt.data, attempt.block
 
@@ -385,10 +383,10 @@ def _first(job) -> Attempt:
 
     block, starts = begun_with_angles(block, own_names(block), data.train.records, attempt.starts, fit)
     attempt = replace(attempt, block=block, starts=starts)
-    return _on(attempt, min(BEGUN, attempt.steps), give_up)
+    return _continued(attempt, min(BEGUN, attempt.steps), give_up)
 
 
-def _on(attempt: Attempt, steps, give_up) -> Attempt:
+def _continued(attempt: Attempt, steps, give_up) -> Attempt:
     fit = attempt.data.fit(
         attempt.block, attempt.names, starts=attempt.starts, iterations=steps, tolerance=attempt.tolerance,
         give_up=give_up, steps_left=attempt.steps if steps < attempt.steps else 0,
@@ -397,14 +395,14 @@ def _on(attempt: Attempt, steps, give_up) -> Attempt:
     return replace(attempt, block=fit.model, fit=fit, starts=fit.starts, steps=left)
 
 
-def _finish(job) -> CandidateFit:
+def _completed(job) -> CandidateFit:
     """Take the steps that are left, then those over the segments of the screen.
 
-    Where they would not lead to an error below `give_up` at the pace of the last ones they are left out.
+    They are left out where the rate of descent excludes an error below `give_up`.
     """
     attempt, data, give_up = job
     if attempt.steps:
-        attempt = _on(attempt, attempt.steps, give_up)
+        attempt = _continued(attempt, attempt.steps, give_up)
     trial = attempt.trial
     if attempt.data is data:
         return trial

@@ -1,4 +1,4 @@
-"""The best candidates refitted with all care: at the full rate, over the longest segments that they bear."""
+"""Confirmation of the best candidates: refits at the full rate, over the longest segments possible."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.values import feasible
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
-from .alike import alike_along
 from .attempts import distinct
+from .equivalence import matching_along
 from .evidence import misses_lines, ranked, rounds
 from .reference import Reference
 from .thresholds import (
@@ -36,7 +36,7 @@ from .thresholds import (
     EFFORT_CONFIRMED,
     EFFORT_ENDED,
     EXPLAINS_LITTLE,
-    LITTLE_LUCK,
+    LITTLE_CHANCE,
     PROMISING,
     STEPS_LONGER,
     STOPPED_EARLY,
@@ -48,27 +48,27 @@ Stages = list[list[FitResult | None]]
 
 
 def confirmed(
-    at: Reference, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+    at: Reference, found: Sequence[CandidateFit], staged: Callable, report: Callable, stage: Callable
 ) -> tuple[Reference, list[CandidateFit]]:
-    """Refit baseline and best candidates at the full rate; return these, best first, and what judges them.
+    """Refit baseline and best candidates at the full rate; return their reference, and these, best first.
 
     Parameters
     ----------
     at : Reference
     found : sequence of CandidateFit
-        Of the first look, best first.
+        From screening, best first.
     staged : callable
         ``staged(at, fits)``, such as `stages`.
-    told, stage : callable
-        See `FirstLook.of`.
+    report, stage : callable
+        See `Screening.run`.
     """
     span = max(float(np.ptp(facts(r).place)) for r in at.data.train.records)
     while True:
-        now, chosen = _confirmed(at, found, staged, told, stage)
+        now, chosen = _confirmed(at, found, staged, report, stage)
         odd = {t.key for t in chosen if not distinct(t, span)}
         if not odd or chosen[0].key not in odd:
             break
-        # beside what is not what its name says the others were given up
+        # the others were given up against one that is not what its name says
         found = [t for t in found if t.key not in odd]
     if odd:
         chosen, noise = ranked(now.base, [t for t in chosen if t.key not in odd])
@@ -77,19 +77,19 @@ def confirmed(
 
 
 def _confirmed(
-    at: Reference, found: Sequence[CandidateFit], staged: Callable, told: Callable, stage: Callable
+    at: Reference, found: Sequence[CandidateFit], staged: Callable, report: Callable, stage: Callable
 ) -> tuple[Reference, list[CandidateFit]]:
-    """Do what `confirmed` does, whatever the effects have become."""
+    """Do what `confirmed` does, whether or not effects are still what their names say."""
     stage("the best refitted over segments of every length")
-    # Disturbance forces let the first look tell little.
+    # under disturbance forces screening distinguishes little
     found = _promising(found, CONFIRMED_FORCED, 0.0) if at.data.disturbed else _promising(found)
     fits, floor = staged(at, [at.base.train, *(t.train for t in found)])
-    stage("the best refitted at the full rate, and tried on what is held out")
-    data, judged = _judged(at, (at.base, *found), fits)
-    base, *others = [t for t in judged if t is not None]
-    # what contains the baseline never errs more where both are fitted as well
+    stage("the best refitted at the full rate, and validated on held-out data")
+    data, validated = _at_suitable_length(at, (at.base, *found), fits)
+    base, *others = [t for t in validated if t is not None]
+    # a model that contains the baseline never errs more, where both fits are equally good
     base = begun_as(base, min([base, *others], key=lambda t: t.size), data.fine)
-    # candidates choose what fits leave open of static levels by what is held out, and so may the baseline
+    # candidates choose static levels within what fits leave open by validation, and so may the baseline
     base = thresholds_refined(base, data.fine)
     chosen, noise = ranked(base, others)
     least = min((f for f in fits[0] if f is not None), key=lambda f: f.rmse)
@@ -98,23 +98,23 @@ def _confirmed(
         at = replace(at, farthest=_farthest(at, fits[-1]))
     if not chosen:
         return at, []
-    told(at, chosen)
-    stage("near ones begun again where the best one ended")
-    chosen, noise = ranked(base, _to_the_end(at, chosen))
+    report(at, chosen)
+    stage("near equals restarted from the best fit")
+    chosen, noise = ranked(base, _converged(at, chosen))
     return replace(at, noise=noise), chosen
 
 
 def _farthest(at: Reference, fits: Sequence[FitResult | None]) -> FitResult:
-    """Return the baseline over the longest segments, begun again as the nearest model there."""
+    """Return the baseline over the longest segments, restarted from the best model there."""
     base, *others = [CandidateFit("", f) for f in fits if f is not None]
     nearest = min([base, *others], key=lambda t: t.train.rmse)
     return begun_as(base, nearest, at.segmentations[-1]).train
 
 
-def _judged(
+def _at_suitable_length(
     at: Reference, tried: Sequence[CandidateFit], stages: Stages
 ) -> tuple[SegmentedData, list[CandidateFit | None]]:
-    """Return the data in segments of the length that suits them, and the models validated there.
+    """Return the data in segments of the most suitable length, and the models validated there.
 
     `tried`: the baseline and the candidates, best first.
     """
@@ -124,7 +124,7 @@ def _judged(
         # would pass for it.
         short = levels[0].continued
         again = side_by_side(
-            lambda f: short.moved(f) if f is not None and short.carries(f.model) else f, stages[0]
+            lambda f: short.moved(f) if f is not None and short.continues(f.model) else f, stages[0]
         )
         levels, stages = [short, *levels[1:]], [again, *stages[1:]]
         best = _longest_coherent(stages)
@@ -132,23 +132,23 @@ def _judged(
     averaged = len(tried) > 1 and rounds(tried[1]) and not at.data.disturbed
     if averaged:
         best = len(stages) - 1
-    judged = _validated(levels[best], tried, stages[best])
+    validated = _validated(levels[best], tried, stages[best])
     # Over long ones parameters fitted to small motions may err by steps in large ones.
-    while averaged and best and judged[1] is not None and misses_lines(judged[1]):
+    while averaged and best and validated[1] is not None and misses_lines(validated[1]):
         best -= 1
-        judged = _validated(levels[best], tried, stages[best])
+        validated = _validated(levels[best], tried, stages[best])
     while best and not averaged and not _shows_less(*_least(stages), best - 1, best):
-        if not _held_out_by_luck(judged, levels[best], levels[best - 1], stages[best - 1]):
+        if not _validated_by_chance(validated, levels[best], levels[best - 1], stages[best - 1]):
             break
         best -= 1
-        judged = _validated(levels[best], tried, stages[best])
-    return levels[best], judged
+        validated = _validated(levels[best], tried, stages[best])
+    return levels[best], validated
 
 
 def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
-    """Return models at the full rate, from their fits in some segments, and run on what is held out.
+    """Return models at the full rate, from their fits in some segments, and validated on held-out data.
 
-    The baseline and the best first: what errs far more than these needs no last step. None stands for those
+    The baseline and the best first: the others need no last step if they err far more. None stands for those
     that have no fit there.
     """
     fine = data.fine
@@ -173,27 +173,27 @@ def _validated(data: SegmentedData, tried, fits) -> list[CandidateFit | None]:
     return found
 
 
-def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
-    """Whether errors of the nearest models grow from shorter segments where they are held out, not fitted.
+def _validated_by_chance(validated, data: SegmentedData, shorter: SegmentedData, fits) -> bool:
+    """Whether the validation error of the best models grows with the segments, but not the error fitted.
 
-    Motion that is sensitive to where it begins is followed where start and parameters are fitted; held out
-    it is luck whether a model does, and no merit. Where one of those that fit best follows all that is held
-    out as well that is no luck.
+    Motion that is sensitive to its initial state is predicted where initial state and parameters are fitted
+    to it; on held-out data it is then a matter of chance whether a model predicts it. Where one of the best
+    fits predicts all held-out data as well, it is not.
 
-    Where it leaves a small share of the baseline's error all the same, luck decides nothing. What fits leave
-    open of static levels is chosen first: to the last sample before a break it is no luck.
+    Where that model leaves a small share of the baseline's error, chance decides nothing. Static levels are
+    chosen first, within what fits leave open.
 
-    `judged`: models in these segments, `data`, the baseline first; `shorter`, `fits`: the next shorter ones,
-    and the fits there.
+    `validated`: models in these segments, `data`, the baseline first; `shorter`, `fits`: the next shorter
+    ones, and the fits there.
     """
-    pairs = [(t, f) for t, f in zip(judged, fits, strict=True) if t is not None]
+    pairs = [(t, f) for t, f in zip(validated, fits, strict=True) if t is not None]
     least = min(t.train.rmse for t, _ in pairs)
     near = [(t, f) for t, f in pairs if t.train.rmse <= GROWTH * least]
     refined = side_by_side(lambda pair: thresholds_refined(pair[0], data.fine), near)
     nearest, fit = min(
         zip(refined, (f for _, f in near), strict=True), key=lambda pair: pair[0].validation_rmse
     )
-    if nearest.validation_rmse <= LITTLE_LUCK * judged[0].validation_rmse:
+    if nearest.validation_rmse <= LITTLE_CHANCE * validated[0].validation_rmse:
         return False
     fitted = max(nearest.train.rmse / max(fit.rmse, NOTHING), 1.0)
     return nearest.validation_rmse > GROWTH * fitted * shorter.fine.validate(nearest).validation_rmse
@@ -203,10 +203,10 @@ def _held_out_by_luck(judged, data: SegmentedData, shorter: SegmentedData, fits)
 
 
 def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
-    """Return the fits in segments of every length that may judge, and their floor.
+    """Return the fits in segments of every length that serve for validation, and their floor.
 
-    The floor is the error that a fit can come down to at best: over short segments nearly every model
-    follows. Where disturbance forces prevail the shortest segments alone may judge.
+    The floor is the least error that a fit can reach: over short segments nearly every model
+    fits. Where disturbance forces prevail only the shortest segments serve.
     """
     shortest, middle, longest = at.segmentations
     base, *others = side_by_side(shortest.moved, fits)
@@ -218,25 +218,26 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     far = over(longest, near, near, floor)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
     both = side_by_side(
-        lambda pair: _begun_again(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
+        lambda pair: _reconciled(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
     )
     return [short, [n for n, _ in both], [f for _, f in both]], floor
 
 
-def _begun_again(
+def _reconciled(
     shorter: SegmentedData,
     longer: SegmentedData,
     near: FitResult | None,
     far: FitResult | None,
     likely: float,
 ):
-    """Return the fits of a model in shorter and in longer segments, begun again where they do not agree.
+    """Return the fits of a model in shorter and longer segments, restarted from each other if they differ.
 
-    Of laws with events the cost over long segments has many minima, the right one within what shorter
-    segments leave open; if it is not there these have missed it, and the fit over long ones may be nearer.
-    Where long segments show no more error than short ones both are right, and where they show far less the
-    fit over short ones has missed what the other one found. `likely`: the error over long ones beyond which a
-    model is behind for other reasons.
+    The cost of laws with events has many minima over long segments, the right one within the uncertainty of
+    the fit over shorter ones; if it is not there that fit is in a wrong minimum, and the one over long
+    segments may be nearer. Where long segments show no more error than short ones both are right, and where
+    they show far less the fit over short ones has missed the minimum.
+    `likely`: the error over long ones beyond which a
+    model is worse for other reasons.
     """
     if near is None or far is None:
         return near, far
@@ -254,7 +255,7 @@ def _begun_again(
 
 
 def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
-    """Return the best of a fit in longer segments and of those begun at points about one in shorter ones."""
+    """Return the best of a fit in longer segments and of those started about one in shorter segments."""
     models = [near.model.with_parameters(feasible(near.model, values)) for values in points]
     begun = side_by_side(
         lambda model: longer.moved(replace(near, model=model), iterations=2, give_up=GIVE_UP * far.rmse),
@@ -269,7 +270,7 @@ def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> Fi
 
 
 def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | None]:
-    """Move the baseline and the best candidate to other segments, then those with a chance against them.
+    """Refit the baseline and the best candidate over other segments, then those not far behind.
 
     `before`: the fits in segments that these are made of: no fit over longer ones can err less than that
     over the parts of them.
@@ -291,7 +292,7 @@ def over(data: SegmentedData, fits, before, floor: float) -> list[FitResult | No
 
 
 def _longest_coherent(stages: Stages) -> int:
-    """Return the level to judge at: the longest segments over which the best model's error does not grow.
+    """Return the level to validate at: the longest segments over which the best model's error does not grow.
 
     Where the best grows with the length (motion that is sensitive to its start, force noise in a real
     machine, an effect outside the library) short segments are clearer, provided that they show what is
@@ -323,23 +324,23 @@ def _left(base, best, at) -> float:
     return math.sqrt(max(best[at] ** 2 - noise, 0.0) / there) if there > STRUCTURE_LEAST * noise else 1.0
 
 
-# --- to the end ---------------------------------------------------------------------------------------
+# --- convergence --------------------------------------------------------------------------------------
 
 
-def _to_the_end(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]:
-    """Tell near equals apart by fits that have come to an end, and in the right minimum."""
-    chosen = _again(at, chosen, chosen[:1])
+def _converged(at: Reference, chosen: list[CandidateFit]) -> list[CandidateFit]:
+    """Iterate near equals until they have converged, in the right minimum."""
+    chosen = _cross_started(at, chosen, chosen[:1])
     near = [t for t in chosen if chosen[0].evidence - t.evidence < STOPPED_EARLY]
     least = min(t.train.rmse for t in chosen)
     close = [t for t in chosen if t in near or t.evidence > 0.5 * chosen[0].evidence]
     close = [t for t in close if t.train.rmse < GIVE_UP * least]
-    ended = side_by_side(lambda t: _ended(at, t, t in near and len(near) > 1, least), close)
+    ended = side_by_side(lambda t: _in_best_minimum(at, t, t in near and len(near) > 1, least), close)
     if any(a is not b for a, b in zip(ended, close, strict=True)):
-        chosen = _again(at, [*ended, *(t for t in chosen if t not in close)], ended)
+        chosen = _cross_started(at, [*ended, *(t for t in chosen if t not in close)], ended)
     return chosen
 
 
-def _ended(at: Reference, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
+def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: float) -> CandidateFit:
     """Return a candidate in its best minimum, unless nothing better is possible.
 
     `exactly`: iterated to the end first. `least`: error of the best of all.
@@ -352,20 +353,20 @@ def _ended(at: Reference, tried: CandidateFit, exactly: bool, least: float) -> C
     return thresholds_refined(tried if fit is tried.train else fine.validate(replace(tried, train=fit)), fine)
 
 
-def _again(at: Reference, chosen, those) -> list[CandidateFit]:
-    """Begin candidates once more where each of `those` ended; keep every effect's best, best first."""
+def _cross_started(at: Reference, chosen, those) -> list[CandidateFit]:
+    """Restart candidates from the fit of each of `those`; keep the best of every effect, best first."""
     fine = at.data.fine
-    alike = alike_along(fine, at.base.block)
+    matching = matching_along(fine, at.base.block)
 
-    def begun_there(pair):
+    def started_there(pair):
         tried, best = pair
-        fit = cross_started(tried, best, fine, alike(tried, best))
+        fit = cross_started(tried, best, fine, matching(tried, best))
         return fit and thresholds_refined(fine.validate(replace(tried, train=fit)), fine)
 
     pairs = [(t, best) for best in those for t in chosen if t is not best]
-    begun = side_by_side(begun_there, pairs)
-    judged, _ = ranked(at.base, [*chosen, *(t for t in begun if t is not None)])
-    return [next(t for t in judged if t.key == key) for key in dict.fromkeys(t.key for t in judged)]
+    begun = side_by_side(started_there, pairs)
+    validated, _ = ranked(at.base, [*chosen, *(t for t in begun if t is not None)])
+    return [next(t for t in validated if t.key == key) for key in dict.fromkeys(t.key for t in validated)]
 
 
 def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:

@@ -1,7 +1,7 @@
 """Evidence of candidates over the baseline.
 
-Log likelihood ratios of whitened residuals, less a price of parameters; a sensor that rounds is judged by how
-probable the recorded values are.
+Log likelihood ratios of whitened residuals, less a penalty for parameters; for a sensor that rounds the
+probability of the recorded values.
 """
 
 from __future__ import annotations
@@ -16,28 +16,29 @@ from ..data.derivatives import step_of
 from ..data.measurement import Measurement
 from ..estimation.segmented import CandidateFit
 from ..prediction.sensed import POSITION, sensed
+from ..residuals.rounding import rounding_evidence
+from ..residuals.thresholds import COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..thresholds import NOTHING
-from .rounding import rounding_evidence
-from .thresholds import COARSE, FINE, REFUTED, SAME_STEP
+from .thresholds import FINE, REFUTED, SAME_STEP
 
 
 def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
-    """Return the trials with their evidence over the baseline, best first, and the noise that judged it.
+    """Return the trials with their evidence over the baseline, best first, and the noise model.
 
-    What held-out data speak against comes after all that they do not. The noise model is of the residuals of
+    Candidates that held-out data speak against come last. The noise model is of the residuals of
     the best one, a sensor that rounds left aside.
     """
     best = min([base, *(t for t in trials if not rounds(t))], key=lambda t: t.size)
     noise = prediction_error_filter(best.residuals, base.train.error_filter, base.train.outputs)
     before = _powers(base, noise)
-    judged = []
+    found = []
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
-        # hardly more than starts was fitted to the segments to validate on: their gain also stands alone
+        # hardly more than initial states is fitted to validation segments: their gain also counts by itself
         price = 0.5 * t.extra * math.log(before.fitted[1] + before.held[1])
-        judged.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
-    return sorted(judged, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
+        found.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
+    return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
 
 def rounds(tried: CandidateFit) -> bool:
@@ -48,9 +49,9 @@ def rounds(tried: CandidateFit) -> bool:
 def step_as_recorded(tried: CandidateFit, records: Sequence[Measurement]) -> float:
     """Return the resolution of the records where it is what a candidate adds, and fine; else 0.
 
-    All values lie on the grid, so that records say so themselves, without a model: rounding is their noise,
-    and no model lacks it. Values that crowd about the lines of a grid have a noise of their own; a coarse
-    grid changes what the sensor tells.
+    All values lie on the grid, which shows without a model: rounding is then noise, and nothing is missing.
+    Values that only cluster about the lines of a grid have a noise of their own; a coarse grid changes the
+    measurement itself.
     """
     step = _step(tried) if rounds(tried) else 0.0
     for known in map(sensed, records):
@@ -145,7 +146,7 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
         kept = [segment != out for segment in fit.segment_of]
         simulated = [y[k] for y, k in zip(fit.simulated_pieces, kept, strict=True)]
         measured = [y + e[k] for y, e, k in zip(simulated, fit.residual_pieces, kept, strict=True)]
-        # for as many samples as the rounding is judged by: a density has a unit, a ratio of two has none
+        # over the samples of the rounding's likelihood: a density has a unit, a ratio of two has none
         samples = sum(map(len, measured))
         likelihood = -0.5 * samples * math.log(2 * math.pi * math.e * max(plain[0], NOTHING) / plain[1])
         gains.append(rounding_evidence(measured, simulated, step) - likelihood)

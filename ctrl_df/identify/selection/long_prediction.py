@@ -1,8 +1,8 @@
 """Whether the best candidate is ahead of all others however far ahead it has to predict.
 
-Evidence is of segments that begin anew, some motions long. A model of other physics may follow those, from
-states that are fitted in each; over longer stretches, hidden states going on, it falls behind one that is
-right, or behind the model without it.
+Evidence is of segments that begin anew, some motions long. A model of other physics may fit those, from
+states that are estimated in each; over longer horizons, with hidden states continued, it falls behind one
+that is right, or behind the model without it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .thresholds import LEFT, LONG_RIVALS
 
 @dataclass(frozen=True)
 class LongPrediction:
-    """How the first of some models does over long stretches.
+    """How the first of some models predicts over long horizons.
 
     Attributes
     ----------
@@ -59,10 +59,10 @@ def compared(ranking: Sequence[CandidateEffect], significant: float) -> list[Can
 def long_prediction(
     ranking: Sequence[CandidateEffect], base: Baseline, significant: float
 ) -> LongPrediction | None:
-    """Compare the first of a ranking with its rivals over all stretches up to the longest that one predicts.
+    """Compare the first of a ranking with its rivals over all horizons up to the longest that one predicts.
 
     Errors count by their geometric mean over these lengths, each as much as any other: what follows long ones
-    by chance fails over others, and one tooth of a ripple too far, at the end of a stretch, is one length's.
+    by chance fails over others, and one tooth of a ripple too far, at the end of a segment, is one length's.
     Where nothing pulls a model back, small errors of parameters drift apart in time: beyond some length no
     model predicts anything, and there nothing is compared.
 
@@ -89,10 +89,10 @@ def long_prediction(
     noise = math.sqrt(sum(f.noise**2 for f in facts_of) / sum(f.spread**2 for f in facts_of))
     names = ["", *(c.id for c in models)]
     table = np.maximum([c.nrmse for c in curves], noise)  # errors below tell nothing
-    told = np.flatnonzero(np.min(table, axis=0) < UNMOVED)
-    if not told.size:
+    predicted = np.flatnonzero(np.min(table, axis=0) < UNMOVED)
+    if not predicted.size:
         return LongPrediction(0.0, dict(zip(names, table[:, 0].tolist(), strict=True)), ())
-    table = table[:, : told[-1] + 1]
+    table = table[:, : predicted[-1] + 1]
     usual = dict(zip(names, np.exp(np.mean(np.log(table), axis=1)).tolist(), strict=True))
     better = sorted((n for n in names if GROWTH * usual[n] < usual[first.id]), key=usual.__getitem__)
     others = np.array([n != first.id for n in names])

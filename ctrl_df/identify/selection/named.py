@@ -18,11 +18,11 @@ from .thresholds import ON_LIMIT, REFIT_MOST
 def refitted(
     at: Reference, chosen: Sequence[CandidateFit], significant: float, refit: Callable
 ) -> tuple[Reference, list[CandidateFit]]:
-    """Refit the first of confirmed candidates and those that the data hardly tell from it.
+    """Refit the first of confirmed candidates and those that the data hardly distinguish from it.
 
-    Candidates are told apart in segments that show what is missing, at an effort that they all can have.
-    Parameters are told best over stretches as long as a model can be followed: those of the ones that may be
-    named are fitted there, to the end, and evidence is that of these fits.
+    Candidates are compared over segments that show what is missing, with the same effort for all. Parameters
+    are estimated best over segments as long as the model can predict: those of candidates that may be named
+    are fitted over these until they converge, and the evidence is that of these fits.
 
     Parameters
     ----------
@@ -47,17 +47,17 @@ def refitted(
 def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> CandidateFit:
     """Return a candidate with the values that `refit` finds from its own.
 
-    It stays as it is where the segments that judge speak against these, or tell parameters that the refit
-    leaves open; and where disturbance forces outweigh the noise: then accelerations judge, the refit goes by
-    outputs, and what is best by these may be far from the best by those.
+    It stays as it is where the validation segments speak against these values, or determine parameters that
+    the refit does not; and where disturbance forces outweigh the noise: then candidates are compared by
+    accelerations, the refit is of outputs, and the best values of one may be far from those of the other.
 
     Parameters
     ----------
     prior : mapping or None
         Value and standard deviation of parameters known beforehand, by name.
     seen : bool
-        Whether what is held out may be judged by this fit: it has seen all of the records fitted. Of parts
-        of them that are held out, what is told else is of the last fit that has not.
+        Whether the held-out error may be that of this fit, which has seen the whole records. Where parts of
+        them are held out it is that of the last fit that has not seen these.
     """
     data, names = at.data.fine, tried.train.names
     if data.disturbed:
@@ -71,9 +71,9 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
 
     found = found_from(tried.block, {})
     if found.rmse > FLOOR * at.floor:
-        # a minimum beside the right one: short segments lead out of it
+        # a wrong minimum near the right one: short segments lead out of it
         found = min(found, found_from(found.model, None), key=lambda f: f.rmse)
-    # a static level is found by trying, as single samples pass it: slopes know nothing of it
+    # a static level is found by trying, as single samples pass it: it has no sensitivity
     levels = {k for k in names if tried.block.parameters[k].threshold}
     if undetermined(found) - undetermined(tried.train) - levels:
         return tried
@@ -88,9 +88,9 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
 def beyond_range(at: Reference, best: CandidateFit, significant: float, refit: Callable):
     """Return the model without an effect, refitted without limits, where that explains more than the best.
 
-    Fits keep the model's own parameters within a range of what they were stated to be. Where one ends there,
-    a record or a model in other units than it says is as likely as a missing effect. Where the best errs by
-    noise alone nothing is left to explain.
+    Fits keep the model's own parameters within a range of what they were stated to be. Where one ends at a
+    limit, wrong units of record or model are as likely as a missing effect. Where the error of the best is
+    noise nothing is left to explain.
 
     Returns
     -------
@@ -109,5 +109,5 @@ def beyond_range(at: Reference, best: CandidateFit, significant: float, refit: C
     other = min((refit(free, begin, seen=True) for begin in begins), key=lambda f: f.train.rmse)
     values = {k: p.value for k, p in other.block.parameters.items()}
     left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)
-    (judged,), _ = ranked(at.base, [other])
-    return (other, left) if left and judged.evidence > best.evidence + significant else None
+    (again,), _ = ranked(at.base, [other])
+    return (other, left) if left and again.evidence > best.evidence + significant else None

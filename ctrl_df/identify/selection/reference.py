@@ -1,4 +1,4 @@
-"""What a search over records stands on: the data that judge, the model refitted there, the noise."""
+"""What candidates of a search over records are compared with: the data, the refitted model, the noise."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ from .thresholds import BASE_LONGER_STEPS, BASE_STEPS, GROWN, by_chance
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What models are judged by at one time of a search.
+    """What models are compared with at one stage of a search.
 
     Attributes
     ----------
     segmentations : sequence of SegmentedData
         The data in segments of three lengths, the shortest first.
     data : SegmentedData
-        Those that judge.
+        The segmentation that candidates are compared over.
     base : CandidateFit
         The model refitted.
     nearest : FitResult
-        The model over the shortest segments, which nearly every model follows, unless forces disturb it.
+        The model over the shortest segments, over which nearly every model fits, unless disturbance forces
+        act.
     noise : NoiseModel
         Of the best model's residual.
     floor : float
-        Error that a fit can come down to at best; 0 where it is not known yet.
+        Least error that a fit can reach; 0 where it is not known yet.
     least : FitResult or None
         The fit over the shortest segments that errs least; None where it is not known yet.
     farthest : FitResult or None
-        The model refitted over the longest segments that may judge; None: not known yet.
+        The model refitted over the longest segments for validation; None: not known yet.
     regressed : mapping of str to float
-        Its free parameters as a regression of the force tells them.
+        Its free parameters from a regression of the force.
     """
 
     segmentations: Sequence[SegmentedData]
@@ -66,10 +67,10 @@ class Reference:
     def unmoved(self, significant: float) -> bool:
         """Whether disturbance forces prevail and the model explains no motion.
 
-        Then its accelerations say no more of those recorded than none at all would, or it does not follow
-        the shortest segments: accelerations that are mostly noise do not speak for such a model.
+        Then its accelerations explain those recorded no better than zero would, or it does not follow the
+        shortest segments: accelerations that are mostly noise are no evidence for such a model.
 
-        `significant`: evidence that tells something from nothing [nats].
+        `significant`: evidence that is significant [nats].
         """
         if not self.data.disturbed:
             return False
@@ -77,13 +78,12 @@ class Reference:
         return self.nearest.nrmse > UNMOVED or -base.count * math.log(base.nrmse) < significant
 
     def coloured(self, noise: NoiseModel) -> NoiseModel:
-        """Return the noise if it forgets within the shortest segments, else white noise.
+        """Return the noise model if its memory is within the shortest segments, else white noise.
 
-        What lasts longer is not told from something that is missing: nothing is conceded to it.
+        Slower noise cannot be distinguished from something that is missing, and is not assumed.
         """
         shortest = min(int(np.min(w.ends - w.begins)) for w in self.nearest.segments)
-        told = noise.memory <= shortest
-        return noise if told else NoiseModel(np.zeros(0), noise.sigma)
+        return noise if noise.memory <= shortest else NoiseModel(np.zeros(0), noise.sigma)
 
     def by_noise(self, fit: FitResult, noise: NoiseModel) -> float:
         """Return the error over the segments of a fit that noise alone may make, slow noise too."""
@@ -92,8 +92,8 @@ class Reference:
     def grown(self, near: FitResult, far: FitResult, noise: NoiseModel | None = None) -> float:
         """Return how many times larger noise alone may be over longer segments, by its memory and by chance.
 
-        Of slow noise the initial states of short ones take a part, the more of them the more. `noise`: None:
-        that which judges.
+        Initial states absorb a part of slow noise, the more of it the more segments there are. `noise`: None:
+        that of the reference.
         """
         if near.sensitivity is None or far.sensitivity is None:
             return GROWN
@@ -102,7 +102,7 @@ class Reference:
         return max(GROWN, math.sqrt(left) * by_chance(far.spanned / coloured.memory))
 
     def by_accelerations(self, free: tuple[str, ...]) -> Reference:
-        """Return the same where disturbance forces drown all else over longer segments.
+        """Return the same where disturbance forces dominate the error over longer segments.
 
         `free`: parameters of the model that are refitted.
         """
@@ -112,7 +112,7 @@ class Reference:
         return replace(self, segmentations=segmentations, data=data, base=base, noise=ranked(base, ())[1])
 
     def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Reference:
-        """Refit the model from what the best candidates say of its parameters: it may have been stuck."""
+        """Refit the model from its parameters in the best candidates: it may be in a wrong minimum."""
         base = self.base
         for best in found[:2]:
             values = {k: best.block.parameters[k].value for k in free}
@@ -124,12 +124,12 @@ class Reference:
         return replace(self, base=base)
 
 
-def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Reference:
-    """Fit a model from its own values and from a regression of the force; return what the better comes to."""
+def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Reference:
+    """Fit a model from its own values and from a regression of the force; return the better one."""
     shortest, data = segmentations[:2]
     begins = [block]
     names = (inertia(block), dry_level(block), viscous_slope(block))
-    plain, own, *_ = force_regression(motion_of(data.train, data.thin, block), data.scales, block)
+    plain, own, *_ = force_regression(motion_of(data.train, data.decimation, block), data.scales, block)
     guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:
@@ -137,7 +137,7 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
     short = [shortest.fit(begin, free, iterations=BASE_STEPS) for begin in begins]
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.nonsmooth and free:
-        # from its own values without a turn by short segments, too: what was fitted before stays there
+        # from its own values directly, too: a model that was fitted before stays in its minimum
         fits.append(data.fit(block, free, iterations=BASE_LONGER_STEPS))
         fits += _past_events(min(short, key=lambda f: f.rmse), shortest, data)
     base = CandidateFit("", min(fits, key=lambda f: f.rmse))
@@ -148,9 +148,8 @@ def begun(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) 
 def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:
     """Return a model refitted past events; none where short segments leave noise alone.
 
-    Where impacts come and go, parameters bend to make up for segments that begin in a wrong minimum, and
-    those of the model are what every effect is tried beside: where segments begin is sought with care, here
-    once for all of them.
+    Where impacts come and go, initial states in a wrong minimum bias the parameters, and every effect is
+    compared with the model: initial states are therefore sought carefully, here once for all candidates.
     """
     if found.rmse <= FLOOR * data.noise:
         return []

@@ -16,7 +16,7 @@ from ..smoothing.missing_force import missing_force
 from ..thresholds import BY_CHANCE, NOTHING
 from .evidence import rounding_error, rounds
 from .search import Located, Remainder
-from .thresholds import CURVE_TOLD, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
+from .thresholds import CURVE_SHARE, FOLLOWED, FORCE_ALIKE, INDEPENDENT_MOST, LEFT, by_chance
 
 CURVES = {
     "time": "time", "position": "position", "velocity": "low_speed", "load": "load",
@@ -150,13 +150,15 @@ def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
     if not force.significant:
         return []
     name, share = next(iter(force.shares.items()))
-    return [CURVES[name]] if share > CURVE_TOLD else []
+    return [CURVES[name]] if share > CURVE_SHARE else []
 
 
 def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:
-    acts = f"It acts like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
+    acts = f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
-        f"Of structure {left.structure:.2g} remains beside {left.noise:.2g} of noise (rms of the {measure}). "
+        f"The residual contains structure of {left.structure:.2g} beside noise of {left.noise:.2g} (rms of "
+        "the "
+        f"{measure}). "
         f"{acts}{places(where)}".rstrip()
     )
 

@@ -1,4 +1,4 @@
-"""What the search for a missing effect asks of data, whatever they are."""
+"""The interface between the search for a missing effect and data of any kind."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..course import Course
 from ..results.diagnosis import Diagnosis
 
 
-class Judged(Protocol):
-    """A model fitted to data, and what they say for its newest effect over the baseline."""
+class Candidate(Protocol):
+    """A model fitted to data, with the evidence for its newest effect over the baseline."""
 
     key: str
     extra: int
@@ -40,7 +40,7 @@ class Remainder:
     about : object
         What the data know besides, for `Search.located`.
     doubt : str
-        Where it shows, in a sentence, if not in these numbers.
+        What else speaks against the verdict, in a sentence.
     more : bool
         Whether more is missing beside the best candidate: what it leaves is too much for noise.
     """
@@ -65,7 +65,7 @@ class Located:
 
 @dataclass(frozen=True)
 class Words:
-    """How a verdict speaks of these data."""
+    """The words of a verdict on these data."""
 
     data: str
     noise: str
@@ -75,13 +75,13 @@ class Words:
 
 
 class Search(ABC):
-    """The fits of one diagnosis, as far as they have come: a value that `candidates` and `confirm` make anew.
+    """The fits of one diagnosis so far: a value, of which `candidates` and `confirm` return the next one.
 
     Attributes
     ----------
     block : Mechanism
         The model as it stands.
-    base : Judged
+    base : Candidate
         The model refitted.
     free : tuple of str
         Parameters of the model that are refitted.
@@ -92,8 +92,8 @@ class Search(ABC):
     words : Words
     kind : type
         Class of the answer.
-    first_look : sequence of Judged
-        The candidates as they were before any was confirmed.
+    screened : sequence of Candidate
+        The candidates as screened, before any was confirmed.
     """
 
     block: Any
@@ -103,7 +103,7 @@ class Search(ABC):
     measure: str
     words: Words
     kind: type[Diagnosis] = Diagnosis
-    first_look: Sequence[Judged] = ()
+    screened: Sequence[Candidate] = ()
 
     def after(self, **found) -> Self:
         """Return the search as it stands after this was found; it itself stays what it is."""
@@ -130,13 +130,13 @@ class Search(ABC):
         classes : sequence of effect classes
         executor : concurrent.futures.Executor or None
         course : Course or None
-            Hears of the same as it stands on the way.
+            Receives the intermediate results.
         """
 
     def rivals(self, model, names, classes, executor=None) -> list[Any]:
-        """Return effects that may do what a model of one effect more does, with evidence over it, best first.
+        """Return effects that may replace the last one of a model, with evidence over it, best first.
 
-        Its values are where they begin; what comes nowhere near it need not be brought to its end.
+        They start from its values; fits that come nowhere near it need not be completed.
 
         Parameters
         ----------
@@ -152,24 +152,24 @@ class Search(ABC):
 
     @abstractmethod
     def confirm(self, found, course: Course | None = None) -> tuple[Self, list[Any]]:
-        """Refit baseline and best candidates with all care; return the search that knows them, and these.
+        """Refit baseline and best candidates carefully; return the search that knows them, and these.
 
         `found`, what is returned: candidates, best first; `course`: see `candidates`.
         """
 
     @abstractmethod
-    def errors(self, judged) -> tuple[float, float]:
+    def errors(self, candidate) -> tuple[float, float]:
         """Return the relative errors of a model on the data fitted, and on those held out."""
 
     @abstractmethod
-    def standard_errors(self, judged) -> dict[str, float]:
+    def standard_errors(self, candidate) -> dict[str, float]:
         """Return the standard errors of the parameters fitted, as far as they are known."""
 
-    def undetermined(self, judged) -> tuple[str, ...]:
+    def undetermined(self, candidate) -> tuple[str, ...]:
         """Return the parameters of the newest effect of a confirmed candidate that data do not determine."""
         return ()
 
-    def displaced(self, judged) -> tuple[str, ...]:
+    def displaced(self, candidate) -> tuple[str, ...]:
         """Return the model's parameters at a bound with the newest effect that are within without it."""
         return ()
 
@@ -177,17 +177,17 @@ class Search(ABC):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
         return ()
 
-    def predicted(self, judged) -> tuple[Any, tuple] | None:
+    def predicted(self, candidate) -> tuple[Any, tuple] | None:
         """Return a model and the records that it is to predict; None where there is nothing to predict."""
         return None
 
-    def so_far(self, judged) -> Remainder:
-        """Return what a model leaves, as far as that is known at a glance."""
+    def so_far(self, candidate) -> Remainder:
+        """Return what a model leaves, as far as that is known without further fits."""
         return Remainder(0.0, 0.0, False)
 
     @abstractmethod
-    def alike(self, a, b) -> bool:
-        """Whether two confirmed candidates make the same of these data, within noise."""
+    def equivalent(self, a, b) -> bool:
+        """Whether two confirmed candidates are equivalent on these data, within noise."""
 
     def in_full(self):
         """Return the model without an effect as a whole refit has it; None: no better than it is."""
@@ -201,8 +201,8 @@ class Search(ABC):
     def located(self, best, remainder: Remainder, unknown: bool) -> Located:
         """Return where the error is: of the model, or (`unknown`) of what is left."""
 
-    def as_recorded(self, judged) -> str:
-        """Return what a candidate adds, where that is noise that the records tell of without a model."""
+    def as_recorded(self, candidate) -> str:
+        """Return what a candidate adds, where the records show it as noise without any model."""
         return ""
 
     def exact(self) -> bool:
@@ -218,12 +218,12 @@ class Search(ABC):
         """Return a block with these parameters fitted, and validated on the data held out."""
 
     @abstractmethod
-    def ranked(self, base, judged: Sequence) -> list[Any]:
+    def ranked(self, base, candidates: Sequence) -> list[Any]:
         """Return models with their evidence over `base`, best first."""
 
-    def ranked_over(self, base, judged: Sequence) -> list[Any]:
+    def ranked_over(self, base, candidates: Sequence) -> list[Any]:
         """Return models with their evidence over one that was fitted as they were, best first."""
-        return self.ranked(base, [replace(t, extra=t.extra - base.extra) for t in judged])
+        return self.ranked(base, [replace(t, extra=t.extra - base.extra) for t in candidates])
 
     def final(self, models: Sequence, free) -> list[tuple[Any, float, float]] | None:
         """Return the models of a ladder with their two errors, all over the same data; None: as they are.

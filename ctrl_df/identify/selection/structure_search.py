@@ -10,21 +10,21 @@ import numpy as np
 
 from ..course import Course
 from ..estimation.fit import in_null_directions
-from ..estimation.refit_records import cannot_be_told_apart, undetermined
+from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
-from .alike import breaks_away_only, indistinguishable
 from .attempts import own_names
 from .confirmation import confirmed, stages
+from .equivalence import breaks_away_only, indistinguishable
 from .evidence import ranked, step_as_recorded
-from .first_look import FirstLook
 from .named import beyond_range, refitted, whole_refit
-from .reference import Reference, begun
+from .reference import Reference, reference_of
 from .remaining import located, remainder
+from .screening import Screening
 from .search import Remainder, Search, Words
 from .thresholds import EXACT, SIGNIFICANT_HELD, SIZE_KNOWN
 
@@ -46,7 +46,7 @@ class StructureSearch(Search):
     Attributes
     ----------
     at : Reference
-        What models are judged by.
+        What models are compared with.
     """
 
     significant = SIGNIFICANT
@@ -57,7 +57,7 @@ class StructureSearch(Search):
     def __init__(self, block, records, validation, free, prior=None):
         self.block, self.free, self.prior = block, tuple(free), prior
         data = prepare(block, records, validation, prior)
-        self.at = begun(block, self.segmentations(data), self.free)
+        self.at = reference_of(block, self.segmentations(data), self.free)
 
     @property
     def base(self):
@@ -73,7 +73,7 @@ class StructureSearch(Search):
         return error > PROCESS_NOISE * data.noise and not data.noise_free
 
     def stages(self, at: Reference, fits):
-        """Return fits in segments of every length that may judge, and the error they can come down to."""
+        """Return fits in segments of every length for validation, and the least error that they can reach."""
         return stages(at, fits)
 
     @property
@@ -85,11 +85,11 @@ class StructureSearch(Search):
 
     @property
     def placed(self) -> bool:
-        """Whether a sensor told the place."""
+        """Whether a sensor measures the position."""
         return all(POSITION in sensed(r).columns for r in self.at.data.train.records)
 
     def applies(self, effect) -> bool:
-        """Whether an effect (a class) can show in these records: those of sensors are of the place."""
+        """Whether an effect (a class) can show in these records: those of sensors act on the position."""
         return self.placed or effect.role != "output"
 
     @property
@@ -97,112 +97,117 @@ class StructureSearch(Search):
         """What errors are of: the output, or its acceleration where disturbance forces outweigh the noise."""
         return "acceleration" if self.at.data.disturbed else "output"
 
-    # --- the course -----------------------------------------------------------------------------------
+    # --- the steps ------------------------------------------------------------------------------------
 
     def candidates(self, classes, executor=None, course=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
         course = course or Course()
-        at, found = self._look(classes, executor).of(self.at, partial(self._told, course), course.stage)
-        return self.after(at=at, first_look=found), found
+        at, found = self._screening(classes, executor).run(
+            self.at, partial(self._report, course), course.stage
+        )
+        return self.after(at=at, screened=found), found
 
     def rivals(self, model, names, classes, executor=None):
-        """Return effects that may do what the model of one effect more does, with evidence over it."""
-        return self._look(classes, executor).rivals(self.at, model, names)
+        """Return effects that may replace the last one of a model, with evidence over it."""
+        return self._screening(classes, executor).rivals(self.at, model, names)
 
     def confirm(self, found, course=None):
         """Refit baseline and best candidates at the full rate."""
         course = course or Course()
-        at, chosen = confirmed(self.at, found, self.stages, partial(self._told, course), course.stage)
-        course.stage("the parameters of those that may be named")
+        at, chosen = confirmed(self.at, found, self.stages, partial(self._report, course), course.stage)
+        course.stage("refit of the candidates that may be named")
         at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen
 
     def in_full(self):
-        """Return the model refitted over stretches as long as it can be followed."""
+        """Return the model refitted over segments as long as it can predict."""
         found = self._whole_refit(self.at, self.base)
         return None if found is self.base else found.block
 
     def _whole_refit(self, at: Reference, tried: CandidateFit, seen: bool = False) -> CandidateFit:
         return whole_refit(at, tried, self.prior, seen or bool(self.records[1]))
 
-    def _look(self, classes, executor) -> FirstLook:
+    def _screening(self, classes, executor) -> Screening:
         nominal = {k: p.value for k, p in self.block.parameters.items()}
         classes = [c for c in classes if self.applies(c)]
-        return FirstLook(classes, self.free, nominal, self.disturbs, executor)
+        return Screening(classes, self.free, nominal, self.disturbs, executor)
 
-    def _told(self, course: Course, at: Reference, found) -> None:
+    def _report(self, course: Course, at: Reference, found) -> None:
         course.known((self.after(at=at), found))
 
-    def alike(self, a: CandidateFit, b: CandidateFit) -> bool:
-        """Whether two candidates make the same of these data, within noise or as the limit of each other."""
+    def equivalent(self, a: CandidateFit, b: CandidateFit) -> bool:
+        """Whether two candidates are equivalent on these data, within noise or as a limit of each other."""
         if all(breaks_away_only(t, self.at.data.scales.speed) for t in (a, b)):
             return True
         return indistinguishable(a.outputs, b.outputs, self.at.noise)
 
-    # --- what it comes to -----------------------------------------------------------------------------
+    # --- results --------------------------------------------------------------------------------------
 
-    def errors(self, judged):
+    def errors(self, candidate):
         """Return nrmse over the segments fitted, and over those held out."""
-        return judged.train.nrmse, judged.validation.nrmse if judged.validation is not None else math.nan
+        return (
+            candidate.train.nrmse,
+            candidate.validation.nrmse if candidate.validation is not None else math.nan,
+        )
 
-    def standard_errors(self, judged):
+    def standard_errors(self, candidate):
         """Return the standard errors of a fit that came to its end."""
-        return judged.train.standard_errors if len(judged.train.covariance) else {}
+        return candidate.train.standard_errors if len(candidate.train.covariance) else {}
 
-    def undetermined(self, judged):
+    def undetermined(self, candidate):
         """Return the parameters of the newest effect at a bound, or known to worse than their size."""
-        fit = judged.train
-        if not judged.confirmed or not len(fit.covariance):
+        fit = candidate.train
+        if not candidate.confirmed or not len(fit.covariance):
             return ()
-        # a bound that the records prove, where a body has been, is what they tell of the parameter
+        # a bound that the records prove, where a body has been, determines the parameter
         proved = {
-            f"{judged.block.newest}.{k}" for k in judged.block.effects[-1].bounds(self.at.data.filtered)
+            f"{candidate.block.newest}.{k}" for k in candidate.block.effects[-1].bounds(self.at.data.filtered)
         }
         doubtful = (fit.names_at_bound - proved) | undetermined(fit)
-        # a static level is found by trying, as single samples pass it: slopes know nothing of it
-        table, errors, values = judged.block.parameters, fit.standard_errors, fit.parameters
-        own = [k for k in own_names(judged.block) if not table[k].threshold]
+        # a static level is found by trying, as single samples pass it: it has no sensitivity
+        table, errors, values = candidate.block.parameters, fit.standard_errors, fit.parameters
+        own = [k for k in own_names(candidate.block) if not table[k].threshold]
         # the size of an effect, its first parameter, is measured by itself
-        size = set(own_names(judged.block)[:1]).intersection(own)
+        size = set(own_names(candidate.block)[:1]).intersection(own)
         doubtful |= {k for k in size if k in values and errors[k] > SIZE_KNOWN * abs(values[k])}
         if len(fit.null) <= len(self.at.base.train.null):
-            # the model has these without the effect, too: sizes are told but for its scale
+            # the model has these directions without the effect, too: sizes are known but for its scale
             doubtful -= in_null_directions(fit)
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
-    def displaced(self, judged):
+    def displaced(self, candidate):
         """Return the model's parameters at a bound with the newest effect that are within without it.
 
-        Those that the data leave free to be what the model states are not meant: two standard errors.
+        Parameters within two standard errors of what the model states are left out.
         """
-        stated, errors = self.block.parameters, self.standard_errors(judged)
-        fit, values = judged.train, judged.train.parameters
-        moved = fit.names_at_bound - self.at.base.train.names_at_bound - set(own_names(judged.block))
+        stated, errors = self.block.parameters, self.standard_errors(candidate)
+        fit, values = candidate.train, candidate.train.parameters
+        moved = fit.names_at_bound - self.at.base.train.names_at_bound - set(own_names(candidate.block))
         far = (k for k in moved if SIZE_KNOWN * abs(values[k] - stated[k].value) > errors.get(k, math.inf))
         return tuple(sorted(far))
 
     def open_directions(self):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
-        return cannot_be_told_apart(self.at.base.train)
+        return indistinguishable_parameters(self.at.base.train)
 
-    def predicted(self, judged):
+    def predicted(self, candidate):
         """Return the model and the records held out (angles as these have them), or those fitted."""
         fitted, held = self.records
-        if held and judged.validation is not None:
-            return judged.validation.model, held
-        return judged.block, held or fitted
+        if held and candidate.validation is not None:
+            return candidate.validation.model, held
+        return candidate.block, held or fitted
 
-    def so_far(self, judged):
+    def so_far(self, candidate):
         """Return the noise of the sensor, and what a model errs by beyond it."""
-        noise, error = self.at.data.noise, judged.train.rmse
+        noise, error = self.at.data.noise, candidate.train.rmse
         if self.at.data.disturbed:
             return Remainder(0.0, error, False)
         return Remainder(min(noise, error), math.sqrt(max(error**2 - noise**2, 0.0)), False)
 
-    def as_recorded(self, judged):
+    def as_recorded(self, candidate):
         """Return the resolution of the records, where a candidate adds just that; else nothing."""
         fitted, held = self.records
-        step = step_as_recorded(judged, (*fitted, *held))
+        step = step_as_recorded(candidate, (*fitted, *held))
         return f", whose values are rounded to {step:.3g} {place_unit(fitted[0])}" if step else ""
 
     def exact(self):
@@ -227,9 +232,9 @@ class StructureSearch(Search):
             return replace(left, noise=self.at.base.train.rmse, structure=0.0)
         return left
 
-    def _noise(self, judged):
+    def _noise(self, candidate):
         """Return the noise of the residual of the best candidate, or of the model without it."""
-        return ranked(judged, ())[1] if judged is self.at.base else self.at.noise
+        return ranked(candidate, ())[1] if candidate is self.at.base else self.at.noise
 
     def _growing(self, left: Remainder, best: CandidateFit | None = None) -> Remainder:
         """Return what is left by a model whose error grows with the length of segments.
@@ -268,23 +273,23 @@ class StructureSearch(Search):
             CandidateFit(block.newest if block.effects else "", found, extra=self.at.data.count(block, names))
         )
 
-    def ranked(self, base, judged):
+    def ranked(self, base, candidates):
         """Return models with their evidence over `base`, best first."""
-        return ranked(base, judged)[0]
+        return ranked(base, candidates)[0]
 
     def final(self, models, free):
-        """Return the models with their errors at the full rate, over the segments that the last one bears.
+        """Return the models with their errors at the full rate, over the segments that suit the last one.
 
         Where disturbance forces blur parameters they are fitted over shorter segments first.
         """
         common = self.at.data.fine
         if common.disturbed:
             models = [self._sharpened(m, common, free) for m in models]
-        return [common.judged(m) for m in models]
+        return [common.evaluated(m) for m in models]
 
     @staticmethod
     def _sharpened(model, data: SegmentedData, free):
-        if data.carries(model):
+        if data.continues(model):
             return model
         return data.short_segments.fit(model, free(model)).model
 

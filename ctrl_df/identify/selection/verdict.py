@@ -1,4 +1,4 @@
-"""The course of a diagnosis over any data: the best confirmed, what they amount to, where the error is."""
+"""The steps of a diagnosis over any data: candidates confirmed, the verdict, where the error is."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from .thresholds import REFUTED_MOST
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """What a search came to, and the search as it then stands."""
+    """The diagnosis of a search, and the search after it."""
 
     diagnosis: Diagnosis
     search: Search
@@ -52,33 +52,33 @@ def diagnosed(
     executor=None,
     course: Course | None = None,
     limits=None,
-    beside: Callable[[Any], Search] | None = None,
+    search_with: Callable[[Any], Search] | None = None,
 ) -> Diagnosed:
-    """Try effects, confirm the best candidates, and say what they amount to.
+    """Screen effects, confirm the best candidates, and return the verdict.
 
     Parameters
     ----------
     search : Search
     classes : sequence of effect classes
-        To try; with none the model is judged as it is.
+        Candidates; with none the model alone is diagnosed.
     executor : concurrent.futures.Executor or None
-        Runs candidates side by side; None: threads of this process do.
+        Runs fits in parallel; None: threads of this process do.
     course : Course or None
-        Hears of the same as it stands.
+        Receives the diagnosis as it stands.
     limits : mapping or None
         What the next experiment may do to the machine.
-    beside : callable or None
-        ``beside(block)``: the search for what the model with the best candidate misses, where that leaves
-        more than noise; None: that is asked elsewhere.
+    search_with : callable or None
+        ``search_with(block)``: the search for what the model with the best candidate still misses, where its
+        residual is more than noise; None: that is not examined here.
     """
     began, limits = time.perf_counter(), dict(limits or {})
 
     def so_far(known) -> Diagnosed:
-        return _Asked(known[0], began, limits).so_far(known[1])
+        return _Question(known[0], began, limits).so_far(known[1])
 
-    def rest(block, part: Course) -> Diagnosis:
-        assert beside is not None
-        return diagnosed(beside(block), classes, executor, part).diagnosis
+    def diagnose_rest(block, part: Course) -> Diagnosis:
+        assert search_with is not None
+        return diagnosed(search_with(block), classes, executor, part).diagnosis
 
     course = (course or Course()).within(so_far)
     first: Diagnosed | None = None
@@ -88,22 +88,24 @@ def diagnosed(
         after, found = search.candidates(left, executor, course)
         after, chosen = after.confirm(found, course)
         course.stage("verdict")
-        known, fallen = _Asked(after, began, limits, refuted).answer(
-            chosen, found, course, rest if beside else None
+        known, refutation = _Question(after, began, limits, refuted).answer(
+            chosen, found, course, diagnose_rest if search_with else None
         )
         ranking = known.diagnosis.ranking
-        if first is not None and not (ranking and worth(ranking[0], after)):
+        if first is not None and not (ranking and is_significant(ranking[0], after)):
             return first  # without what was refuted nothing is explained
-        if fallen is None or len(refuted) == REFUTED_MOST:
+        if refutation is None or len(refuted) == REFUTED_MOST:
             return known
         first = first or known
         course.known((after, found))
-        course.stage(f"the same without {fallen[0].replace('_', ' ')}, which long stretches refute")
-        refuted = (*refuted, fallen)
+        course.stage(
+            f"the search repeated without {refutation[0].replace('_', ' ')}, which long horizons refute"
+        )
+        refuted = (*refuted, refutation)
 
 
-class _Asked:
-    """One question: which effect the model of a search misses."""
+class _Question:
+    """Which effect the model of a search misses."""
 
     def __init__(self, search: Search, began: float, limits, refuted: Sequence[tuple[str, str]] = ()):
         self.search, self.began, self.limits, self.refuted = search, began, limits, refuted
@@ -114,82 +116,94 @@ class _Asked:
         chosen = [t for t in found if t.confirmed]
         weights = dict(zip((t.key for t in chosen or found), _probabilities(chosen or found), strict=True))
         ranking = [_entry(t, search, weights.get(t.key, 0.0), ()) for t in found]
-        told = bool(ranking) and ranking[0].evidence > search.significant
-        verdict = NONE if search.exact() else AMBIGUOUS if told else UNKNOWN
+        significant = bool(ranking) and ranking[0].evidence > search.significant
+        verdict = NONE if search.exact() else AMBIGUOUS if significant else UNKNOWN
         best = chosen[0] if chosen else search.base
-        result, _ = self._made(verdict, ranking, search.so_far(best), best, self._base(), UNDER_WAY)
+        result, _ = self._diagnosis(verdict, ranking, search.so_far(best), best, self._base(), UNDER_WAY)
         return Diagnosed(replace(result, explanation=explain_so_far(result, search.words)), search)
 
     def answer(
-        self, chosen: Sequence, found: Sequence, course: Course, rest: Callable[..., Diagnosis] | None
+        self,
+        chosen: Sequence,
+        found: Sequence,
+        course: Course,
+        diagnose_rest: Callable[..., Diagnosis] | None,
     ) -> tuple[Diagnosed, tuple[str, str] | None]:
-        """Return what confirmed candidates amount to, `found` beside them; and the first if it is refuted.
+        """Return the diagnosis, and the refutation of the first candidate (id, reason) if there is one.
 
-        That is its id, and why in a sentence. What follows short segments by its hidden states alone, begun
-        anew in each, has set the pace at which others were given up: they are worth a look without it.
+        `found`: all candidates. One that fits short segments only by its hidden states, estimated anew in
+        each, set the error above which fits of others were given up: the search is then repeated without it.
 
-        Where the first leaves more than noise a second effect is missing beside it, or it stands in for one
-        outside the library. `rest(block, course)` tells: the diagnosis of the model with the first;
-        None: that is asked elsewhere.
+        Where the residual with the first is more than noise, a second effect is missing or it stands in for
+        one outside the library: `diagnose_rest(block, course)` is the diagnosis of the model with the first;
+        None: that is not examined here.
         """
         search = self.search
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
         ranking = []
-        for judged, weight in zip(chosen, _probabilities(chosen), strict=True):
-            same = tuple(o.key for o in chosen if o is not judged and search.alike(judged, o))
-            ranking.append(_entry(judged, search, weight, same))
+        for candidate, weight in zip(chosen, _probabilities(chosen), strict=True):
+            same = tuple(o.key for o in chosen if o is not candidate and search.equivalent(candidate, o))
+            ranking.append(_entry(candidate, search, weight, same))
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
         recorded = search.as_recorded(chosen[0]) if chosen else ""
-        asked = bool(ranking) and not recorded and not search.exact()
-        silent = asked and unheld(ranking[0], search)
+        examined = bool(ranking) and not recorded and not search.exact()
+        inconclusive = examined and inconclusive_on_holdout(ranking[0], search)
         base = self._base()
-        if silent:
+        if inconclusive:
             verdict = AMBIGUOUS
-        elif not asked or not worth(ranking[0], search):
+        elif not examined or not is_significant(ranking[0], search):
             verdict = NONE
         elif all(c.id in ranking[0].equivalents for c in rivals(ranking)):
             verdict = EFFECT
         else:
             verdict = AMBIGUOUS
-        far: list = []
-        if verdict == EFFECT or (verdict == AMBIGUOUS and not silent):
-            course.stage("free prediction over long stretches")
-            far = [base, *compared(ranking, search.significant)]
-        # neither needs the other's answer; what takes longest first
-        told = verdict != NONE
-        jobs = [lambda: search.remainder(best, told), *(lambda m=m: m.error_by_horizon for m in far)]
+        long_run: list = []
+        if verdict == EFFECT or (verdict == AMBIGUOUS and not inconclusive):
+            course.stage("free prediction over long horizons")
+            long_run = [base, *compared(ranking, search.significant)]
+        # independent of each other; the longest first
+        significant = verdict != NONE
+        jobs = [
+            lambda: search.remainder(best, significant),
+            *(lambda m=m: m.error_by_horizon for m in long_run),
+        ]
         remainder, *_ = side_by_side(lambda job: job(), jobs)
-        long = long_prediction(ranking, base, search.significant) if far else None
+        long = long_prediction(ranking, base, search.significant) if long_run else None
         refuted = long is not None and long.refuted
-        fallen = (ranking[0].id, left_out(ranking[0], long)) if refuted else None
+        refutation = (ranking[0].id, left_out(ranking[0], long)) if refuted else None
         if remainder.unexplained and not search.exact():
             verdict = UNKNOWN
         doubts = (remainder.doubt,) if verdict != NONE and remainder.doubt else ()
-        doubts = (unconfirmed(ranking[0]), *doubts) if silent else doubts
-        if far and verdict != AMBIGUOUS:
-            lasts, ranking, further = doubted(ranking, long, search.significant_validation)
-            doubts = further if lasts == UNKNOWN else (*further, *doubts)
-            if lasts == UNKNOWN:
-                # refuted: what is missing is what the model leaves without it
+        doubts = (unconfirmed(ranking[0]), *doubts) if inconclusive else doubts
+        if long_run and verdict != AMBIGUOUS:
+            outcome, ranking, further = after_long_prediction(ranking, long, search.significant_validation)
+            doubts = further if outcome == UNKNOWN else (*further, *doubts)
+            if outcome == UNKNOWN:
+                # refuted: what is missing is what the model without it leaves
                 best, remainder = search.base, search.remainder(search.base, False)
-            verdict = lasts if verdict == EFFECT else verdict
-        if rest is not None and verdict in (EFFECT, AMBIGUOUS) and remainder.more and not silent:
-            course.stage(f"what {ranking[0].id.replace('_', ' ')} leaves")
-            second = rest(best.block, course.within(lambda _: (search, chosen)))
+            verdict = outcome if verdict == EFFECT else verdict
+        if (
+            diagnose_rest is not None
+            and verdict in (EFFECT, AMBIGUOUS)
+            and remainder.more
+            and not inconclusive
+        ):
+            course.stage(f"the residual with {ranking[0].id.replace('_', ' ')}")
+            second = diagnose_rest(best.block, course.within(lambda _: (search, chosen)))
             verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
             doubts = (*doubts, leaves(ranking[0], second))
         doubts = (*doubts, *(why for _, why in self.refuted), *search.open_directions())
-        result, note = self._made(verdict, ranking, remainder, best, base, COMPLETE, doubts)
+        result, note = self._diagnosis(verdict, ranking, remainder, best, base, COMPLETE, doubts)
         words = replace(search.words, noise=search.words.noise + recorded)
-        return Diagnosed(replace(result, explanation=explain(result, words) + note), search), fallen
+        return Diagnosed(replace(result, explanation=explain(result, words) + note), search), refutation
 
     def _base(self) -> Baseline:
         search = self.search
         errors, predicted = search.errors(search.base), search.predicted(search.base)
         return Baseline(search.base.block, *errors, predicted=predicted)
 
-    def _made(
+    def _diagnosis(
         self, verdict, ranking, remainder: Remainder, best, base: Baseline, status, doubts=()
     ) -> tuple[Diagnosis, str]:
         search = self.search
@@ -204,12 +218,12 @@ class _Asked:
         return result, located.note
 
 
-def doubted(ranking, long: LongPrediction | None, significant: float):
-    """Return what becomes of the verdict that the first of a ranking is the effect, and why.
+def after_long_prediction(ranking, long: LongPrediction | None, significant: float):
+    """Return the verdict on the first of a ranking after free prediction, with the reasons.
 
-    It stands where the first predicts the motion over long stretches as well as any rival, and better than
+    It is confirmed where it predicts the motion over long horizons as well as any rival, and better than
     the model without it, where the held-out data favour no rival, where the data determine the effect's
-    size, its first parameter, and where the model's own parameters keep to their ranges beside it.
+    size, its first parameter, and where the parameters of the model itself stay within their ranges with it.
 
     Parameters
     ----------
@@ -222,7 +236,7 @@ def doubted(ranking, long: LongPrediction | None, significant: float):
     -------
     verdict : str
     ranking : list of CandidateEffect
-        Those that predict better share the probability with the first: one judgement is against the other.
+        Those that predict better share the probability with the first: two criteria contradict each other.
     doubts : tuple of str
     """
     first = ranking[0]
@@ -258,12 +272,12 @@ def _shared(ranking, others) -> list[CandidateEffect]:
     return [replace(c, probability=share) if c is ranking[0] or c in others else c for c in ranking]
 
 
-def worth(first: CandidateEffect, search: Search) -> bool:
-    """Whether the data fitted speak for an effect, and those held out by themselves too.
+def is_significant(first: CandidateEffect, search: Search) -> bool:
+    """Whether an effect is significant on the data fitted, and on those held out alone.
 
-    On data held out the errors of all parameters show, and an idle effect may make up for them by chance:
-    those fitted have to speak for themselves. Whitened residuals may speak for an effect that makes slow
-    errors larger: the plain error held out must not grow.
+    On held-out data the errors of all parameters show, and a superfluous effect may reduce them by chance:
+    the data fitted have to be significant by themselves. Whitened residuals may favour an effect that makes
+    slow errors larger: the plain error on held-out data must not grow.
     """
     if _errs_more(first, search):
         return False
@@ -272,10 +286,10 @@ def worth(first: CandidateEffect, search: Search) -> bool:
     )
 
 
-def unheld(first: CandidateEffect, search: Search) -> bool:
-    """Whether the data fitted speak for an effect, and those held out neither for nor against it.
+def inconclusive_on_holdout(first: CandidateEffect, search: Search) -> bool:
+    """Whether an effect is significant on the data fitted, while those held out say nothing about it.
 
-    It may not act there at all: a stop that is not met, for instance.
+    It may not act in them at all: a stop that is not reached, for instance.
     """
     quiet = abs(first.evidence_holdout) <= search.significant_validation
     return first.evidence_fitted > search.significant and quiet and not _errs_more(first, search)
@@ -285,8 +299,8 @@ def _errs_more(first: CandidateEffect, search: Search) -> bool:
     """Whether held-out data err more with an effect than without it.
 
     Of a sensor that rounds that says nothing: a model right to a tenth of a step errs by a whole one in a
-    tenth of the samples, which is more than the 1/sqrt(12) of one that knows no steps. How probable the
-    recorded values are has judged it.
+    tenth of the samples, which is more than the 1/sqrt(12) of one that knows no steps. Its evidence is
+    the likelihood of the recorded values.
     """
     if any(p.stepped for p in first.effect.parameters.values()):
         return False
@@ -302,16 +316,16 @@ def _probabilities(chosen) -> list[float]:
     return (weights / weights.sum())[:-1].tolist()
 
 
-def _entry(judged, search: Search, probability: float, same) -> CandidateEffect:
-    effect, key = judged.block.effects[-1], judged.block.newest
+def _entry(candidate, search: Search, probability: float, same) -> CandidateEffect:
+    effect, key = candidate.block.effects[-1], candidate.block.newest
     values = {k: p.value for k, p in effect.parameters.items()}
-    known = search.standard_errors(judged)
-    nrmse, held = search.errors(judged)
+    known = search.standard_errors(candidate)
+    nrmse, held = search.errors(candidate)
     return CandidateEffect(
-        judged.block, predicted=search.predicted(judged), effect=effect, id=effect.id, nrmse=nrmse,
-        nrmse_holdout=held, evidence=judged.evidence, probability=probability, parameters=values,
-        equivalents=same, confirmed=judged.confirmed,
+        candidate.block, predicted=search.predicted(candidate), effect=effect, id=effect.id, nrmse=nrmse,
+        nrmse_holdout=held, evidence=candidate.evidence, probability=probability, parameters=values,
+        equivalents=same, confirmed=candidate.confirmed,
         errors={k: known[f"{key}.{k}"] for k in values if f"{key}.{k}" in known},
-        evidence_holdout=judged.evidence_validation, undetermined=search.undetermined(judged),
-        displaced=search.displaced(judged),
+        evidence_holdout=candidate.evidence_validation, undetermined=search.undetermined(candidate),
+        displaced=search.displaced(candidate),
     )  # fmt: skip

@@ -120,12 +120,12 @@ class Stage(SegmentOutputs):
 
     def over(self, segments, starts) -> Stage:
         """Return the same over other segments."""
-        return Stage(self.problem, segments, self.thin, starts, self.rtol)
+        return Stage(self.problem, segments, self.decimation, starts, self.rtol)
 
     def alone(self, theta, starts, which=slice(None)) -> Stage:
         """Return the stage of the initial states alone, for some of the records."""
         return Stage(
-            self.problem.alone(theta, which), self.segments[which], self.thin, starts, self.rtol
+            self.problem.alone(theta, which), self.segments[which], self.decimation, starts, self.rtol
         )  # fmt: skip
 
     def followed_states(self, theta, states) -> tuple[States, Signals]:

@@ -230,7 +230,7 @@ def acceleration_filter(step: int, column: int = 0) -> NoiseModel:
 
 
 def prediction_error_filter(pieces: Pieces, plain: NoiseModel | None = None, outputs: int = 1) -> NoiseModel:
-    """Return the noise model that evidence is judged by.
+    """Return the noise model that residuals are whitened by for evidence.
 
     Of the longest record; `plain`: the `acceleration_filter` of fits, then of these in all segments.
     """

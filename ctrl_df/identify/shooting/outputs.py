@@ -57,7 +57,7 @@ class SegmentOutputs:
     ----------
     problem : Problem
     segments : list of Segments
-    thin : int
+    decimation : int
         Samples a step of the input.
     starts : list of (nw, ns) arrays or None
         Initial states to begin with; None: what the data say.
@@ -65,10 +65,10 @@ class SegmentOutputs:
         Relative tolerance of the simulations.
     """
 
-    def __init__(self, problem: Problem, segments: list[Segments], thin, starts=None, rtol=RTOL):
-        self.problem, self.segments, self.thin, self.rtol = problem, list(segments), thin, rtol
+    def __init__(self, problem: Problem, segments: list[Segments], decimation, starts=None, rtol=RTOL):
+        self.problem, self.segments, self.decimation, self.rtol = problem, list(segments), decimation, rtol
         self.simulators: list[Simulator] = [
-            simulator_of(problem.model, r, thin=thin, begins=problem.begins, rtol=rtol)
+            simulator_of(problem.model, r, decimation=decimation, begins=problem.begins, rtol=rtol)
             for r in problem.records
         ]
         self.measured = [sensed(r).within(w.samples) for r, w in zip(problem.records, segments, strict=True)]

@@ -56,7 +56,7 @@ def restarted_segments(stage, found):
         least = (BETTER**2 if problem.followed else UNFOLLOWED) * rms[bad] ** 2
         all_reach[k][bad, column] = stage.widest[k][bad, column]
         reach, chosen = all_reach[k][bad, column], starts[bad].copy()
-        before = simulator.carried_on(segments, values, starts)[bad]
+        before = simulator.continued_from(segments, values, starts)[bad]
         before = np.where(np.isfinite(before), before, starts[bad])
         tries: list[tuple[Any, Any]] = [
             (slice(None), before),

@@ -5,24 +5,30 @@ from __future__ import annotations
 from ..thresholds import RTOL
 
 BETTER = 0.99
-"""Error over the one before that counts as a better minimum."""
+"""Error over the one before that counts as a better minimum: a hundredth less is 10 nats of 1,000 samples,
+half of what makes an effect."""
 
 OUTLYING_SEGMENT, OUTLYING_NOISE = 1.5, 2.0
-"""Error of a segment over the good quarter's, and over the noise, from which its start is sought anew."""
+"""Error of a segment over that of the good quarter, and over the noise, from which its initial state is
+sought again: 1.5 lies three standard deviations, 1 / sqrt(2 n), above the rms of n = 20 independent samples
+(`SEGMENT_SAMPLES`), 2 six."""
 
 GOOD = 0.25
-"""Share of the segments that are taken to be right when others are compared with them."""
+"""Share of the segments that are taken to be right when others are compared with them: the quartile stays
+right as long as three of four segments are wrong."""
 
 SIZE_PRIOR = 3.0
 """Factor by which the model's own parameters may be off before any data, one standard deviation: beyond two
 and a quarter lies `PARAMETER_RANGE`."""
 
 SHORTEST_SEGMENT = 50
-"""Samples of the shortest segment of a diagnosis: states and derivatives of hidden bodies need more."""
+"""Samples of the shortest segment of a diagnosis: the four initial states of two bodies are then fewer than a
+tenth of its samples."""
 
 DAMPING, DAMPING_LEAST, DAMPING_MOST = 1e-3, 1e-7, 1e4
-"""Of Levenberg and Marquardt, over the curvature: at the begin; at least, where steps are those of Gauss and
-Newton; at most, where a refused step is too short to gain."""
+"""Of Levenberg and Marquardt, over the curvature: at the start, for a start that may be far off (Madsen,
+Nielsen & Tingleff 2004, section 3.2); at least, where steps are those of Gauss and Newton to 1e-7; at most,
+where a refused step is 1e-4 of these, too short to gain."""
 
 NUDGE_FIRST, NUDGE_LEAST, NUDGE_MOST, NUDGE_FALLS = 1e-3, 100 * RTOL, (0.05, 0.02), 0.05
 """Steps of scaled parameters that derivatives are differences over: the first; at least, a hundred times what
@@ -32,10 +38,13 @@ OUTPUT_MOVES = 0.3
 """Of the noise: what the output is to move by over such a step, seen well and linear still."""
 
 STATE_NUDGE, HIDDEN_NUDGE = 3e-3, 0.1
-"""The same of initial states: of place and speed over the typical ones, of what is hidden over its reach."""
+"""The same of initial states: of place and speed over the typical ones, of what is hidden over its reach. A
+difference over 3e-3 errs by as much of the curvature, and simulations by 3e-6 of it (`RTOL`); a reach is
+known roughly only, and its tenth moves the output well beyond rounding."""
 
 SLACK_TURNED = 0.8
-"""Share of a gap from which its state is moved back."""
+"""Share of a gap from which its state is nudged backwards, so that a nudge of up to a fifth of the gap stays
+inside."""
 
 AT_BOUND, ON_BOUND = 1e-6, 1e-9
 """Distance of a scaled parameter from a bound that leaves no room; difference that rounding makes."""
@@ -71,20 +80,23 @@ UNFOLLOWED = 0.7
 """Mean squared error over the one before below which another start of a segment is taken as it is (rigs)."""
 
 RESTART_SPEEDS = (-1, -0.6, -0.3, -0.15, 0, 0.15, 0.3, 0.6, 1)
-"""Speeds to begin a segment with, over how far the estimate may be off."""
+"""Speeds to start a segment with, over how far the estimate may be off: each about twice the one before, so
+that one lies within a third of any but the smallest."""
 
 BEGINNINGS = (16, 8, 4, 2)
 """Parts that a segment is divided into: the state that it begins in is found over the first of them, then
 over twice that."""
 
 NOISE_ORDER = 12
-"""Largest order of the noise model of a residual that others are judged by."""
+"""Largest order of the noise model of a residual that evidence is whitened by: six resonances, of two
+coefficients each. Half and twice of it were not tried."""
 
 IMPULSE_GONE = 1e-6
 """Over its peak, an impulse response that has died out."""
 
 TRIES, DAMPED_BY = 6, 10
-"""Tries of a step, each damped more by this factor."""
+"""Tries of a step, each damped more by this factor: together a million, from 1e-3 of the curvature to a
+thousand times it, where the step follows the gradient and is as much shorter."""
 
 AGAIN_LEAST, RESTART_ROUNDS = 3, 4
 """Steps after segments have begun anew, at least; rounds of that where no parameter moves."""
@@ -93,7 +105,8 @@ GROSS_ERROR = 4.0
 """Standard deviations of the usual error beyond which a sample counts less: one of 16,000 of normal noise."""
 
 NOISE_ORDER_MOST, NOISE_ORDER_LEFT = 30, 4
-"""Largest order of a noise model, and of one of what another has left."""
+"""Largest order of a noise model, 15 resonances, and of one of what another has left, two. Half and twice
+were not tried."""
 
 IMPULSE_FIRST, IMPULSE_LONGEST = 4096, 1 << 18
 """Samples of an impulse response: at first, and at most."""

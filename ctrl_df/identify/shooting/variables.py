@@ -65,7 +65,7 @@ def typical_mass(block, force: float, position: float, speed: float) -> float:
 
 
 def default_free(block) -> tuple[str, ...]:
-    """Return the parameters that a refit moves unless told otherwise."""
+    """Return the parameters that a refit moves by default."""
     return tuple(k for k, p in block.parameters.items() if p.free and not p.stepped)
 
 

@@ -60,7 +60,7 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     own : (n, p) array
         Regressors of the model's own parameters: what they do alone is no share of a curve.
     beside : (n, q) array
-        Those of them that a curve over this quantity can be told from.
+        Those of them that can be distinguished from a curve over this quantity.
     known : (n,) bool array
         Which instants count.
     """
@@ -75,7 +75,7 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     rest = _weighed(beside[use], root)
     y, count, together = force[use] * root, CURVE_BINS, 1.0
     bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
-    # what neither explains tells how many instants know the same, and so how many bins can be told apart
+    # the autocorrelation of what neither explains gives the independent instants, and so the bins
     for _ in range(2):
         bins = np.empty(len(use), int)
         bins[order] = np.arange(len(use)) * count // len(use)

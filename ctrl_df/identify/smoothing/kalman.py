@@ -50,14 +50,15 @@ def _solve(a, b):
 
 
 @njit(error_model="numpy")
-def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch, back):
+def smooth(a, b, q, info, info_vector, mean0, cov0, mean, cov, scratch, back):
     """Write means (N + 1, n) and covariances (N + 1, n, n) given all measurements; return their evidence.
 
-    a (N, n, n), b (N, n), q (N, n, n): the steps; info (N + 1, n, n), told (N + 1, n): J and h; mean0, cov0:
-    before anything is measured. scratch (N + 5, n, n). The evidence lacks what depends on the measurements
-    and their noise alone. Without `back` only it is computed: what is written is that of the filter.
+    a (N, n, n), b (N, n), q (N, n, n): the steps; info (N + 1, n, n), info_vector (N + 1, n): J and h; mean0,
+    cov0: before anything is measured. scratch (N + 5, n, n). The evidence lacks what depends on the
+    measurements and their noise alone. Without `back` only it is computed: what is written is that of the
+    filter.
     """
-    a, b, q, info, told, mean0 = lean(a), lean(b), lean(q), lean(info), lean(told), lean(mean0)
+    a, b, q, info, info_vector, mean0 = lean(a), lean(b), lean(q), lean(info), lean(info_vector), lean(mean0)
     cov0, mean, cov, scratch = lean(cov0), lean(mean), lean(cov), lean(scratch)
     n, steps = mean0.shape[0], a.shape[0]
     m, p, left, right = scratch[steps], scratch[steps + 1], scratch[steps + 2], scratch[steps + 3]
@@ -78,12 +79,12 @@ def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch, back):
                 right[i, j] = p[i, j]
         evidence -= 0.5 * _solve(left, right)
         for i in range(n):
-            value, square = told[k, i], 0.0
+            value, square = info_vector[k, i], 0.0
             for j in range(n):
                 value -= info[k, i, j] * m[0, j]
                 square += info[k, i, j] * m[0, j]
             m[1, i] = value
-            evidence += m[0, i] * (told[k, i] - 0.5 * square)
+            evidence += m[0, i] * (info_vector[k, i] - 0.5 * square)
         for i in range(n):
             value = m[0, i]
             for j in range(n):
@@ -161,10 +162,10 @@ def smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch, back):
     return evidence
 
 
-def smoothed(a, b, q, info, told, mean0, cov0, back=True):
+def smoothed(a, b, q, info, info_vector, mean0, cov0, back=True):
     """Return (means, covariances, evidence); see `smooth`."""
     steps, n = b.shape
     mean, cov = np.zeros((steps + 1, n)), np.zeros((steps + 1, n, n))
     scratch = np.zeros((steps + 5, max(n, 2), n))
-    evidence = smooth(a, b, q, info, told, mean0, cov0, mean, cov, scratch, back)
+    evidence = smooth(a, b, q, info, info_vector, mean0, cov0, mean, cov, scratch, back)
     return mean, cov, evidence

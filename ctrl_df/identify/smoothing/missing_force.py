@@ -96,7 +96,7 @@ class MissingForce:
 
     @property
     def known(self) -> np.ndarray:
-        """Where the record tells of the force, (n,) bool."""
+        """Where the record determines the force, (n,) bool."""
         return self.std < FORCE_KNOWN * self.size
 
     @cached_property
@@ -136,24 +136,24 @@ class MissingForce:
 
     @cached_property
     def regions(self) -> Curves:
-        """What it is a curve over, as regions of an error are told; none where it is not significant."""
+        """What it is a curve over, as regions of an error are; none where it is not significant."""
         if not self.significant:
             return Curves()
         words, (own, constant) = self.words, self.made
         size = f"the missing {words['force']} ({digits(self.rms)} {self.unit} rms)"
-        makes = f"of {size} is what other values of the model's parameters make"
-        told = [
+        makes = f"of {size} could be explained by other values of the model's parameters"
+        rows = [
             (own, "parameters", "of the model", float(own < MADE_LEAST), makes),
             (constant, "constant", words["force"], float(constant < MADE_LEAST),
              f"of {size} is a constant {words['force']}"),
         ]  # fmt: skip
-        rest = f"of what parameters leave of {size} is a curve over the"
+        rest = f"of what parameters and a constant leave of {size} is a function of the"
         for name, curve in self._curves.items() if self._left else ():
             said = f"{rest} {words[name]}"
-            told.append((curve.share, "curve", f"over the {words[name]}", curve.p_value, said))
+            rows.append((curve.share, "curve", f"over the {words[name]}", curve.p_value, said))
         found = [
             Region(kind, label, share, 0.0, p_value, 0.0, 1.0, (-inf, inf), f"{share:.0%} {said}.")
-            for share, kind, label, p_value, said in told
+            for share, kind, label, p_value, said in rows
         ]
         return Curves(sorted(found, key=lambda region: (region.p_value >= LEVEL, -region.share)))
 
@@ -207,19 +207,19 @@ class MissingForce:
         )
         if not self.significant:
             return (
-                f"No missing {words['force']} is seen beside {self.name!r}: nowhere beyond three standard "
+                f"No missing {words['force']} in {self.name!r}: the estimate nowhere exceeds three standard "
                 f"deviations ({size})."
             )
         own, constant = self.made
         curves = [
-            f"{share:.0%} over the {words[name]}"
+            f"{share:.0%} is a function of the {words[name]}"
             for name, share in self.shares.items()
             if self._left and share >= MADE_LEAST
         ]
-        rest = f" Of the rest, as a curve: {', '.join(curves)}." if curves else ""
+        rest = f" Of the rest {', '.join(curves)}." if curves else ""
         return (
-            f"Missing {words['force']} beside {self.name!r}: {size}. Other values of the model's parameters "
-            f"make {own:.0%} of its square, a constant {words['force']} {constant:.0%}.{rest}"
+            f"Missing {words['force']} in {self.name!r}: {size}. Other parameter values of the model could "
+            f"explain {own:.0%} of its mean square, a constant {words['force']} {constant:.0%}.{rest}"
         )
 
     def __repr__(self) -> str:

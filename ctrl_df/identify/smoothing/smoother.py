@@ -112,11 +112,11 @@ def _rounds(begun: _Found, smooth: bool, steps: Steps, scale, leak, first, known
     mean, cov, sizes, evidence = begun.mean, begun.cov, begun.sizes, begun.evidence
     for turn in range(SMOOTHER_ROUNDS):
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
-        told = _Told(lin, steps, leak, mean[0], first, known, smooth)
+        model = _Model(lin, steps, leak, mean[0], first, known, smooth)
         if turn < SMOOTHER_ESTIMATED:
-            sizes = told.likeliest(sizes, SMOOTHER_DAMPED[min(turn // 2, 1)])
-        new, cov, _ = told.smoothed(sizes)
-        evidence = told.evidence(sizes)
+            sizes = model.likeliest(sizes, SMOOTHER_DAMPED[min(turn // 2, 1)])
+        new, cov, _ = model.smoothed(sizes)
+        evidence = model.evidence(sizes)
         moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
         mean = new
         if turn > 1 and moved < SMOOTHER_STILL:
@@ -152,8 +152,8 @@ def _scaled(lin: Linearized, scale) -> Linearized:
     )
 
 
-class _Told:
-    """What a linearized record says of the process and of the noise."""
+class _Model:
+    """A linear Gaussian state-space model of a record: its smoother and its likelihood."""
 
     def __init__(self, lin: Linearized, steps: Steps, leak, mean0, cov0, known, smooth):
         self.lin, self.known, self.smooth = lin, known, smooth
@@ -179,16 +179,16 @@ class _Told:
         size, memory, noise = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
         weight = np.where(self.has, 1.0 / (noise**2 + self.r), 0.0)
         n = self.b.shape[1]
-        info, told = np.zeros((len(self.b) + 1, n, n)), np.zeros((len(self.b) + 1, n))
+        info, info_vector = np.zeros((len(self.b) + 1, n, n)), np.zeros((len(self.b) + 1, n))
         weighted = self.c * weight[:, :, None]
         info[:-1] = weighted.swapaxes(1, 2) @ self.c
-        told[:-1] = np.einsum("kmi,km->ki", weighted, self.off)
+        info_vector[:-1] = np.einsum("kmi,km->ki", weighted, self.off)
         a, q = self.a.copy(), self.q.copy()
         cov0, mean0 = self.cov0.copy(), self.mean0.copy()
         cov0[-1], cov0[:, -1], cov0[-1, -1], mean0[-1] = 0.0, 0.0, size**2, 0.0
         if self.smooth:
-            a, q, info, told, mean0, cov0 = _with_slope(
-                a, q, info, told, mean0, cov0, size, self.dt * math.sqrt(3) / memory
+            a, q, info, info_vector, mean0, cov0 = _with_slope(
+                a, q, info, info_vector, mean0, cov0, size, self.dt * math.sqrt(3) / memory
             )
         else:
             a[:, -1, -1] = np.exp(-self.dt / memory)
@@ -198,7 +198,7 @@ class _Told:
             pushed = a[:, :-1, -1]
             q[:, :-1, :-1] += apart[:, None, None] * pushed[:, :, None] * pushed[:, None, :]
         b = np.pad(self.b, ((0, 0), (0, len(mean0) - n)))
-        mean, cov, evidence = smoothed(a, b, q, info, told, mean0, cov0, back)
+        mean, cov, evidence = smoothed(a, b, q, info, info_vector, mean0, cov0, back)
         mean, cov = mean[:, :n], cov[:, :n, :n]
         evidence += 0.5 * float(np.sum(np.log(weight[self.has])) - np.sum(weight * self.off**2))
         return mean, cov, evidence
@@ -220,7 +220,7 @@ class _Told:
         return value if math.isfinite(value) else UNLIKELY
 
 
-def _with_slope(a, q, info, told, mean0, cov0, size, decay):
+def _with_slope(a, q, info, info_vector, mean0, cov0, size, decay):
     """Return the same with the slope of the force, over its usual size, as one more state.
 
     Force and slope are those of a process of Matern's class, differentiable once. `decay`: of each step, over
@@ -234,4 +234,4 @@ def _with_slope(a, q, info, told, mean0, cov0, size, decay):
     q[last] = size**2 * (np.eye(2) - kept @ kept.swapaxes(1, 2))
     cov0 = np.pad(cov0, ((0, 1), (0, 1)))
     cov0[-1, -1] = size**2
-    return a, q, info, np.pad(told, ((0, 0), (0, 1))), np.append(mean0, 0.0), cov0
+    return a, q, info, np.pad(info_vector, ((0, 0), (0, 1))), np.append(mean0, 0.0), cov0

@@ -246,11 +246,11 @@ class Steps:
         """Move states outside a gap or a stop to their border."""
         core = self.core
         if core.joint == IMPACT:
-            stretch = np.clip(x[:, 2] - x[:, 0], 0.0, core.gap)
+            deflection = np.clip(x[:, 2] - x[:, 0], 0.0, core.gap)
             if core.measured == 1:
-                x[:, 0] = x[:, 2] - stretch
+                x[:, 0] = x[:, 2] - deflection
             else:
-                x[:, 2] = x[:, 0] + stretch
+                x[:, 2] = x[:, 0] + deflection
         if core.stop is not None:
             low, high = core.stop.span
             for body in range(core.bodies):

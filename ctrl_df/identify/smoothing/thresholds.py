@@ -24,7 +24,7 @@ SMOOTHER_LEAK = 0.1
 """Of the sensor's noise: what continuity of the position may give way over a whole record."""
 
 FORCE_KNOWN = 0.8
-"""Of the force's size: a standard deviation beyond it tells of no more than what was assumed."""
+"""Of the force's size: with a standard deviation beyond it the record adds nothing to what was assumed."""
 
 CURVE_BINS, CURVE_LEAST = 25, 4
 """Steps of a curve over a quantity, at most and at least."""

@@ -15,7 +15,7 @@ def own_columns(block, u, x, v) -> Columns:
     """Return what a block's laws take of the force besides plain dry and viscous friction.
 
     A law that is proportional to its first parameter is taken for a parameter of one. Laws with states of
-    their own, joints and contacts are left out: the motion alone does not tell of them.
+    their own, joints and contacts are left out: the motion alone does not determine them.
 
     Parameters
     ----------

@@ -36,13 +36,13 @@ class Motion:
     own: Columns = ()
 
 
-def motion_of(view, thin: int, block) -> Motion:
-    """Return every `thin`-th sample of the segments; the force as the drive of a block makes it."""
+def motion_of(view, decimation: int, block) -> Motion:
+    """Return every `decimation`-th sample of the segments; the force as the drive of a block makes it."""
     parts = []
     for record, segments in zip(view.records, view.segments, strict=True):
         known = facts(record)
         acceleration = np.gradient(known.velocity, record.t)
-        some = segments.every(thin).samples
+        some = segments.every(decimation).samples
         parts.append(
             [np.asarray(c)[some] for c in (load_of(block, record), known.place, known.velocity, acceleration)]
         )

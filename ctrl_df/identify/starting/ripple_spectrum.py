@@ -241,7 +241,7 @@ def _moving(record) -> np.ndarray:
     known = facts(record)
     slow = np.abs(known.velocity) < SLOWLY * known.speed
     moving = np.ones(len(slow), bool)
-    for i, j in _stretches(slow):
+    for i, j in _intervals(slow):
         if j - i > 2 * known.half:
             moving[max(i - known.half, 0) : j + known.half] = False
     return moving
@@ -253,12 +253,12 @@ def _runs(segments, size, moving) -> list[tuple[int, int]]:
     for i, j in zip(segments.begins, segments.ends, strict=True):
         there[i:j] = True
     there &= moving
-    runs = _stretches(there)
+    runs = _intervals(there)
     return [(int(i), int(i + (j - i) // size * size)) for i, j in runs if (j - i) // size > RUN_LEAST]
 
 
-def _stretches(there) -> np.ndarray:
-    """Return begin and end (n, 2) of the stretches of samples that are there."""
+def _intervals(there) -> np.ndarray:
+    """Return begin and end (n, 2) of the intervals of samples that are there."""
     return np.flatnonzero(np.diff(np.concatenate(([False], there, [False])).astype(int))).reshape(-1, 2)
 
 

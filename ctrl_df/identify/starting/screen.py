@@ -15,7 +15,7 @@ import numpy as np
 from ...blocks.core import kinetic_level
 from ..estimation.fit import FitResult
 from ..estimation.segmented import SegmentedData
-from ..estimation.starts import carried
+from ..estimation.starts import continued_states
 from ..shooting.scales import Scales
 from ..thresholds import NOTHING
 from .extend import extended
@@ -45,7 +45,7 @@ class Screen:
     def __init__(self, base: FitResult, data: SegmentedData):
         self.base, self.data = base, data
         self.view = data.train
-        self.motion = motion_of(data.train, data.thin, base.model)
+        self.motion = motion_of(data.train, data.decimation, base.model)
         self.sensitivity = base.sensitivity
         self.residual = self.project(base.residual)
         self.simulators = [data.simulator(base.model, r) for r in self.view.records]
@@ -103,7 +103,7 @@ class Screen:
     def starts(self, block) -> list[np.ndarray]:
         """Return the baseline's initial states as those of a block with an effect more."""
         return [
-            carried(self.data.simulator(block, r), w, old, start)
+            continued_states(self.data.simulator(block, r), w, old, start)
             for r, w, old, start in zip(
                 self.view.records, self.view.segments, self.simulators, self.base.starts, strict=True
             )
@@ -125,7 +125,7 @@ def starts_for(cls, screen: Screen, proposed, keep: int = 2) -> list[Start]:
     found: list[Start] = []
     total = screen.power
     for effect in proposed:
-        found += _judged(effect, screen, total)
+        found += _ranked_starts(effect, screen, total)
     found.sort(key=lambda s: s.left)
     chosen: list[Start] = list(regressed(cls, screen))
     keep += len(chosen)
@@ -137,7 +137,7 @@ def starts_for(cls, screen: Screen, proposed, keep: int = 2) -> list[Start]:
     return chosen
 
 
-def _judged(effect, screen, total) -> Iterator[Start]:
+def _ranked_starts(effect, screen, total) -> Iterator[Start]:
     block = extended(screen.block, effect)
     change = None if block is None else screen.change(block)
     if block is None or change is None or total == 0:

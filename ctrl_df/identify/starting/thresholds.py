@@ -35,7 +35,7 @@ AS_IT_IS, FACTOR_MOST = 1.25, 300.0
 away; by which it is at most: beyond nothing is proportional."""
 
 MOVING = 0.03
-"""Speed, over the typical one, from which a sample tells of forces: below, friction may be anything."""
+"""Speed, over the typical one, from which a sample shows forces: below, friction may be anything."""
 
 DRY_LEAST, VISCOUS_LEAST = 0.01, 1e-3
 """Regressed dry and viscous friction at least, over the typical force: fits move them by factors."""

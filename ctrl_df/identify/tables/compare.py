@@ -112,7 +112,7 @@ class FrequencyComparison(ComparisonBase):
         lost = sum(int((np.isfinite(r.record.N) & ~np.isfinite(r.simulated)).sum()) for r in self.records)
         text = (
             f"{count} points of N(A, omega): error {self.nrmse:.4g} of |N|, fit {self.fit_percent:.2f} %, "
-            f"{'scatter only' if self.white else 'neighbours err alike'} (correlation "
+            f"{'scatter only' if self.white else 'errors of neighbours agree'} (correlation "
             f"{self.white.correlation:.2f}, p = {self.white.p_value:.2g})"
         )
         if lost:
@@ -121,7 +121,7 @@ class FrequencyComparison(ComparisonBase):
 
     @property
     def over(self) -> str:
-        """What the model was judged over, in words."""
+        """What the errors are over, in words."""
         return "the plane"
 
     def plot(self, record=None, **keywords):

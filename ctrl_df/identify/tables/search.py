@@ -18,7 +18,7 @@ from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
 from ..starting.extend import applicable
-from ..thresholds import TOLD_APART
+from ..thresholds import DISTINGUISHED
 from .candidate import fit_either, try_effect
 from .compare import comparison_of_tables, plane_regions, scatter
 from .errors import log_density, outlying, rms
@@ -160,14 +160,14 @@ class TableSearch(Search):
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         found = []
-        course.stage(f"{len(jobs)} effects tried on some points")
+        course.stage(f"{len(jobs)} effects screened on some of the points")
         for r in run(try_effect, jobs):
             course.done()
             if r is not None:
                 found.append(self._trial(*r, work=WORK_MEDIUM))
                 course.known((self, self.ranked(self.base, found)))
         ranked = self.ranked(self.base, found)
-        return self.after(first_look=ranked), ranked
+        return self.after(screened=ranked), ranked
 
     def confirm(self, found, course=None):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
@@ -203,16 +203,16 @@ class TableSearch(Search):
         found = fit_table(block, self.inside, names, self.scales, iterations=iterations)
         return self._trial(block.newest if block.effects else "", found, len(names))
 
-    # --- judging --------------------------------------------------------------------------------------
+    # --- evidence -------------------------------------------------------------------------------------
 
-    def ranked(self, base, judged: Sequence[TableTrial]):
+    def ranked(self, base, candidates: Sequence[TableTrial]):
         """Return models with their evidence over `base`, best first.
 
         That is the likelihood ratio of independent complex errors, less Schwarz's price of parameters.
         """
         price, before = 0.5 * math.log(2 * len(self.points)), self._likelihood(base)[0]
         found = []
-        for t in judged:
+        for t in candidates:
             gain = self._likelihood(t)[0] - before
             validation = float(np.sum(gain[~self.train]))
             found.append(
@@ -229,29 +229,29 @@ class TableSearch(Search):
             self.points.weight * tried.error, max(0.5 * self.points.stated, SCATTER_LEAST) ** 2
         )
 
-    def alike(self, a, b):
+    def equivalent(self, a, b):
         """Whether two candidates' tables differ by less than the scatter lets one see."""
         both = np.isfinite(a.table) & np.isfinite(b.table)
         if np.any(np.isfinite(a.table) != np.isfinite(b.table)):
             return False
         sigma2 = min(self._likelihood(a)[1], self._likelihood(b)[1])
         gap = self.points.weight * np.abs(a.table - b.table) / self.points.scale
-        return float(np.sum(gap[both] ** 2)) / sigma2 < TOLD_APART
+        return float(np.sum(gap[both] ** 2)) / sigma2 < DISTINGUISHED
 
-    def errors(self, judged):
+    def errors(self, candidate):
         """Return the rms of the relative errors of the points fitted, and of those held out."""
-        good = ~outlying(judged.error)
-        return rms(judged.error[self.train & good]), rms(judged.error[~self.train & good])
+        good = ~outlying(candidate.error)
+        return rms(candidate.error[self.train & good]), rms(candidate.error[~self.train & good])
 
-    def standard_errors(self, judged):
+    def standard_errors(self, candidate):
         """Return the standard errors of a candidate fitted to all points."""
-        return uncertainty(judged.fitted)[1] if judged.confirmed else {}
+        return uncertainty(candidate.fitted)[1] if candidate.confirmed else {}
 
-    def undetermined(self, judged):
+    def undetermined(self, candidate):
         """Return the parameters of the newest effect at a bound, or known to worse than their size."""
-        if not judged.confirmed:
+        if not candidate.confirmed:
             return ()
-        own, fitted = judged.block.newest + ".", judged.fitted
+        own, fitted = candidate.block.newest + ".", candidate.fitted
         table, doubtful = fitted.block.parameters, uncertainty(fitted)[2]
         named = [v for v in fitted.variables if v.name.startswith(own)]
         return tuple(
@@ -263,7 +263,7 @@ class TableSearch(Search):
     # --- what it comes to -----------------------------------------------------------------------------
 
     def remainder(self, best, significant):
-        """Split the error into scatter and structure, and judge whether the latter is explained."""
+        """Split the error into scatter and structure, and decide whether the latter is explained."""
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
@@ -304,14 +304,15 @@ class TableSearch(Search):
     def located(self, best, remainder, unknown):
         """Return the bands of amplitude and frequency where the error is."""
         where = plane_regions(self.points, (best if unknown else self.base).error)
-        look = places(where) or "the error is spread over the whole plane."
+        look = places(where) or "The error is spread over the whole plane."
         remains = (
-            f"Neighbouring points err alike: {percent(remainder.structure)} beside "
-            f"{percent(remainder.noise)} of scatter. Look here: {look}"
+            f"The errors of neighbouring points agree: structure of {percent(remainder.structure)} beside "
+            "scatter of "
+            f"{percent(remainder.noise)}. {look}"
         )
         far = np.count_nonzero(outlying(best.error))
         note = (
-            f" {far} of {len(best.error)} points err by more than ten times the usual and are left out of "
+            f" {far} of {len(best.error)} points err by more than ten times the median and are left out of "
             "these figures: another motion that coexists, or a bad measurement."
         )
         return Located(where, where.kinds, remains if unknown else "", note if far else "")

@@ -43,7 +43,7 @@ def _rigid(model, points: Points, share: float) -> np.ndarray:
     """Return where the presliding of a model yields over next to nothing of the measured swing.
 
     There it is stiff and costs thousands of steps a period, and N differs from that of rigid friction by
-    less than that share. It must carry the block's dry friction and no more.
+    less than that share. Its level must be the block's dry friction and no more.
     """
     nowhere = np.zeros(len(points), bool)
     presliding = [e for e in getattr(model, "effects", ()) if e.role == "presliding"]
@@ -52,8 +52,8 @@ def _rigid(model, points: Points, share: float) -> np.ndarray:
     dry = level([e for e in model.effects if e.role == "friction" and e.side == "motor"], 0.0, 1.0, 0.0)
     if not dry > 0:
         return nowhere
-    stroke, carried = slip(presliding[0], dry)
-    if not math.isclose(carried, dry, rel_tol=AS_DRY):
+    stroke, force = slip(presliding[0], dry)
+    if not math.isclose(force, dry, rel_tol=AS_DRY):
         return nowhere
     return stroke < share * points.A * np.abs(points.N)
 

@@ -162,7 +162,7 @@ def best_starts(
 ) -> tuple[list, bool]:
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 
-    A start is judged by what remains of its errors once the model's own parameters have moved along `slopes`
+    A start is ranked by what remains of its errors once the model's own parameters have moved along `slopes`
     (2 n, p), those of the weighted errors. An effect that changes no point leaves no print: no start.
     """
     q = np.linalg.qr(slopes)[0] if slopes.size else np.zeros((2 * len(points), 0))
@@ -177,7 +177,7 @@ def best_starts(
     size = left(before)
     # a single point of another motion must not hide a good start
     common = START_COMMON * float(np.mean(size)) + NEARLY_NOTHING
-    scored, silent = [], int(np.isnan(before).sum())
+    scored, unanswered = [], int(np.isnan(before).sum())
     begins = list(proposals(cls, block, points))
     own = (
         [k for k, p in begins[0].parameters.items() if k not in block.parameters and p.free] if begins else []
@@ -189,7 +189,7 @@ def best_starts(
             continue
         if not np.allclose(table, before, rtol=START_SAME, atol=0, equal_nan=True):
             # a model that runs away where the machine moved steadily comes after all that do not
-            lost = int(np.isnan(table).sum()) > silent
+            lost = int(np.isnan(table).sum()) > unanswered
             scored.append((lost, float(np.sum(np.log(left(table) + common))), len(scored), grown))
     scored.sort(key=lambda s: s[:3])
     bound = float(np.sum(np.log(size + common))) + 2 * len(points) * math.log(GIVE_UP_START)

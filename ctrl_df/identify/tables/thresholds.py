@@ -26,13 +26,13 @@ RIGID = (2e-3, 3e-4)
 """Deflection of bristles, as a share of the swing, below which they are rigid: when quick, when careful."""
 
 AS_DRY = 1e-6
-"""Relative difference up to which presliding that slips carries the dry friction of its block: rounding."""
+"""Relative difference up to which presliding that slips has the dry friction of its block: rounding."""
 
 CONFIRMED_ON_TABLE = 5
 """Candidates that are fitted to all points of a table."""
 
 POINTS, POINTS_COSTLY = 20, 10
-"""Points of a table for the first look, and for effects whose orbits take many times as long."""
+"""Points of a table for screening, and for effects whose orbits take many times as long."""
 
 TABLE_SIZES = (0.01, 0.05, 0.2, 0.7)
 """Sizes of an effect of which nothing is known, over those of the table."""
@@ -46,7 +46,7 @@ BALANCED_STARTS = 2
 """Starts of an effect on a table from which its forces are balanced: sizes apart may balance alike."""
 
 WORK_LOW = {"max_steps": 4_000, "averages": 8}
-"""Bounds on the work of one point of a forced orbit at the first look: a candidate far from the truth may
+"""Bounds on the work of one point of a forced orbit at screening: a candidate far from the truth may
 rattle or creep for ever."""
 
 WORK_MEDIUM = {"max_steps": 25_000, "averages": 8}

@@ -20,7 +20,7 @@ def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[
     size = np.linalg.norm(j, axis=0)
     for k, s in zip(names, size, strict=True):
         if s < FLAT_COLUMN * max(float(size.max()), NOTHING):
-            doubtful[k] = f"{k} leaves no trace in these data: its value is the start value."
+            doubtful[k] = f"{k} has no influence on these data: its value is the start value."
     live = [i for i, k in enumerate(names) if k not in doubtful]
     residual = float(found.weighted @ found.weighted) / max(len(found.weighted) - len(live), 1)
     covariance = np.full((len(names), len(names)), np.inf)
@@ -29,12 +29,12 @@ def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[
         for direction in vt[s < FLAT_SINGULAR * s[0]]:
             alike = [names[live[i]] for i in np.flatnonzero(np.abs(direction) > TAKES_PART)]
             for k in alike:
-                doubtful[k] = f"{' and '.join(alike)} cannot be told apart on these data. Fix one of them."
+                doubtful[k] = f"{' and '.join(alike)} cannot be distinguished on these data. Fix one of them."
         inverse = (vt.T / np.maximum(s, FLAT_INVERSE * s[0]) ** 2) @ vt
         unit = slope[live] / size[live]
         covariance[np.ix_(live, live)] = residual * inverse * np.outer(unit, unit)
     errors = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     for k, value in zip(names, values, strict=True):
         if k not in doubtful and errors[k] > abs(value) > 0:
-            doubtful[k] = f"{k} is less certain than it is large: these data do not determine it."
+            doubtful[k] = f"{k} has a standard error larger than its value: these data do not determine it."
     return covariance, errors, doubtful

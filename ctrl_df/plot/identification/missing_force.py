@@ -46,7 +46,7 @@ def missing_force_plot(missing, *, against="time", title=None, width=None) -> ct
             lines = [[points, means]]
             if not len(curve.points[0]):
                 ax.text(
-                    0.5, 0.6, f"the record tells of no missing {what}:\nnowhere larger than its uncertainty",
+                    0.5, 0.6, f"no missing {what} is significant:\nnowhere larger than its uncertainty",
                     transform=ax.transAxes, ha="center", va="bottom",
                 )  # fmt: skip
         ax.axhline(0.0, color="0.6", lw=0.7, zorder=0)

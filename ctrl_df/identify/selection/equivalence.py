@@ -1,7 +1,7 @@
-"""Candidates that do the same.
+"""Candidates that are equivalent.
 
-On these data: the outputs they make are the same within noise. By their laws: one of two such fits may have
-missed what the other found.
+On these data: their outputs agree within noise. By their laws: where one can represent the other, a fit of
+one may have missed the minimum that the other has found.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER
 from ..starting.like_another import like_another
 from ..starting.regression import motion_of
-from ..thresholds import NOTHING, TOLD_APART
+from ..thresholds import DISTINGUISHED, NOTHING
 from .thresholds import BUMP_LEFT, CONFIRMED, PASSED
 
 
-def alike_along(data: SegmentedData, block) -> Callable:
-    """Return ``alike(tried, other)``: the newest effect of a candidate such that it acts like another's.
+def matching_along(data: SegmentedData, block) -> Callable:
+    """Return ``matching(tried, other)``: the effect of a candidate with values that make it act as another.
 
     `data`, `block`: the motion, and the model that is driven along it.
     """
-    motion = motion_of(data.train, data.thin, block)
+    motion = motion_of(data.train, data.decimation, block)
     return lambda tried, other: like_another(
         tried.block.effects[-1], other.block.effects[-1], motion.x, motion.v
     )
 
 
-def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
-    """Begin candidates whose law can do what that of a better one does where that one ended.
+def restarted_from_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
+    """Start candidates from the fit of a better one whose law theirs can represent.
 
     A spring is a pendulum over a small angle; what breaks away is the limit of a narrow bump over speed: no
     force along the motion tells that.
@@ -44,7 +44,7 @@ def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block)
     found : sequence of CandidateFit
         Best first.
     data : SegmentedData
-        That they are fitted to.
+        The data that they are fitted to.
     block : Mechanism
         The model without them.
 
@@ -53,13 +53,13 @@ def begun_like_better(found: Sequence[CandidateFit], data: SegmentedData, block)
     list of CandidateFit
         In the same order.
     """
-    alike = alike_along(data, block)
+    matching = matching_along(data, block)
     pairs = [(t, best) for i, best in enumerate(found[:CONFIRMED]) for t in found[i + 1 :]]
-    likes = side_by_side(lambda pair: alike(*pair), pairs)
+    matches = side_by_side(lambda pair: matching(*pair), pairs)
     able = [
-        (*pair, like)
-        for pair, like in zip(pairs, likes, strict=True)
-        if like is not None or all(_breaks_away(t) for t in pair)
+        (*pair, match)
+        for pair, match in zip(pairs, matches, strict=True)
+        if match is not None or all(_breaks_away(t) for t in pair)
     ]
     fits = side_by_side(lambda a: cross_started(a[0], a[1], data, a[2]), able)
     nearest = {t.key: t for t in found}
@@ -75,8 +75,8 @@ def _breaks_away(tried: CandidateFit) -> bool:
     return effect.role == "friction" and bool(static_levels(type(effect)))
 
 
-def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_APART) -> bool:
-    """Whether two candidates' outputs differ by no more than the noise lets one see.
+def indistinguishable(first, second, noise: NoiseModel, *, nats: float = DISTINGUISHED) -> bool:
+    """Whether two candidates' outputs differ by less than the noise can distinguish.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def indistinguishable(first, second, noise: NoiseModel, *, nats: float = TOLD_AP
     noise : NoiseModel
         Of the better one's residual.
     nats : float
-        Log likelihood ratio that would tell them apart.
+        Log likelihood ratio that distinguishes them.
     """
     difference = [a - b for a, b in zip(first, second, strict=True)]
     power, _ = whitened_power(difference, noise)

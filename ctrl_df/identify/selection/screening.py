@@ -1,4 +1,4 @@
-"""Every effect tried coarsely: over short segments, by accelerations or over long segments where need be."""
+"""Screening: every effect fitted coarsely over short segments, or on accelerations, or over long segments."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..starting.screen import Screen
 from ..thresholds import BY_CHANCE, GROWTH
-from .alike import begun_like_better
-from .attempts import tried
+from .attempts import fit_effects
+from .equivalence import restarted_from_better
 from .evidence import ranked
 from .reference import Reference
 from .thresholds import (
@@ -28,8 +28,8 @@ from .thresholds import (
 
 
 @dataclass(frozen=True, eq=False)
-class FirstLook:
-    """How every effect is tried.
+class Screening:
+    """How every effect is screened.
 
     Attributes
     ----------
@@ -50,60 +50,60 @@ class FirstLook:
     disturbs: Callable[[float, SegmentedData], bool]
     executor: object = None
 
-    def of(self, at: Reference, told: Callable, stage: Callable) -> tuple[Reference, list[CandidateFit]]:
-        """Return every effect that can be added, fitted, the one with most evidence first, and by what.
+    def run(self, at: Reference, report: Callable, stage: Callable) -> tuple[Reference, list[CandidateFit]]:
+        """Return the reference of the search and every effect that can be added, fitted, best evidence first.
 
         Parameters
         ----------
         at : Reference
-            On which the search begins.
-        told : callable
-            ``told(at, found)`` hears of what is known on the way.
+            With which the search starts.
+        report : callable
+            ``report(at, found)`` receives intermediate results.
         stage : callable
-            Hears in words what is done.
+            Receives the name of every stage.
         """
-        stage(f"{len(self.classes)} effects tried over short segments")
-        begun = at
-        base, found = self._sampled(at, lambda screened: told(begun, screened))
-        told(at, found)
+        stage(f"{len(self.classes)} effects screened over short segments")
+        start = at
+        base, found = self._sampled(at, lambda screened: report(start, screened))
+        report(at, found)
         if self._disturbed(at, found):
             at = at.by_accelerations(self.free)
-            stage("the same by accelerations: disturbance forces outweigh the noise")
+            stage("screening repeated on accelerations: disturbance forces outweigh the noise")
             base, found = self._sampled(at)
-            told(at, found)
+            report(at, found)
         longest = at.segmentations[-1]
         there = base if at.data.disturbed else longest.reached(base)
         if there.rmse > GROWTH * (base.rmse if at.data.disturbed else min(base.rmse, at.nearest.rmse)):
-            # Short segments show nothing, long ones do: what is missing acts seldom, or slowly.
-            stage("the same over long segments")
+            # Short segments show nothing, long ones do: what is missing acts rarely, or slowly.
+            stage("screening repeated over long segments")
             far = replace(at, base=CandidateFit("", there))
             moved = _over_long_segments(far, base.rmse, found)
             if moved is not None:
-                # Fitted over them the model bends to what it lacks; short ones tell what its parameters are.
-                again = self._over(far, longest, there, longest.as_it_is(base), None)
+                # Over long segments what is missing biases the parameters; short ones give them right.
+                again = self._fitted_over(far, longest, there, longest.as_it_is(base), None)
                 found = _best_of(there, [*moved, *again])
-                told(far, found)
-            # what it is compared with from here on errs over these segments
+                report(far, found)
+            # further comparisons are over these segments
             back = CandidateFit("", at.data.moved(there))
             at = replace(at, base=min(at.base, back, key=lambda t: t.train.rmse))
         return (at.rebased(found, self.free) if found else at), found
 
     def rivals(self, at: Reference, model, names) -> list[CandidateFit]:
-        """Return effects that may do what the model of one effect more does, with evidence over it."""
+        """Return effects that may replace the last one of a model, with evidence over it."""
         data = at.data.sampled
         known = data.fit(model, names, iterations=RIVAL_STEPS, followed=RESTARTS_KEPT)
         about = data.moved(at.base.train, RIVAL_BASE_STEPS)
-        found = self._tried(at, data, about, self._short(at, data), reached=known.rmse)
+        found = self._fit_effects(at, data, about, self._short(at, data), reached=known.rmse)
         more = data.count(model, names) - data.count(at.base.block, self.free)
         return ranked(CandidateFit("", known), [replace(t, extra=t.extra - more) for t in found])[0]
 
     def _sampled(self, at: Reference, screened=None) -> tuple[FitResult, list[CandidateFit]]:
-        """Return the model and every effect fitted over every second of the segments that judge."""
+        """Return the model and every effect fitted over every second of the segments for validation."""
         data = at.data.sampled
         base = data.moved(at.base.train, RIVAL_BASE_STEPS)
-        return base, self._over(at, data, base, base, self._short(at, data), screened)
+        return base, self._fitted_over(at, data, base, base, self._short(at, data), screened)
 
-    def _over(
+    def _fitted_over(
         self,
         at: Reference,
         data: SegmentedData,
@@ -114,13 +114,13 @@ class FirstLook:
     ) -> list[CandidateFit]:
         """Fit every effect over one set of segments; return them with evidence over `base`, best first.
 
-        `about`: the model about which starts are sought; `short`, `screened`: see `tried`.
+        `about`: the model about which start values are sought; `short`, `screened`: see `fit_effects`.
         """
         before = CandidateFit("", base)
-        found = ranked(before, self._tried(at, data, about, short, screened))[0]
-        return ranked(before, begun_like_better(found, data, about.model))[0]
+        found = ranked(before, self._fit_effects(at, data, about, short, screened))[0]
+        return ranked(before, restarted_from_better(found, data, about.model))[0]
 
-    def _tried(
+    def _fit_effects(
         self,
         at: Reference,
         data: SegmentedData,
@@ -133,18 +133,18 @@ class FirstLook:
             return []
         screen = Screen(about, data)
         nominal = {k: self.nominal[k] for k in self.free if k in screen.block.parameters}
-        return tried(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
+        return fit_effects(self.classes, screen, short, self.free, nominal, self.executor, screened, reached)
 
     @staticmethod
     def _short(at: Reference, data: SegmentedData) -> SegmentedData:
         """Return the segments in which fits of effects with many minima begin: short ones, or `data`."""
-        # where short ones show noise alone (its rms, but for chance) no minimum is right
+        # where short ones show noise alone (its rms, within chance) no minimum is right
         most = (1 + BY_CHANCE / math.sqrt(2 * at.nearest.count)) * at.data.noise
         shows = at.nearest.rmse > most or at.data.disturbed
         return at.segmentations[0].sampled if shows else data
 
     def _disturbed(self, at: Reference, found) -> bool:
-        """Whether forces disturb the machine that no effect accounts for.
+        """Whether disturbance forces act that no effect explains.
 
         The baseline then errs over the shortest segments by far more than the sensor's noise, and so does the
         best candidate; an effect that is missing would take most of that away.

@@ -1,0 +1,433 @@
+"""The ladder: stepwise selection of effects, then a local search among the neighbours of its last model.
+
+In each step the effect that explains most is added (forward selection), and all earlier ones are examined
+again with it in the model (backward elimination). Where nothing more is found, every model that differs by
+one effect is tried; a better one, or one as good with fewer parameters, is where the ladder continues. No
+structure is visited twice, so that it ends.
+
+Where something remains that no effect explains, an effect added early may have stood in for several: the
+ladder then branches off again from the next best candidates of each step, and the better end counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any
+
+from ...blocks.effect import Effect
+from ...cached import cached_property
+from ...numerals import percent
+from ..course import COMPLETE, UNDER_WAY, Course
+from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
+from ..results.ladder import Step, Study, last_diagnosis, outcome
+from ..results.neighbours import ADD, Neighbour, Neighbours
+from ..selection.long_prediction import LongPrediction, long_prediction
+from ..selection.search import Search
+from ..selection.thresholds import CONFIRMED, SHOWS_HARDLY
+from ..selection.verdict import Diagnosed, diagnosed, is_significant
+from ..thresholds import FLOOR
+from .neighbours import Alternatives, Neighbourhood
+from .revision import Revision, revised
+from .structure import Structure, plainness
+from .thresholds import BRANCHES, STEPS_COMPARED
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A model that the ladder has visited, with its diagnosis.
+
+    Attributes
+    ----------
+    structure : Structure
+        Refitted.
+    search : Search
+    diagnosis : Diagnosis
+    steps : tuple of Step
+        The steps that led to it, with errors over the data on which it is validated; the last one is its own.
+    parent : Node or None
+        The node that it was reached from.
+    refused : str
+        Id of the best candidate where it was not added; empty where it may be.
+    """
+
+    structure: Structure
+    search: Search
+    diagnosis: Diagnosis
+    steps: tuple[Step, ...]
+    parent: Node | None = None
+    refused: str = ""
+
+    @property
+    def next(self) -> CandidateEffect | None:
+        """The effect to be added; None where there is none."""
+        ranking = self.diagnosis.ranking
+        if self.refused or not ranking or self.diagnosis.verdict == NONE:
+            return None
+        long = self._long_prediction
+        if long is not None and long.better:  # the best of them, or nothing where that is the model without
+            return next((c for c in ranking if c.id == long.better[0]), None)
+        return plainest(ranking) if is_significant(ranking[0], self.search) else None
+
+    @cached_property
+    def _long_prediction(self) -> LongPrediction | None:
+        """How the first candidate predicts over long horizons, compared with others and the model without it.
+
+        While several effects are missing, one whose hidden states are fitted anew in every segment may stand
+        in for all of them there, and predict nothing beyond. What predicts held-out data best need not be
+        best in short segments: where something remains unexplained it needs no evidence there.
+        """
+        least = -math.inf if self.diagnosis.verdict == UNKNOWN else self.search.significant
+        return long_prediction(self.diagnosis.ranking, self.diagnosis.baseline, least)
+
+    @property
+    def path(self) -> list[Node]:
+        """The nodes from the first to this one."""
+        return [*(self.parent.path if self.parent else ()), self]
+
+    def refusing(self, effect: str, doubt: str) -> Node:
+        """Return the same node with its best candidate not added, and the reason."""
+        remains = f"{self.diagnosis.remains} {doubt}" if self.diagnosis.remains else ""
+        found = replace(
+            self.diagnosis,
+            verdict=UNKNOWN,
+            doubts=(*self.diagnosis.doubts, doubt),
+            explanation=doubt,
+            remains=remains,
+        )
+        steps = (*self.steps[:-1], replace(self.steps[-1], diagnosis=found))
+        return replace(self, diagnosis=found, steps=steps, refused=effect)
+
+
+def plainest(ranking) -> CandidateEffect:
+    """Return the simplest of the candidates that the data hardly distinguish from the first."""
+    first, near = ranking[0], rivals(ranking)
+    same = [c for c in near if c.id in first.equivalents]
+    fewer = [c for c in near if plainness(c.effect)[0] < plainness(first.effect)[0]]
+    return min([first, *same, *fewer], key=lambda c: plainness(c.effect))
+
+
+class StepwiseSelection:
+    """The search for the effects of a model: forward, backward, among neighbours, and along other branches.
+
+    Parameters
+    ----------
+    dataset : Dataset
+    start : Mechanism
+    classes : sequence of effect classes
+        Candidates; what is found does not depend on their order.
+    free : callable
+        Parameters of a block that may be refitted.
+    max_effects : int
+        Most effects added.
+    executor : concurrent.futures.Executor or None
+    course : Course
+        Receives the `Study` as it stands.
+    """
+
+    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor, course: Course):
+        self.dataset, self.free, self.executor, self.course = dataset, free, executor, course
+        self.classes = sorted(dict.fromkeys(classes), key=lambda c: c.id)
+        self.max_effects = max_effects
+        self.start = Structure(start, len(start.effects))
+        self.visited: dict[tuple[str, ...], Node] = {}
+
+    def run(self) -> Study:
+        """Return the end of the ladder and its neighbours."""
+        end, neighbourhood = self._local_best(self._search_from(self.start, None))
+        for node, effect in islice(self._untried(end), BRANCHES):
+            if end.diagnosis.verdict != UNKNOWN:
+                break
+            other = self._branch(
+                end, node, effect, self._study(end.steps, end.search, UNDER_WAY, neighbourhood)
+            )
+            if other is not None:
+                end, neighbourhood = self._local_best(self._forward(other))
+        steps = self._refitted_in_full(end)
+        neighbourhood = replace(neighbourhood, nrmse=steps[-1].nrmse, nrmse_holdout=steps[-1].nrmse_holdout)
+        return self._study(steps, end.search, COMPLETE, neighbourhood)
+
+    def _refitted_in_full(self, end: Node) -> tuple[Step, ...]:
+        """Return the steps to an end, the last with the parameters of a refit to the whole records.
+
+        Where parts of the records are held out, that refit has seen them: the held-out error is then that of
+        the last fit that has not.
+        """
+        *steps, last = end.steps
+        self.course.stage("the parameters of the last model")
+        refitted = end.search.in_full()
+        again = None if refitted is None else end.search.final([refitted], self.free)
+        if again is None:
+            return end.steps
+        ((model, error, held),) = again
+        held = held if self.dataset.validation else last.nrmse_holdout
+        return (
+            *steps,
+            replace(last, model=model, nrmse=error, nrmse_holdout=held, parameters=_values(model)),
+        )
+
+    # --- forward, with backward elimination -------------------------------------------------------------
+
+    def _search_from(self, structure: Structure, parent: Node | None, how: dict | None = None) -> Node:
+        """Return the node at which selection from a structure ends."""
+        return self._forward(self._visit(structure, parent, how or {}))
+
+    def _forward(self, node: Node) -> Node:
+        """Add effects until nothing more is found; return the last node."""
+        while (best := node.next) is not None:
+            step = _step(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), _addition(best))
+            self._publish((*node.steps, step), node.search)
+            self.course.stage("earlier effects examined again")
+            revision = self._revised(node, best)
+            if revision.structure.key in self.visited:
+                break
+            how = _addition(best) | {"dropped": revision.dropped, "instead": revision.instead}
+            ahead = self._visit(revision.structure, node, how, step)
+            gain, held = self._compared(_extended_model(ahead), node.structure.block, ahead.search)
+            # a step that dropped or replaced others does not need the evidence of an additional effect
+            least = node.search.significant * (-1 if revision.dropped or revision.instead else 1)
+            if gain < least or held[0] > FLOOR * held[1]:
+                node = node.refusing(best.id, _refusal(best, held))
+                self.visited[node.structure.key] = node
+                break
+            node = ahead
+        return node
+
+    def _visit(
+        self,
+        structure: Structure,
+        parent: Node | None,
+        how: dict,
+        step: Step | None = None,
+        best: Study | None = None,
+    ) -> Node:
+        """Refit a structure and diagnose what it misses.
+
+        `step`: reported until that is known; `best`: reported meanwhile in its place, where a better model is
+        known.
+        """
+        steps = parent.steps if parent else ()
+        self.course.stage(f"step {len(steps)}: the model refitted")
+        search = self.dataset.search(structure.block, self.free(structure.block))
+        last = step or (steps[-1] if steps else None)
+
+        def step_of(found: Diagnosis) -> Step:
+            errors = found.nrmse, found.nrmse_holdout
+            if last is not None and not math.isfinite(errors[1]):  # not tried on what is held out yet
+                errors = last.nrmse, last.nrmse_holdout
+            return _step(found, found.model, errors, how)
+
+        def so_far(known: Diagnosed) -> Study:
+            return best or self._study((*steps, step_of(known.diagnosis)), known.search, UNDER_WAY)
+
+        room = len(structure.added) < self.max_effects
+        known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
+        found = known.diagnosis
+        self.course.stage("all models over the same data")
+        steps = self._on_common_data((*steps, step_of(found)), known.search)
+        node = Node(structure.at(found.model), known.search, found, steps, parent)
+        self.visited[structure.key] = node
+        return node
+
+    def _on_common_data(self, steps: tuple[Step, ...], search: Search) -> tuple[Step, ...]:
+        """Return steps with the errors of their models over the data on which the last one is validated."""
+        again = search.final([s.model for s in steps], self.free)
+        if again is None:
+            return steps
+        return tuple(
+            replace(s, model=m, nrmse=e, nrmse_holdout=h, parameters=_values(m))
+            for s, (m, e, h) in zip(steps, again, strict=True)
+        )
+
+    def _revised(self, node: Node, effect: CandidateEffect) -> Revision:
+        """Return the structure with an effect added and the earlier ones examined again."""
+        others = [c.effect for c in node.diagnosis.ranking if c is not effect and c.confirmed]
+        return revised(node.structure.plus(effect.model, others), node.search, self.free)
+
+    # --- local search -----------------------------------------------------------------------------------
+
+    def _local_best(self, end: Node) -> tuple[Node, Neighbours]:
+        """Move to better neighbours until there are none; return the last node and its neighbours."""
+        refound: set[tuple[str, ...]] = set()
+        for _ in range(self.max_effects):
+            neighbourhood, table = self._neighbourhood(end)
+            better = neighbourhood.better(self.visited, end.structure.key not in refound)
+            if better is None:
+                return end, table
+            structure, how = better
+            if structure.key == end.structure.key:
+                refound.add(structure.key)
+            end = self._search_from(structure, end, _exchange(how))
+        return end, self._neighbourhood(end)[1]
+
+    def _neighbourhood(self, end: Node) -> tuple[Neighbourhood, Neighbours]:
+        """Fit every neighbour of a model in which nothing more was found."""
+        self._publish(end.steps, end.search)
+        self.course.stage("every effect left out in turn")
+        neighbourhood = Neighbourhood(end.structure, end.search, self.free)
+        neighbourhood.add(end.diagnosis, end.refused)
+        neighbourhood.drop_each()
+        if end.diagnosis.verdict == UNKNOWN and len(end.structure.added) < self.max_effects:
+            neighbourhood.add_restarted(self._effects_on_path(end))
+        errors = end.search.errors(neighbourhood.own)
+        for place in reversed(range(len(end.structure.added))):
+            self._publish(end.steps, end.search, Neighbours(neighbourhood.rows(), *errors, complete=False))
+            self.course.stage(f"exchanges of {end.structure.added[place].id.replace('_', ' ')}")
+            neighbourhood.exchange(place, self._alternatives(end, place))
+        neighbourhood.merge()
+        table = Neighbours(neighbourhood.rows(), *errors)
+        self._publish(end.steps, end.search, table)
+        return neighbourhood, table
+
+    def _alternatives(self, end: Node, place: int) -> Alternatives:
+        """Return the candidates in the place of an effect, those of the step that added it or new ones."""
+        less, old = end.structure.without(place), end.structure.added[place]
+        node = self.visited.get(less.key)
+        if node is not None and node.diagnosis.ranking:
+            return _alternatives_at(node, old)
+        search = self.dataset.search(less.block, self.free(less.block))
+        model = end.structure.block
+        return Alternatives(
+            less, search.rivals(model, self.free(model), self.classes, self.executor), search.errors
+        )
+
+    def _effects_on_path(self, end: Node) -> list[Effect]:
+        """Return effects that left less error at an earlier step, with the values of the last such one."""
+        found: dict[str, Effect] = {}
+        for node in reversed(end.path[:-1]):
+            ranking = sorted(node.diagnosis.ranking, key=lambda c: c.nrmse)
+            for c in ranking:
+                if c.confirmed and c.nrmse < node.diagnosis.nrmse:
+                    found.setdefault(c.id, c.effect)
+        return list(found.values())[:CONFIRMED]
+
+    # --- other branches ---------------------------------------------------------------------------------
+
+    def _untried(self, end: Node) -> Iterator[tuple[Node, CandidateEffect]]:
+        """Yield candidates not followed on a path: the best of every step before the second of any.
+
+        Within a step they are in order of error: where several effects are missing none need stand out alone.
+        """
+        found = []
+        for node in end.path:
+            followed = node.next
+            named = {followed.id, *followed.equivalents} if followed is not None else set()
+            ranking = sorted((c for c in node.diagnosis.ranking if c.confirmed), key=lambda c: c.nrmse)
+            rank = 0
+            for c in ranking:
+                if c.id in named or not c.nrmse < SHOWS_HARDLY * node.diagnosis.nrmse:
+                    continue
+                named |= {c.id, *c.equivalents}
+                key = node.structure.plus(c.model).key
+                found.append(((rank, c.nrmse / node.diagnosis.nrmse, key), node, c))
+                rank += 1
+        for (_, _, key), node, c in sorted(found, key=lambda f: f[0]):
+            if key not in self.visited:
+                yield node, c
+
+    def _branch(self, end: Node, node: Node, effect: CandidateEffect, best: Study) -> Node | None:
+        """Visit the model with a rival of an earlier step; return it if it, or its best extension, is better.
+
+        `best`: reported meanwhile.
+        """
+        structure = self._revised(node, effect).structure
+        if structure.key in self.visited:
+            return None
+        gone, new = [e.id for e in end.structure.added], [e.id for e in structure.added]
+        how = {
+            "dropped": tuple(e for e in gone if e not in new),
+            "instead": tuple(e for e in new if e not in gone),
+            "evidence": effect.evidence - max(node.diagnosis.ranking[0].evidence, 0.0),
+        }
+        other = self._visit(structure, end, how, best=best)
+        return other if self._beats(_extended_model(other), end.structure.block, other.search) else None
+
+    def _beats(self, block, end, search: Search) -> bool:
+        """Whether a model is better than another on the data of a search, and no worse on those held out."""
+        evidence, held = self._compared(block, end, search)
+        return evidence > search.significant and not held[0] > FLOOR * held[1]
+
+    def _compared(self, block, other, search: Search) -> tuple[float, tuple[float, float]]:
+        """Return the evidence for a model over another on the data of a search, and both errors held out."""
+        old, new = (search.fitted(b, self.free(b), STEPS_COMPARED) for b in (other, block))
+        ranked = search.ranked_over(old, [new])[0]
+        return ranked.evidence, (search.errors(new)[1], search.errors(old)[1])
+
+    # --- reporting --------------------------------------------------------------------------------------
+
+    def _publish(self, steps, search: Search, neighbours: Neighbours | None = None) -> None:
+        self.course.known(self._study(steps, search, UNDER_WAY, neighbours))
+
+    def _study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
+        return Study(
+            tuple(steps), steps[-1].model, outcome(steps), search.relative(last_diagnosis(steps).noise),
+            self.start.block, self.dataset.records, self.dataset.validation, self.course.seconds, status,
+            neighbours or Neighbours(complete=False),
+        )  # fmt: skip
+
+
+def _step(found: Diagnosis, model, errors, how: dict) -> Step:
+    return Step(
+        model=model,
+        nrmse=errors[0],
+        nrmse_holdout=errors[1],
+        parameters=_values(model),
+        diagnosis=found,
+        **how,
+    )
+
+
+def _values(model) -> dict[str, float]:
+    return {k: p.value for k, p in model.parameters.items()}
+
+
+def _extended_model(node: Node):
+    """Return the model of a node with its best candidate: over long segments one may need the other."""
+    return node.structure.block if node.next is None else node.next.model
+
+
+def _refusal(effect: CandidateEffect, held: tuple[float, float]) -> str:
+    """Return why an effect was not added; `held`: errors on held-out data, with it and without."""
+    name = effect.id.replace("_", " ")
+    return (
+        f"{name.capitalize()} was not added: it improves the model on the segments on which the previous "
+        f"model was validated, but not on those chosen for the model with it (held-out error "
+        f"{percent(held[0])} with it, {percent(held[1])} without)."
+    )
+
+
+def _addition(effect: CandidateEffect) -> dict:
+    return {"effect": effect.id, "evidence": effect.evidence, "equivalents": effect.equivalents}
+
+
+def _exchange(n: Neighbour) -> dict:
+    if n.dropped == (n.added,):  # the same in a better minimum
+        return {"evidence": n.evidence}
+    if n.change == ADD:
+        return {"effect": n.added, "evidence": n.evidence}
+    return {"dropped": n.dropped, "instead": (n.added,) if n.added else (), "evidence": n.evidence}
+
+
+def _alternatives_at(node: Node, old) -> Alternatives:
+    """Return the diagnosis of a node as the candidates in the place of an effect that was then added."""
+    first = {t.key: t.evidence for t in node.search.screened}
+    own = next(
+        (c for c in node.diagnosis.ranking if c.confirmed and c.id == old.id), node.diagnosis.ranking[0]
+    )
+    entries = []
+    for c in node.diagnosis.ranking:
+        # those confirmed are validated on other segments than those screened
+        ahead = c.evidence - own.evidence if c.confirmed else first[c.id] - max(first.get(old.id, 0.0), 0.0)
+        entries.append(_Entry(c.model, ahead, (c.nrmse, c.nrmse_holdout), c.confirmed))
+    entries.sort(key=lambda e: (not e.confirmed, -e.evidence))
+    return Alternatives(node.structure, entries, lambda e: e.errors)
+
+
+@dataclass(frozen=True, eq=False)
+class _Entry:
+    block: Any
+    evidence: float
+    errors: tuple[float, float]
+    confirmed: bool
