@@ -15,7 +15,7 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.df import executors, work
 from ctrl_df.df.dispatch import method_for
-from ctrl_df.df.journal import lines_done
+from ctrl_df.df.saving.journal import lines_done
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # Python 3.12, with threads about
 

@@ -11,8 +11,9 @@ import ctrl_df as cdf
 from ctrl_df.blocks.mechanism import Mass, TwoMass, backlash_masses, friction_mass
 from ctrl_df.df.closed_form.backlash import BACKLASH_REGIMES, backlash_family
 from ctrl_df.df.closed_form.friction import FRICTION_REGIMES, friction_family
-from ctrl_df.df.forced_orbit.orbit_search import OrbitSearch
-from ctrl_df.df.forced_orbit.orbits import ORBIT_REGIMES, OrbitSolver, orbit_family
+from ctrl_df.df.forced_orbit.driven_block import DrivenBlock
+from ctrl_df.df.forced_orbit.orbits import OrbitSolver, orbit_family
+from ctrl_df.df.forced_orbit.regimes import ORBIT_REGIMES
 from ctrl_df.simulate.sampled import sampled
 
 
@@ -120,11 +121,10 @@ def friction_period(mass, force, kinetic, static, x0, A, omega, stop=None, resti
 
 
 def solved(b, A, omega):
-    """Answer of the solver and the state its orbit starts from."""
-    solver = OrbitSolver(OrbitSearch(b))
-    y, regime, residual = solver.solve(A, omega, 9)
-    assert residual < 1e-8, (regime, residual)
-    return y, regime, solver.previous.x
+    """Harmonics and regime of a point, and the state its orbit starts from."""
+    point = OrbitSolver(DrivenBlock(b)).solve(A, omega, 9)
+    assert point.residual < 1e-8, (point.regime, point.residual)
+    return point.harmonics, point.regime, point.after.state.x
 
 
 def disagreement(y, reference):
@@ -245,13 +245,13 @@ def test_smooth_compositions_repeat_and_agree(seed):
         (channel, 1000, block(Mass(m), viscous, saturation, cdf.InputDeadZone(dead), lag)),
     )
     for rates, steps, b in cases:
-        solver = OrbitSolver(OrbitSearch(b))
-        y, regime, residual = solver.solve(A, omega, 9)
+        point = OrbitSolver(DrivenBlock(b)).solve(A, omega, 9)
+        y, regime = point.harmonics, point.regime
         if regime.startswith(("aperiodic", "subharmonic")):  # rattle in the elastic gap
             assert rates is with_gap
             continue
-        reference, change = smooth_period(rates, solver.previous.x, A, omega, steps)
-        if solver.search.free_row:
+        reference, change = smooth_period(rates, point.after.state.x, A, omega, steps)
+        if point.after.laws.free_row:
             reference[0], change[[0] if len(change) < 4 else [0, 2]] = 0, 0
         size = abs(reference[1]) * A
         assert np.abs(change).max() < 1e-7 * size * max(1, omega), (rates.__name__, change)
@@ -301,7 +301,7 @@ def test_trial_states_that_run_away_leave_nothing_behind():
     y, regime, _ = orbit_family(soft, A, omega)
     assert {ORBIT_REGIMES[code] for code in regime.flat} == {"slip"}
     for k in range(2):
-        alone, _, _ = OrbitSolver(OrbitSearch(soft)).solve(A[k], omega[0], 9)
+        alone = OrbitSolver(DrivenBlock(soft)).solve(A[k], omega[0], 9).harmonics
         assert abs(alone[1] / y[k, 0, 1] - 1) < 2e-9  # measured 1e-11, beside these frequencies 5e-10
 
 

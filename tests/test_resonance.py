@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ctrl_df as cdf
-from ctrl_df.df.forced_orbit.orbit_search import OrbitSearch
+from ctrl_df.df.forced_orbit.driven_block import DrivenBlock
 from ctrl_df.df.forced_orbit.orbits import OrbitSolver
 
 
@@ -152,12 +152,11 @@ def shooting(rates, n, A, omega, x):
 def test_lightly_damped_cubic_spring_is_its_own_periodic_orbit(omega):
     b, k3 = 2e-3, 0.02
     plant = block(cdf.Mass(1), cdf.LinearSpring(100.0), cdf.Viscous(b), cdf.CubicSpring(k3))
-    solver = OrbitSolver(OrbitSearch(plant))
-    y, regime, _ = solver.solve(1.0, omega, 3)
+    point = OrbitSolver(DrivenBlock(plant)).solve(1.0, omega, 3)
     N, multiplier = shooting(
-        lambda x, F: (x[1], F - b * x[1] - 100 * x[0] - k3 * x[0] ** 3), 2, 1.0, omega, solver.previous.x
+        lambda x, F: (x[1], F - b * x[1] - 100 * x[0] - k3 * x[0] ** 3), 2, 1.0, omega, point.after.state.x
     )
-    assert regime == "smooth" and multiplier < 1 and abs(y[1] / N - 1) < 1e-7
+    assert point.regime == "smooth" and multiplier < 1 and abs(point.harmonics[1] / N - 1) < 1e-7
 
 
 def test_lightly_damped_elastic_joint_is_its_own_periodic_orbit():
@@ -166,15 +165,14 @@ def test_lightly_damped_elastic_joint_is_its_own_periodic_orbit():
         cdf.TwoMass(1.0, 2.0), cdf.Compliance(k, c), cdf.LinearSpring(10.0), cdf.QuadraticDrag(drag)
     )
     omega = math.sqrt(k * 1.5)
-    solver = OrbitSolver(OrbitSearch(plant))
-    y, regime, _ = solver.solve(3.0, omega, 3)
+    point = OrbitSolver(DrivenBlock(plant)).solve(3.0, omega, 3)
 
     def rates(x, F):
         pull = k * (x[2] - x[0]) + c * (x[3] - x[1])
         return x[1], pull / 2, x[3], F - pull - 10 * x[2] - drag * abs(x[3]) * x[3]
 
-    N, multiplier = shooting(rates, 4, 3.0, omega, solver.previous.x)
-    assert regime == "smooth" and multiplier < 1 and abs(y[1] / N - 1) < 1e-6
+    N, multiplier = shooting(rates, 4, 3.0, omega, point.after.state.x)
+    assert point.regime == "smooth" and multiplier < 1 and abs(point.harmonics[1] / N - 1) < 1e-6
 
 
 def test_friction_that_cannot_hold_an_undamped_resonance_is_said_to_diverge():

@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.df.family_file import read_arrays
-from ctrl_df.df.fingerprint import fingerprint
-from ctrl_df.df.journal import MAGIC, Journal, is_journal, lines_done
+from ctrl_df.df.saving.family_file import read_arrays
+from ctrl_df.df.saving.fingerprint import fingerprint
+from ctrl_df.df.saving.journal import MAGIC, Journal, is_journal, lines_done
 
 FRICTION = cdf.friction_mass(9, 5, 0.5)
 GAIN = 2.0
@@ -213,7 +213,7 @@ def test_names_and_places_are_not_in_the_fingerprint():
 STABLE = """
     import functools, math
     import control as ct, numpy as np, ctrl_df as cdf
-    from ctrl_df.df.fingerprint import fingerprint
+    from ctrl_df.df.saving.fingerprint import fingerprint
     table = {"b": np.arange(3.0), "a": {"x", "y", "z"}}
     class Law:
         def __init__(self): self.table = table

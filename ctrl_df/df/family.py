@@ -13,9 +13,9 @@ import numpy as np
 from ..checks import number, path_of
 from ..drawing import draw
 from ..table import Table
-from .family_file import FORMAT, read_arrays, write_arrays
-from .journal import is_journal, lines_done, read_header
 from .points import AtPairs
+from .saving.family_file import FORMAT, read_arrays, write_arrays
+from .saving.journal import is_journal, lines_done, read_header
 from .thresholds import ON_GRID
 
 

@@ -365,18 +365,18 @@ class ForcedOrbit(Method):
 
     def harmonics(self, A, omega, orders):
         """See `Method.harmonics`."""
-        from .forced_orbit import orbits
+        from .forced_orbit import orbits, regimes
 
         y, code, residual = orbits.orbit_family(
             self.block, A, omega, orders=orders, output=self.output, **self.options
         )
-        return y, named(code, orbits.ORBIT_REGIMES), residual
+        return y, named(code, regimes.ORBIT_REGIMES), residual
 
     def compiled(self) -> bool:
         """See `Method.compiled`."""
         from .forced_orbit import orbits
 
-        return not orbits.solver_for(self.block, self.output, **self.options).search.engine.calls_python
+        return not orbits.solver_for(self.block, self.output, **self.options).block.engine.calls_python
 
     def identity(self) -> tuple:
         """See `Method.identity`."""

@@ -266,7 +266,7 @@ FAMILIAR = 1e3
 BINS = 2
 """Decades of force and of frequency: within them sizes, up to A / omega^2, differ by `FAMILIAR`."""
 
-ACQUAINT_STEPS = 20_000
+SIZING_STEPS = 20_000
 """Steps of the run that shows the sizes of states which belong to no mechanism."""
 
 SIZE_AT_FIRST = 1e-3
@@ -278,13 +278,13 @@ WITHIN = 0.3
 NUDGE = 1e-3
 """Of the size of each coordinate: far above rounding, within the reach of Newton's method."""
 
-KNOCKS = ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2))
+GAP_STARTS = ((0.0, 0.0), (0.0, 0.7), (1.0, -0.4), (0.0, 1.3), (1.0, -0.2))
 """Face of a gap to begin at, and speed to leave it with over that which crosses it in a radian: none, and
 some below and above; one that stays in touch is enough."""
 
-KNOCKED, NUDGED, LATER, LATEST = 20, 30, 27, 40
-"""Periods followed after a knock, and after what breaks a symmetry then; where the first ones did not do, and
-before a motion is taken to have no period."""
+GAP_PERIODS, NUDGED, LATER, LATEST = 20, 30, 27, 40
+"""Periods followed from such a state, and after what breaks a symmetry then; where the first ones did not do,
+and before a motion is taken to have no period."""
 
 SETTLED_AT_FIRST, SETTLED_BETTER, SETTLED_AT_LAST = 3e-2, 0.1, 1e-5
 """Change from shot to shot, relative, at which a motion is taken to be near its orbit; by how much less it

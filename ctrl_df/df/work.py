@@ -11,11 +11,11 @@ from ..checks import executor as checked_executor
 from ..simulate.parallel import processors
 from .executors import by_executor, check_picklable
 from .family import Family
-from .family_file import FORMAT, place_for, read_arrays, write_arrays
-from .fingerprint import fingerprint
-from .journal import Journal, is_journal, read_header
 from .methods import Guarded, Method
 from .points import AtPairs, compute_part
+from .saving.family_file import FORMAT, place_for, read_arrays, write_arrays
+from .saving.fingerprint import fingerprint
+from .saving.journal import Journal, is_journal, read_header
 from .threads import Threads
 from .thresholds import HERE, LARGEST, LAW_ROWS
 

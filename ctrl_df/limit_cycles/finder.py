@@ -120,13 +120,20 @@ def find_limit_cycle(
 class _Attempts:
     """What was tried from one guess, or in one search, and how each try ended.
 
-    `merged`: the guess was shown to belong to no orbit; `centre`: orbits of every amplitude lie side by side.
+    `failures`: why tries closed no orbit; `merged`: the guess was shown to belong to none; `centre`: orbits
+    of every amplitude lie side by side.
     """
 
     tried: list[Try] = field(default_factory=list)
-    mismatches: list[float] = field(default_factory=list)
-    merged: bool = False
-    centre: bool = False
+    failures: list[NoClosure] = field(default_factory=list)
+
+    @property
+    def merged(self) -> bool:
+        return any(isinstance(why, Merged) for why in self.failures)
+
+    @property
+    def centre(self) -> bool:
+        return any(isinstance(why, Centre) for why in self.failures)
 
     def tell(self, start: str, outcome: str) -> None:
         """Take note of a try."""
@@ -134,9 +141,7 @@ class _Attempts:
 
     def failed(self, start: str, why: NoClosure) -> None:
         """Take note of a try that closed no orbit."""
-        self.centre = self.centre or isinstance(why, Centre)
-        self.merged = self.merged or isinstance(why, Merged)
-        self.mismatches.append(why.mismatch)
+        self.failures.append(why)
         self.tell(start, str(why))
 
     def none(self) -> NoOrbit:
@@ -268,18 +273,17 @@ class OrbitFinder:
 
     def _closed_path(self, attempts, path: Path, name):
         if path.end is End.MERGED:
-            attempts.merged = True
             a, w = path.solution
-            attempts.tell(
-                name,
+            why = (
                 f"it merges with the prediction at {a:.5g} @ {w:.5g} rad/s once {path.share:.0%} of the "
-                "harmonics are fed back",
+                "harmonics are fed back"
             )
+            attempts.failed(name, Merged(why))
             return None
         if path.end is not End.REACHED:
             attempts.tell(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)")
             return None
-        earlier = len(attempts.mismatches)
+        earlier = len(attempts.failures)
         (start,), period = path_starts(self.loop, path, 1), 2 * np.pi / path.omega
         orbit = self._closed(attempts, start, period, name)
         if orbit is None:
@@ -296,7 +300,10 @@ class OrbitFinder:
                 orbit is None or _distance(exact, *path.solution) < _distance(orbit, *path.solution)
             ):
                 orbit = exact
-        if orbit is None and min(attempts.mismatches[earlier:], default=np.inf) < NEAR_MISS:
+        if (
+            orbit is None
+            and min((why.mismatch for why in attempts.failures[earlier:]), default=np.inf) < NEAR_MISS
+        ):
             orbit = self._closed(
                 attempts,
                 start,
@@ -379,10 +386,9 @@ class OrbitFinder:
                 continue
             try:
                 return self.closing.close(recent[k].state, recent[k].time - recent[k - laps_per_period].time)
-            except Centre:
-                attempts.centre = True
-            except NoClosure:
-                pass
+            except NoClosure as why:
+                if isinstance(why, Centre):
+                    attempts.failures.append(why)
         return None
 
     def _simulated(self, attempts, x0, name, search_time=None):

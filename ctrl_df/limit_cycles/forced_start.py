@@ -75,7 +75,7 @@ def path_starts(loop: Any, path: Path, count: int) -> list[np.ndarray]:
     row = list(block.output_labels).index(loop.output_labels[0])
     period = 2 * np.pi / path.omega
     run = engine.run(
-        path.motion, period, harmonic_drive([path.waveform], path.omega),
+        path.motion.state, period, harmonic_drive([path.waveform], path.omega),
         period * np.arange(count) / count, **_options(period, path.waveform),
     )  # fmt: skip
     starts = []
@@ -91,7 +91,7 @@ def _forced_motion(loop, U, omega, wanted):
     if not block.nstates:
         if len(U) > 2:
             answer = responder(block, method_for(block))
-            Y = None if answer is None else answer[0](U, omega)
+            Y = None if answer is None else answer[0](U, omega)[0]
             if Y is not None:
                 return np.zeros(0), Y
         return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])

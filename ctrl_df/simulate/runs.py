@@ -135,9 +135,14 @@ def run_many(
     atol = 0.0 if atol is None else float(atol)
     height = max(rtol, HEIGHT) if height is None else float(height)
     how = How(int(order), float(rtol), atol, float(max_step), height)
-    work = _Work(groups, rows, drives, how, kept, states, events)
-    if any(g.engine.calls_python for g in groups):
+    alone = any(g.engine.calls_python for g in groups)
+    job = None if alone else parallel.flag()
+    stop = np.zeros(1, np.int64) if job is None else job
+    work = _Work(groups, rows, drives, how, kept, states, events, stop)
+    if alone:
         work.one_by_one()
+    elif job is not None:
+        work.as_job(processors() if threads is None else threads)
     else:
         work.on_threads(processors() if threads is None else threads)
     status = [STATUS[int(r)] for r in rows.reason]
@@ -181,16 +186,16 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, e
 
 
 class _Work:
-    """The runs of one call, done and to do."""
+    """The runs of one call, done and to do; all end soon once ``stop[0]`` is set."""
 
-    def __init__(self, groups, rows, drives, how, kept, states, events):
+    def __init__(self, groups, rows, drives, how, kept, states, events, stop):
         for array in (*drives, *(g.par for g in groups)):
             # compiled code takes them for that; the rows are made here
             if isinstance(array, np.ndarray):
                 assert array.flags.c_contiguous and array.flags.writeable
         self.groups, self.rows, self.drives, self.how = groups, rows, drives, how
         self.kept, self.states, self.logged = kept, states, events
-        self.stop = np.zeros(1, np.int64)
+        self.stop = stop
         self.log: list[tuple[np.ndarray, ...]] = []
         self.failed: dict[int, Exception] = {}
 
@@ -200,11 +205,7 @@ class _Work:
         return int(self.rows.max_steps.sum()) <= STEPS_ALONE
 
     def on_threads(self, threads: int) -> None:
-        """Make all runs, so many at once; a job makes its own, with the processors that have no job."""
-        flag = parallel.flag()
-        if flag is not None:
-            self._as_job(flag, threads)
-            return
+        """Make all runs, so many at once."""
         if self.small:
             self._work(deque(self._whole()))
             return
@@ -230,9 +231,9 @@ class _Work:
             wait(workers)
             raise
 
-    def _as_job(self, flag, threads: int) -> None:
+    def as_job(self, threads: int) -> None:
         """Make all runs in this thread, and in those of processors that have no job."""
-        self.stop, others = flag, 0 if self.small else min(parallel.spare(), threads - 1)
+        others = 0 if self.small else min(parallel.spare(), threads - 1)
         todo = deque(self._parts(1 + others) if others else self._whole())
         pool = parallel.pool(os.getpid(), parallel.processors(), "runs")
         helpers = [pool.submit(self._work, todo) for _ in range(min(others, len(todo) - 1))]
@@ -244,7 +245,7 @@ class _Work:
             wait(begun)
         for helper in begun:
             helper.result()
-        if flag[0]:
+        if self.stop[0]:
             raise parallel.Stopped
 
     def one_by_one(self) -> None:

@@ -58,8 +58,9 @@ def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
     amplitudes = np.asarray(amplitudes, dtype=float)
     if amplitudes.size == 0:
         return np.zeros((0, orders + 1), dtype=complex), np.zeros(0)
-    law = Law(f)
-    corners = find_corners(law, amplitudes.min(), amplitudes.max())
+    scan = scan_points(amplitudes.min(), amplitudes.max())
+    law = Law(f, scan)
+    corners = find_corners(law, scan)
     owner, left, right = _first_intervals(amplitudes, corners)
     k = np.arange(orders + 1)
     total = np.zeros((amplitudes.size, orders + 1))
@@ -96,16 +97,21 @@ def static_harmonics(f, amplitudes, orders: int = 9, rtol: float = 1e-10):
 
 
 class Law:
-    """A user's static law, called with arrays where that gives the same values, and checked for NaN."""
+    """A user's static law, called with arrays where that gives the same values, and checked for NaN.
 
-    def __init__(self, f):
+    Parameters
+    ----------
+    f : callable
+    probed : ndarray
+        Arguments among which it is asked for that.
+    """
+
+    def __init__(self, f, probed):
         self._f = f
-        self._arrays: bool | None = None
+        self._arrays = self._accepts_arrays(probed)
 
     def __call__(self, u):
         """Evaluate elementwise."""
-        if self._arrays is None:
-            self._arrays = self._accepts_arrays(u)
         y = self._as_array(u) if self._arrays else self._point_by_point(u)
         if not np.isfinite(y).all():
             bad = u.ravel()[np.argmin(np.isfinite(y.ravel()))]
@@ -141,11 +147,15 @@ class Law:
         return together.shape == single.shape and np.array_equal(together, single, equal_nan=True)
 
 
-def find_corners(law, smallest: float, largest: float, points: int = 401) -> np.ndarray:
-    """Locate kinks and jumps of `law` on [-largest, largest], as far as a scan shows them."""
+def scan_points(smallest: float, largest: float, points: int = 401) -> np.ndarray:
+    """Return arguments in [-largest, largest], evenly spaced and in ratios, at which corners show."""
     fine = np.geomspace(max(smallest, SCAN_LEAST * largest), largest, points // 4)
     side = np.unique(np.concatenate([fine, np.linspace(largest / points, largest, points)]))
-    u = np.concatenate([-side[::-1], [0.0], side])
+    return np.concatenate([-side[::-1], [0.0], side])
+
+
+def find_corners(law, u) -> np.ndarray:
+    """Locate kinks and jumps of `law`, as far as a scan of arguments `u`, ascending, shows them."""
     y = law(u)
     slope = np.diff(y) / np.diff(u)
     bend = np.abs(np.diff(slope))

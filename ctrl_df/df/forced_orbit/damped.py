@@ -10,6 +10,8 @@ mismatch). That costs several times as many shots: it is asked only where secant
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from ...simulate.engine import State
@@ -30,19 +32,24 @@ from ..thresholds import (
     SHORTENED,
     SQUARINGS_FINE,
 )
-from .newton import mismatch_of, newton_step_of, spectral_radius_of
-from .orbit_search import OutOfWork
+from .kernel.newton import mismatch_of, newton_step_of, spectral_radius_of
+from .orbit_search import ClosedOrbit, measure
+from .shots import OutOfWork, Shots
 
 
 def close_damped(
-    search, state: State, periods: int = 1, orders: int = 9, patient: bool = True, repelling: bool = False
-):
-    """Close an orbit from a state far off; return (state, error) of one that attracts, or None.
+    shots: Shots,
+    state: State,
+    periods: int = 1,
+    orders: int = 9,
+    patient: bool = True,
+    repelling: bool = False,
+) -> ClosedOrbit | None:
+    """Close an orbit from a state far off; return one that attracts, or None.
 
     Parameters
     ----------
-    search : OrbitSearch
-        Aimed at its point; keeps integrals, ends and event kinds of the orbit found.
+    shots : Shots
     state : State
     periods : int
         Of the force in one of the orbit.
@@ -54,39 +61,40 @@ def close_damped(
     repelling : bool
         Whether one that does not attract will do.
     """
-    if not len(search.symmetries.free):
+    s, at = shots.laws.symmetries, shots.laws.period_map
+    if not len(s.free):
         return None
-    known = search.shot.size.copy(), search.shot.jacobian.copy()  # left as the secant steps had them
-    shots = _Shots(search, state.mode, periods, FINE if patient else RTOL)
+    known = at.size.copy(), at.jacobian.copy()  # left as the secant steps had them
+    at.size[:] = 0.0
+    trials = _Trials(shots, state.mode.copy(), periods, FINE if patient else RTOL)
     try:
-        found = _solved(shots, search.symmetries.transform @ state.x, patient)
+        found = _solved(trials, s.transform @ state.x, patient)
         if found is None:
             return None
         y, error = found
-        radius = spectral_radius_of(search.shot.at, SQUARINGS_FINE)
+        radius = spectral_radius_of(at.at, SQUARINGS_FINE)
         if not repelling and not radius < 1.0 + NEUTRAL:
             return None
-        orbit = search.state_at(y, state.mode)
-        if search.mirrored and search.symmetries.shifts:
-            _center(search, orbit)
-        search.measure(orbit, periods, orders, FINE)
-    except RanOff:
+        begin = shots.state_at(y, state.mode)
+        if shots.mirrored and s.shifts:
+            begin = _centred(shots, begin)
+        return measure(shots, begin, error, periods, orders, FINE)
+    except RanAway:
         return None
     finally:
-        search.shot.size[:], search.shot.jacobian[:] = known
-    return orbit, error
+        at.size[:], at.jacobian[:] = known
 
 
-def _solved(shots, y, patient):
+def _solved(trials, y, patient):
     """Return coordinates of an orbit and the error that they have, or None; its Jacobian is the last one."""
-    f = shots.missed(y)
+    f = trials.missed(y)
     best, error, last = y, np.inf, np.inf
     for _ in range(DAMPED_STEPS):
-        size = shots.shot.size.copy()
-        step = shots.step(f) if shots.differentiate(y, f) else None
+        size = trials.size.copy()
+        step = trials.step(f) if trials.differentiate(y, f) else None
         if step is None:
             return None
-        now = shots.length(step, size)
+        now = trials.length(step, size)
         if not patient and now > REACH:
             return None
         if now < error:
@@ -95,90 +103,101 @@ def _solved(shots, y, patient):
         if now < BETTER * GOOD or rounding:
             break
         last = now
-        shorter = _shortened(shots, y, step, size, LEAST_SHARE[patient])
+        shorter = _shortened(trials, y, step, size, LEAST_SHARE[patient])
         if shorter is None:
             break
         y, f = shorter
-        if shots.rtol > FINE:
-            shots.rtol = FINE
-            f = shots.missed(y)
-    if shots.rtol > FINE:
+        if trials.rtol > FINE:
+            trials = replace(trials, rtol=FINE)
+            f = trials.missed(y)
+    if trials.rtol > FINE:
         return None
-    miss = shots.length(shots.missed(best), size)
+    miss = trials.length(trials.missed(best), size)
     closed = error < GOOD_LATE * GOOD or (error < POOR and miss < FINE_LATE * FINE)
     return (best, float(error)) if closed else None
 
 
-def _shortened(shots, y, step, size, least):
+def _shortened(trials, y, step, size, least):
     """Return coordinates a share of the step ahead, and what they miss; None where no share leads nearer.
 
     Nearer: with the same Jacobian the next step is shorter than this one, in sizes of where it began.
     """
-    share, now = 1.0, shots.length(step, size)
+    share, now = 1.0, trials.length(step, size)
     while share >= least:
-        trial = shots.clipped(y + share * step)
-        shots.shot.size[:] = size
+        trial = trials.clipped(y + share * step)
+        trials.size[:] = size
         try:
-            f = shots.missed(trial)
-            ahead = shots.step(f)
-        except RanOff:
+            f = trials.missed(trial)
+            ahead = trials.step(f)
+        except RanAway:
             ahead = None
-        if ahead is not None and shots.length(ahead, size) <= (1 - 0.25 * share) * now:
+        if ahead is not None and trials.length(ahead, size) <= (1 - 0.25 * share) * now:
             return trial, f
         share *= 0.5 if share > SHORTENED else 0.25
     return None
 
 
-def _center(search, orbit):
-    """Move free positions, in place, to where half a period mirrors them onto themselves."""
-    end = orbit.copy()
-    search.shoot(end, FINE)
-    for direction in search.symmetries.shifts:
+def _centred(shots, state):
+    """Return the state with free positions moved to where half a period mirrors them onto themselves."""
+    end, centred = shots.shoot(state, FINE).end, state.copy()
+    for direction in shots.laws.symmetries.shifts:
         at = np.flatnonzero(direction)[0]
-        orbit.x[direction] += 0.5 * (end.x[at] - orbit.x[at])
+        centred.x[direction] += 0.5 * (end.x[at] - state.x[at])
+    return centred
 
 
-class RanOff(Exception):
+class RanAway(Exception):
     """A trial shot left every bound."""
 
 
-class _Shots:
-    """Shots of a search from coordinates, at a tolerance `rtol`."""
+@dataclass(frozen=True, eq=False)
+class _Trials:
+    """Shots from coordinates in modes `mode`, over so many periods, at a tolerance `rtol`."""
 
-    def __init__(self, search, mode, periods, rtol):
-        self.search, self.mode, self.periods, self.rtol = search, mode.copy(), periods, rtol
-        self.free, self.shot = search.symmetries.free, search.shot
-        self.shot.size[:] = 0.0
+    shots: Shots
+    mode: np.ndarray
+    periods: int
+    rtol: float
+
+    @property
+    def size(self):
+        """Sizes of the coordinates, which shots take note of in the workspace."""
+        return self.shots.laws.period_map.size
+
+    @property
+    def free(self):
+        """Coordinates that have to repeat."""
+        return self.shots.laws.symmetries.free
 
     def clipped(self, y):
-        return np.clip(y, self.search.symmetries.lower, self.search.symmetries.upper)
+        s = self.shots.laws.symmetries
+        return np.clip(y, s.lower, s.upper)
 
     def missed(self, y):
         """Return end less start of one shot from y, in all coordinates; takes note of sizes."""
-        search, transform = self.search, self.search.symmetries.transform
-        state = search.state_at(y, self.mode)
-        begin = transform @ state.x
+        transform = self.shots.laws.symmetries.transform
+        state = self.shots.state_at(y, self.mode)
         try:
-            search.shoot(state, self.rtol, self.periods)
+            end = self.shots.shoot(state, self.rtol, self.periods).end
         except OutOfWork as stop:
-            if search.budget <= 0:
+            if self.shots.work.left <= 0:
                 raise
-            raise RanOff from stop
+            raise RanAway from stop
         except RuntimeError as error:  # a law asked where no motion leads may fail
-            raise RanOff from error
-        end = transform @ state.x
-        mismatch_of(self.shot.at, begin, end)
-        return end
+            raise RanAway from error
+        missed = transform @ end.x
+        mismatch_of(self.shots.laws.period_map.at, transform @ state.x, missed)
+        return missed
 
     def differentiate(self, y, f):
         """Take the Jacobian at y, whose shot misses by f; False where a shot fails."""
-        search, state = self.search, self.search.state_at(y, self.mode)
-        return search.differentiated(state, f, self.rtol, self.periods, CENTRAL)
+        state = self.shots.state_at(y, self.mode)
+        return self.shots.differentiate(state, f, self.rtol, self.periods, CENTRAL)
 
     def step(self, f):
         """Return Newton's step in all coordinates, zero where they are not free; None where singular."""
         change, step = np.zeros(len(self.free)), np.zeros(len(f))
-        if not newton_step_of(self.shot.at, f, change) or not np.all(np.isfinite(change)):
+        if not newton_step_of(self.shots.laws.period_map.at, f, change) or not np.all(np.isfinite(change)):
             return None
         step[self.free] = change
         return step

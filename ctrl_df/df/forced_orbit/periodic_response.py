@@ -3,27 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ...blocks.transparent import without_delays
-from ...simulate.engine import Engine
+from ...simulate.engine import Engine, State
 from ...simulate.program import layout
-from ..thresholds import WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE
+from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE
 from .damped import close_damped
-from .orbit_search import OrbitSearch, OutOfWork
+from .driven_block import DrivenBlock, Laws
+from .fourier import shifted
+from .orbit_search import ClosedOrbit, close_orbit
+from .shots import Force, OutOfWork, Shots, Work
 
 # Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)
 
 
-class PeriodicResponse:
-    """Forced periodic motions of one block, each started from the one before.
+@dataclass(frozen=True, eq=False)
+class ForcedState:
+    """A forced periodic motion: its state at t = 0, and the laws for motions of its size."""
 
-    Under one force there may be several. Who follows one of them keeps `motion` and sets it again before
-    going on from another point; without one, several starts are tried.
+    state: State
+    laws: Laws
+
+
+class PeriodicResponse:
+    """Forced periodic motions of one block.
+
+    Under one force there may be several. Who follows one of them passes on the motion that the last answer
+    came with; without one, several starts are tried.
 
     Parameters
     ----------
@@ -32,80 +44,79 @@ class PeriodicResponse:
         Output described.
     max_steps : int
         Bound on the work of one motion, in integration steps.
-
-    Attributes
-    ----------
-    motion : State or None
-        The motion last answered with, at t = 0.
     """
 
     def __init__(self, block, output, max_steps=60_000):
-        self.motion = None
+        self.max_steps = max_steps
         self.core: Any = block.core if isinstance(block, Mechanism) else None
         inner = without_delays(block)[0] if self.core is not None else block
         suited = not np.isin(Engine(inner).program.nodes[:, layout.KIND], _UNSUITED).any()
-        self.search: Any = OrbitSearch(block, output, max_steps=max_steps) if suited else None
+        self.block: Any = DrivenBlock(block, output) if suited else None
 
-    def __call__(self, U, omega: float):
-        """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, or None."""
-        return next(self._answers(U, omega), None)
+    def __call__(self, U, omega: float, motion: ForcedState | None = None):
+        """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, and its motion.
+
+        None and the motion given where there is no answer.
+        """
+        return next(self._answers(U, omega, motion), (None, motion))
 
     def nearest(self, U, omega: float, apart: Callable, near: float):
         """Return of the answers from all starts the one least ``apart(Y)``; the first one `near`."""
-        self.motion, best, least = None, None, np.inf
-        motion = None
-        for Y in self._answers(U, omega):
+        best, least = (None, None), np.inf
+        for Y, motion in self._answers(U, omega, None):
             if apart(Y) < least:
-                best, least, motion = Y, apart(Y), self.motion
+                best, least = (Y, motion), apart(Y)
             if least < near:
                 break
-            self.motion = None
-        self.motion = motion
         return best
 
-    def _answers(self, U, omega):
-        U, search = np.asarray(U, dtype=complex), self.search
-        if search is None:
+    def _answers(self, U, omega, motion):
+        U, omega, block = np.asarray(U, dtype=complex), float(omega), self.block
+        if block is None:
             return
-        search.aim(U, float(omega))
-        search.mirrored = False
-        for state, sought in self._starts():
-            orbit = self._closed(state, U.size - 1, **sought)
+        force = Force.of(U, omega)
+        laws = block.laws_for(force.A, omega, None if motion is None else motion.laws)
+        if motion is None or laws is not motion.laws:
+            laws.reset()
+        shots = Shots(block, laws, force, Work(self.max_steps))
+        for state, sought in self._starts(shots, motion):
+            orbit = self._closed(shots, state, U.size - 1, **sought)
             if orbit is not None:
-                self.motion = orbit
-                yield search.coefficients()
+                y = orbit.coefficients(shots)
+                offset = 0.0 if laws.free_row else block.offset
+                yield shifted(y, omega, delay=block.delay, offset=offset), ForcedState(orbit.state, laws)
 
-    def _starts(self) -> Iterator[tuple[Any, dict[str, Any]]]:
-        """States to start from: the last motion; if there is none, rest, or a knock against a gap's faces."""
-        search, core = self.search, self.core
+    def _starts(self, shots, motion) -> Iterator[tuple[Any, dict[str, Any]]]:
+        """States to start from: a motion; without one, rest, or some speed between the faces of a gap."""
+        core, engine = self.core, self.block.engine
         gap = 0.0 if core is None else core.gap
-        if self.motion is not None:
-            yield self.motion, dict(near=True)
+        if motion is not None:
+            yield motion.state, dict(near=True)
             if gap > 0:  # any other start may lead to another motion
-                yield self.motion, dict(periods=WAVE_PERIODS_GAP)
+                yield motion.state, dict(periods=WAVE_PERIODS_GAP)
                 return
-        n = search.engine.nstates
+        n = engine.nstates
         if core is None or gap == 0:
             for periods in (WAVE_PERIODS, WAVE_PERIODS_MORE):
-                yield search.engine.start(np.zeros(n)), dict(periods=periods)
+                yield engine.start(np.zeros(n)), dict(periods=periods)
             return
-        driven = search.A / (sum(core.masses) * search.omega)
-        crossing = gap * search.omega / np.pi  # one gap in half a period: the two-impact motion
+        omega = shots.force.omega
+        driven = shots.force.A / (sum(core.masses) * omega)
+        crossing = gap * omega / np.pi  # one gap in half a period: the two-impact motion
         for speed in (3.0 * driven, crossing, -crossing, 2.0 * crossing, -driven):
             x = np.zeros(n)
             x[2], x[3] = 0.5 * gap, speed
-            yield search.engine.start(x), dict(periods=WAVE_PERIODS_GAP, far=True)
+            yield engine.start(x), dict(periods=WAVE_PERIODS_GAP, far=True)
 
-    def _closed(self, state, orders, periods=0, near=False, far=False):
-        """Close an orbit, attracting or not, from where a state is after some periods; its state or None."""
-        search = self.search
+    def _closed(self, shots, state, orders, periods=0, near=False, far=False) -> ClosedOrbit | None:
+        """Close an orbit, attracting or not, from where a state is after some periods."""
         try:
             if periods:
-                search.resize(search.A)
-                state = search.iterate(state, periods)
-            orbit = search.periodic(state, orders=orders, repelling=True, near=near)
+                shots.reset_sizes()
+                state = shots.after(state, periods, COARSE)
+            orbit, _ = close_orbit(shots, state, orders=orders, repelling=True, near=near)
             if orbit is None and far:
-                orbit = close_damped(search, state, orders=orders, patient=False, repelling=True)
+                orbit = close_damped(shots, state, orders=orders, patient=False, repelling=True)
         except OutOfWork:
             return None
-        return None if orbit is None else orbit[0]
+        return orbit

@@ -3,52 +3,75 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
 
 import control as ct
 import numpy as np
 
 from ...blocks.elements.element import Element
 from ...blocks.primitives import PiecewiseAffine, Play, Quantizer
-from ...df.forced_orbit.periodic_response import PeriodicResponse
+from ...df.forced_orbit.periodic_response import ForcedState, PeriodicResponse
 from ...df.methods import ElementIntegrals, Method
 from .thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
 
 
-def responder(F, method: Method) -> tuple[Callable, int] | None:
-    """Return how the block answers a waveform, and the harmonics to keep; None where that is not known.
-
-    The steady-state response is a function ``steady_state(U, omega) -> Y``: coefficients k = 0, 1, ... of the
-    output for those of the input ``Re sum U_k exp(j k omega t)``; None where the block has no periodic
-    response. A block with dynamics may have several: it goes on from the one before (see `PeriodicResponse`).
-    """
+def responder(F, method: Method) -> tuple[Response, int] | None:
+    """Return the block's steady-state response to waveforms, and the harmonics to keep; None: not known."""
     if isinstance(method, ElementIntegrals):
         cells = _element_cells(method.block)
-        return None if cells is None else (_sampled(cells), STATIC_HARMONICS)
+        return None if cells is None else (SampledResponse(cells), STATIC_HARMONICS)
     law = method.law()
     if law is not None:
-        return _sampled(_cell_means(_pointwise(law))), STATIC_HARMONICS
+        return SampledResponse(_cell_means(_pointwise(law))), STATIC_HARMONICS
     if method.dynamic and isinstance(F, ct.NonlinearIOSystem):
         return PeriodicResponse(F, method.output), DYNAMIC_HARMONICS
     return None
 
 
-def _sampled(cells):
-    """Answer of a law on waveforms; `cells` maps samples of the input to means of the output between them.
+class Response(Protocol):
+    """Steady-state response of a block: harmonics out for harmonics in."""
+
+    def __call__(
+        self, U: np.ndarray, omega: float, motion: ForcedState | None = None
+    ) -> tuple[np.ndarray | None, ForcedState | None]:
+        """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, and the block's motion.
+
+        A block with dynamics may have several motions: the one near `motion` is sought. Y_k is None where
+        the block has no periodic response.
+        """
+        ...
+
+    def nearest(
+        self, U: np.ndarray, omega: float, apart: Callable, near: float
+    ) -> tuple[np.ndarray | None, ForcedState | None]:
+        """Return of several responses the one least ``apart(Y)``; the first one `near`."""
+        ...
+
+
+@dataclass(frozen=True)
+class SampledResponse:
+    """Response of a law on waveforms; `cells` maps samples of the input to means of the output between them.
 
     Means, not samples: a jump then moves the answer smoothly with its place instead of from sample to sample.
     """
 
-    def steady_state(U, omega):
+    cells: Callable
+
+    def __call__(self, U, omega, motion=None):
+        """See `Response`; there is no motion."""
         full = np.zeros(WAVE_SAMPLES // 2 + 1, dtype=complex)
         full[: U.size] = U * WAVE_SAMPLES / 2
         full[0] *= 2
         k = np.arange(U.size)
-        Y = np.fft.rfft(cells(np.fft.irfft(full, WAVE_SAMPLES)))[: U.size] * 2 / WAVE_SAMPLES
+        Y = np.fft.rfft(self.cells(np.fft.irfft(full, WAVE_SAMPLES)))[: U.size] * 2 / WAVE_SAMPLES
         Y *= np.sinc(k / WAVE_SAMPLES) * np.exp(-1j * np.pi * k / WAVE_SAMPLES)
         Y[0] /= 2
-        return Y
+        return Y, None
 
-    return steady_state
+    def nearest(self, U, omega, apart, near):
+        """See `Response`: there is one."""
+        return self(U, omega)
 
 
 def jumps(method: Method, amplitude: float) -> bool:

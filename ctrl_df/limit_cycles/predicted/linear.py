@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import control as ct
@@ -46,18 +48,20 @@ class LinearPart:
         self.H: Any = H  # control's stubs know less of it than it can
         self.measured = isinstance(H, ct.FrequencyResponseData)
         self.dt = 0.0 if not H.isdtime(strict=True) else (1.0 if H.dt is True else float(self.H.dt))
-        self.top = math.pi / self.dt if self.dt else math.inf
-        self.bottom = 0.0
-        if self.measured:
-            self._prepare()
+        top = math.pi / self.dt if self.dt else math.inf
+        self._curve = _MeasuredCurve.of(H) if self.measured else None
+        self.bottom, self.top = 0.0, top
+        if self._curve is not None:
+            self.bottom, self.top = self._curve.low, min(top, self._curve.high)
 
     def __call__(self, omega) -> np.ndarray:
         """Return H at `omega` [rad/s]; NaN at a pole; beyond measured data ValueError."""
         omega = np.asarray(omega, dtype=float)
         flat = omega.reshape(-1)
-        if self.measured:
+        if self._curve is not None:
             self._require_inside(flat)
-            return self._interpolate(flat).reshape(omega.shape)
+            x = np.clip(np.log(flat), np.log(self.bottom), np.log(self.top))
+            return np.asarray(self._curve.over_log(x), dtype=complex).reshape(omega.shape)
         s = np.exp(1j * flat * self.dt) if self.dt else 1j * flat
         with np.errstate(all="ignore"):
             value = np.asarray(self.H(s, squeeze=False, warn_infinite=False)).reshape(-1).astype(complex)
@@ -138,9 +142,29 @@ class LinearPart:
         top = self.top if self.dt else OMEGA_BEYOND * high
         return np.geomspace(min(low / OMEGA_BEYOND, top / OMEGA_SPAN), top, points)
 
-    def _prepare(self):
-        omega = np.asarray(self.H.omega, dtype=float)
-        value = np.asarray(self.H.frdata)[0, 0].astype(complex)
+    def _require_inside(self, omega):
+        slack = ON_EDGE
+        if omega.size and (omega.min() < self.bottom * (1 - slack) or omega.max() > self.top * (1 + slack)):
+            raise ValueError(
+                f"a measured H is known from {self.bottom:g} to {self.top:g} rad/s only; got omega from "
+                f"{omega.min():g} "
+                f"to {omega.max():g}. Keep omega inside the data, or fit a model to them."
+            )
+
+
+@dataclass(frozen=True)
+class _MeasuredCurve:
+    """Measured points of H, interpolated over ln omega from `low` to `high` [rad/s]."""
+
+    low: float
+    high: float
+    over_log: Callable
+
+    @classmethod
+    def of(cls, H) -> _MeasuredCurve:
+        """Interpolate the points of a measured H; ValueError for too few, or NaN among them."""
+        omega = np.asarray(H.omega, dtype=float)
+        value = np.asarray(H.frdata)[0, 0].astype(complex)
         keep = np.argsort(omega)
         omega, value = omega[keep], value[keep]
         positive = omega > 0
@@ -154,28 +178,12 @@ class LinearPart:
         from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
         make = CubicSpline if omega.size >= 4 else (lambda x, y: CubicSpline(x, y, bc_type="natural"))
-        self.bottom, top = float(omega[0]), float(omega[-1])
-        self.top = min(self.top, top)
-        x = np.log(omega)
+        low, high, x = float(omega[0]), float(omega[-1]), np.log(omega)
         smooth = (np.abs(value) > 0).all() and np.abs(np.angle(value[1:] / value[:-1])).max() < SMOOTH_STEP
         if smooth:  # magnitude and phase of a physical response run smoothly over log frequency
             log = make(x, np.log(np.abs(value)) + 1j * np.unwrap(np.angle(value)))
-            self._spline = lambda q: np.exp(log(q))
-        else:
-            self._spline = Akima1DInterpolator(x, value) if omega.size > 2 else make(x, value)
-
-    def _interpolate(self, omega):
-        x = np.clip(np.log(omega), np.log(self.bottom), np.log(self.top))
-        return np.asarray(self._spline(x), dtype=complex)
-
-    def _require_inside(self, omega):
-        slack = ON_EDGE
-        if omega.size and (omega.min() < self.bottom * (1 - slack) or omega.max() > self.top * (1 + slack)):
-            raise ValueError(
-                f"a measured H is known from {self.bottom:g} to {self.top:g} rad/s only; got omega from "
-                f"{omega.min():g} "
-                f"to {omega.max():g}. Keep omega inside the data, or fit a model to them."
-            )
+            return cls(low, high, lambda q: np.exp(log(q)))
+        return cls(low, high, Akima1DInterpolator(x, value) if omega.size > 2 else make(x, value))
 
 
 def _require_finite(H):

@@ -22,7 +22,7 @@ from enum import Enum
 import numpy as np
 
 from ...arclength import correction, tangent
-from ...simulate.engine import State
+from ...df.forced_orbit.periodic_response import ForcedState
 from .thresholds import (
     ASTRAY,
     NAMED,
@@ -70,8 +70,8 @@ class Path:
         Those of the block's output.
     folds : int
         Times the curve turned back.
-    motion : State or None
-        The block's motion at the end, at t = 0; None for a law without time.
+    motion : ForcedState or None
+        The block's motion at the end; None for a law without time.
     """
 
     end: End
@@ -80,7 +80,7 @@ class Path:
     waveform: np.ndarray
     answer: np.ndarray
     folds: int = 0
-    motion: State | None = None
+    motion: ForcedState | None = None
 
     @property
     def solution(self) -> tuple[float, float]:
@@ -109,15 +109,16 @@ def corrected_near(steady_state: Callable, harmonics: int, linear, amplitude, om
     """Balance all harmonics at once, from a guess at which no prediction need stand; None if that fails."""
     curve = _Curve(steady_state, harmonics, linear, amplitude, omega)
     z = curve.begin()
+    motion = curve.motion
     for share in (0.0, 0.5, 1.0):
         z[-1] = share
-        r, _ = curve.defect(z)
-        J = None if r is None else curve.jacobian(z, r)
-        found = None if J is None else curve.corrected(z, curve.level(), J)
+        r, _, motion = curve.defect(z, motion)
+        J = None if r is None else curve.jacobian(z, r, motion)
+        found = None if J is None else curve.corrected(z, curve.level(), J, motion)
         if found is None:
             return None
-        z, Y, J = found
-    return curve.path(End.REACHED, z, 1.0, Y, 0)
+        z, Y, J, motion = found
+    return curve.path(End.REACHED, z, 1.0, Y, 0, motion)
 
 
 class _Curve:
@@ -126,37 +127,23 @@ class _Curve:
     def __init__(self, steady_state, harmonics, linear, amplitude, omega):
         self.steady_state, self.harmonics, self.linear = steady_state, harmonics, linear
         self.first = np.log([amplitude, omega])
-        self.motion = None
-        self.kept = np.array([0, *range(2, harmonics + 1)])
-        self._begin(amplitude, omega)
+        self.kept, self.motion = self._begin(amplitude, omega)
         gain = linear.static_gain
         self.fixed_mean = bool(np.isnan(gain)) and not linear.measured
         self.static_gain = 0.0 if np.isnan(gain) else gain
 
     def _begin(self, amplitude, omega):
-        """Find the motion that the describing function names, and whether it answers odd waveforms oddly."""
+        """Return the harmonics kept, odd ones where the block answers these oddly, and the first motion."""
         U = np.zeros(self.harmonics + 1, complex)
         U[1] = amplitude
-        nearest = getattr(self.steady_state, "nearest", None)
-        if nearest is not None:  # of several, the one whose N balances H there
-            H = self.linear.clamped(np.array([omega]))[0][0]
-            nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), NAMED)
-        motion = self.motion
+        H = self.linear.clamped(np.array([omega]))[0][0]
+        # of several motions the one whose N balances H there: that which the describing function names
+        _, motion = self.steady_state.nearest(U, omega, lambda Y: abs(1 + H * Y[1] / amplitude), NAMED)
         U[3] = PROBE * amplitude
-        Y = self.steady_state(U, omega)
+        Y, _ = self.steady_state(U, omega, motion)
         if Y is not None and np.abs(Y[0::2]).max() < ODD * np.abs(Y).max():
-            self.kept = np.arange(3, self.harmonics + 1, 2)
-        self.motion = motion
-
-    @property
-    def motion(self):
-        """The block's motion last answered with, from which it goes on where it has several."""
-        return getattr(self.steady_state, "motion", None)
-
-    @motion.setter
-    def motion(self, motion):
-        if hasattr(self.steady_state, "motion"):
-            self.steady_state.motion = motion
+            return np.arange(3, self.harmonics + 1, 2), motion
+        return np.array([0, *range(2, self.harmonics + 1)]), motion
 
     def waveform(self, z):
         """Return U_k, a and omega of the unknowns."""
@@ -171,13 +158,16 @@ class _Curve:
         U[1] = a
         return U, a, float(np.exp(z[1]))
 
-    def defect(self, z):
-        """Return what is missing to the balance of each harmonic, and the block's answer or None."""
+    def defect(self, z, motion):
+        """Return what is missing to the balance of each harmonic, the block's answer, and its motion.
+
+        It is sought from a `motion` nearby. None twice, and that motion, where the block does not answer.
+        """
         U, a, omega = self.waveform(z)
-        Y = self.steady_state(U, omega)
+        Y, motion = self.steady_state(U, omega, motion)
         if Y is None or not np.isfinite(Y).all() or Y[1] == 0:  # it stands still: nothing goes around
-            return None, None
-        return self._defect(z, U / a, Y / a, omega), Y
+            return None, None, motion
+        return self._defect(z, U / a, Y / a, omega), Y, motion
 
     def _defect(self, z, V, y, omega):
         k = np.concatenate([[1], self.kept])
@@ -193,18 +183,16 @@ class _Curve:
         first = 1 + H[0] * y[1]
         return np.concatenate([[first.real, first.imag], r.real, r.imag[self.kept != 0]])
 
-    def jacobian(self, z, r):
+    def jacobian(self, z, r, motion):
         """Return the derivatives of the defect by all unknowns; None where the block does not answer."""
-        columns, motion = [], self.motion
+        columns = []
         for i in range(z.size):
-            self.motion = motion
             moved = z.copy()
             moved[i] += PATH_NUDGE if i < z.size - 1 or z[i] < 0.5 else -PATH_NUDGE
-            there, _ = self.defect(moved)
+            there, *_ = self.defect(moved, motion)
             if there is None:
                 return None
             columns.append((there - r) / (moved[i] - z[i]))
-        self.motion = motion
         return np.array(columns).T
 
     def begin(self):
@@ -222,17 +210,16 @@ class _Curve:
     def follow(self) -> Path:
         """Follow the curve from share 0 to 1, or back to 0."""
         z = self.begin()
-        r, Y = self.defect(z)
-        J = None if r is None else self.jacobian(z, r)
+        r, Y, motion = self.defect(z, self.motion)
+        J = None if r is None else self.jacobian(z, r, motion)
         border = self.level()
         if r is None or J is None:
-            return self.path(End.UNANSWERED, z, 0.0, np.zeros(self.harmonics + 1, complex), 0)
-        found = self.corrected(z, border, J)  # the prediction itself, to the accuracy of the samples
+            return self.path(End.UNANSWERED, z, 0.0, np.zeros(self.harmonics + 1, complex), 0, motion)
+        found = self.corrected(z, border, J, motion)  # the prediction itself, to the accuracy of the samples
         if found is None:
-            return self.path(End.STOPPED, z, 0.0, Y, 0)
-        z, Y, J = found
-        border = tangent(J, border)
-        motion = self.motion
+            return self.path(End.STOPPED, z, 0.0, Y, 0, motion)
+        z, Y, J, motion = found
+        border, near = tangent(J, border), motion  # `near`: the motion that the next step starts from
         step, share, folds, differenced = PATH_FIRST, 0.0, 0, False
         reason = End.STOPPED
         for _ in range(PATH_STEPS):
@@ -244,13 +231,13 @@ class _Curve:
                 target = 0.0
             if target is not None:
                 ahead = z + (target - z[-1]) / border[-1] * border
-                found = self.corrected(ahead, self.level(), J)
+                found = self.corrected(ahead, self.level(), J, near)
                 if found is not None and np.abs(found[0] - ahead).max() < 0.5:
-                    z, Y, J = found
+                    z, Y, J, motion = found
                     end = End.REACHED if target == 1.0 else End.MERGED
-                    return self.path(end, z, max(share, z[-1]), Y, folds)
+                    return self.path(end, z, max(share, z[-1]), Y, folds, motion)
             else:
-                found = self.corrected(ahead, border, J)
+                found = self.corrected(ahead, border, J, near)
             turned = None if found is None or target is not None else tangent(found[2], border)
             # a step that bends the curve sharply, or that went far to find it, is taken shorter
             if (
@@ -262,11 +249,11 @@ class _Curve:
                 step *= 0.5
                 if step < PATH_SHORTEST:
                     break
-                self.motion = motion  # what was tried may have led to another one
+                near = motion
                 if differenced:  # Newton's matrix is that of this point already
                     continue
-                fresh, _ = self.defect(z)
-                J = J if fresh is None else self.jacobian(z, fresh)
+                fresh, _, near = self.defect(z, motion)
+                J = J if fresh is None else self.jacobian(z, fresh, near)
                 if J is None:
                     reason = End.UNANSWERED
                     break
@@ -274,31 +261,31 @@ class _Curve:
                 continue
             if turned[-1] * border[-1] < 0.0:
                 folds += 1
-            z, Y, J = found
-            border, motion, differenced = turned, self.motion, False
+            z, Y, J, motion = found
+            border, near, differenced = turned, motion, False
             share = max(share, float(z[-1]))
             step = min(PATH_LONGER * step, PATH_LONGEST)
             if (np.abs(z[:2] - self.first) > PATH_REACH).any():
                 reason = End.LEFT
                 break
-        return self.path(reason, z, share, Y, folds)
+        return self.path(reason, z, share, Y, folds, motion)
 
-    def corrected(self, z, border, J):
-        """Newton onto the curve within the plane through z across `border`; (z, Y, J) or None."""
+    def corrected(self, z, border, J, motion):
+        """Newton onto the curve within the plane through z across `border`; (z, Y, J, motion) or None."""
         z = z.copy()
         offset = border @ z
-        r, Y = self.defect(z)
+        r, Y, motion = self.defect(z, motion)
         if r is None:
             return None
         fresh, before = False, np.inf
         for _ in range(PATH_NEWTON):
             size = float(np.abs(r).max())
             if size < PATH_CLOSED:
-                return z, Y, J
+                return z, Y, J, motion
             if size > SLOW[0] * before:
                 if fresh and size > SLOW[1] * before:
-                    return (z, Y, J) if size < PATH_LATE * PATH_CLOSED else None
-                J = self.jacobian(z, r)
+                    return (z, Y, J, motion) if size < PATH_LATE * PATH_CLOSED else None
+                J = self.jacobian(z, r, motion)
                 fresh = True
                 if J is None:
                     return None
@@ -306,7 +293,7 @@ class _Curve:
             change = correction(J, border, r, border @ z - offset)
             if np.abs(change).max() > 1.0:
                 return None
-            there, Y = self.defect(z + change)
+            there, Y, motion = self.defect(z + change, motion)
             if there is None:
                 return None
             if change @ change > 0:  # Broyden's update
@@ -314,7 +301,7 @@ class _Curve:
             z, r = z + change, there
         return None
 
-    def path(self, end, z, share, Y, folds) -> Path:
+    def path(self, end, z, share, Y, folds, motion) -> Path:
         """Return where the curve stands."""
         U, _, omega = self.waveform(z)
-        return Path(end, share, omega, U, Y, folds, self.motion)
+        return Path(end, share, omega, U, Y, folds, motion)

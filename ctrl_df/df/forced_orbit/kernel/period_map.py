@@ -14,19 +14,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...simulate.compiler.compiled import apart, njit, part
-from ...simulate.compiler.native import call_native, native_address
-from ...simulate.compiler.packed import Layout, address_of
-from ...simulate.compiler.views import lean
-from ...simulate.dynamics.flow import combine, refresh
-from ...simulate.dynamics.modes import settle
-from ...simulate.engine import harmonic_drive
-from ...simulate.kernel import driver
-from ...simulate.kernel.driver import copy
-from ...simulate.kernel.space import Space
-from ...simulate.program import layout as L
-from ...simulate.thresholds import HEIGHT
-from ..thresholds import (
+from ....simulate.compiler.compiled import apart, njit, part
+from ....simulate.compiler.native import call_native, native_address
+from ....simulate.compiler.packed import Layout, address_of
+from ....simulate.compiler.views import lean
+from ....simulate.dynamics.flow import combine, refresh
+from ....simulate.dynamics.modes import settle
+from ....simulate.engine import harmonic_drive
+from ....simulate.kernel import driver
+from ....simulate.kernel.driver import copy
+from ....simulate.kernel.space import Space
+from ....simulate.program import layout as L
+from ....simulate.thresholds import HEIGHT
+from ...thresholds import (
     CHATTER_ROOM,
     EVENS,
     FIRST_STALE,

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 
-from ...simulate.compiler.compiled import njit, part
-from ...simulate.compiler.native import call_native
-from ...simulate.compiler.views import lean
-from ...simulate.dynamics.matrices import multiply
-from ...simulate.kernel import driver
-from ...simulate.kernel.driver import copy
-from ..thresholds import ASIDE, PIVOT, STILL
+from ....simulate.compiler.compiled import njit, part
+from ....simulate.compiler.native import call_native
+from ....simulate.compiler.views import lean
+from ....simulate.dynamics.matrices import multiply
+from ....simulate.kernel import driver
+from ....simulate.kernel.driver import copy
+from ...thresholds import ASIDE, PIVOT, STILL
 from .period_map import coordinates, mismatch, period_map_at, place
 
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import math
 
-from ...simulate.compiler.compiled import njit, part
-from ...simulate.compiler.native import call_native
-from ...simulate.compiler.views import lean
-from ...simulate.kernel.driver import copy
-from ...simulate.program import layout as L
-from ...simulate.program.layout import Drive
-from ..thresholds import EVEN_LEAST, FIRST_LONGEST, SHOTS
+from ....simulate.compiler.compiled import njit, part
+from ....simulate.compiler.native import call_native
+from ....simulate.compiler.views import lean
+from ....simulate.kernel.driver import copy
+from ....simulate.program import layout as L
+from ....simulate.program.layout import Drive
+from ...thresholds import EVEN_LEAST, FIRST_LONGEST, SHOTS
 from .period_map import coordinates, period_map_at, place
 from .shooting import CLOSED
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import path_of
-from .thresholds import COMPRESSED
+from ...checks import path_of
+from ..thresholds import COMPRESSED
 
 FORMAT = 2
 """Of saved families: 1 to version 0.1.0; raised when files, or the numbers in them, change their meaning."""

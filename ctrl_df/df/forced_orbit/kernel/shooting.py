@@ -14,13 +14,13 @@ import math
 
 import numpy as np
 
-from ...simulate.compiler.compiled import apart, njit, part
-from ...simulate.compiler.native import call_native, native_address
-from ...simulate.compiler.views import lean
-from ...simulate.engine import harmonic_drive
-from ...simulate.kernel import driver
-from ...simulate.kernel.driver import copy
-from ..thresholds import (
+from ....simulate.compiler.compiled import apart, njit, part
+from ....simulate.compiler.native import call_native, native_address
+from ....simulate.compiler.views import lean
+from ....simulate.engine import harmonic_drive
+from ....simulate.kernel import driver
+from ....simulate.kernel.driver import copy
+from ...thresholds import (
     EXPECTED,
     FAR_OFF,
     JACOBIANS,
