@@ -139,7 +139,7 @@ def test_an_encoder_fitted_to_small_motions_is_found_in_large_ones():
 def candidate(id, fitted, held, same=()):
     """Return a candidate of a ranking with these log-likelihoods of its records."""
     return SimpleNamespace(
-        id=id, evidence=fitted + held, evidence_holdout=held, confirmed=True, equivalents=same
+        id=id, evidence=fitted + held, evidence_holdout=held, confirmed=True, equivalents=same, effect=id
     )
 
 
@@ -150,8 +150,10 @@ def candidate(id, fitted, held, same=()):
         (candidate("bristle", 100.0, 52.0), []),  # by chance
         (candidate("bristle", 400.0, 20.0), []),
         (candidate("bristle", 100.0, 90.0, same=("backlash",)), []),
+        (candidate("alike", 100.0, 90.0), []),  # the first in a wrong minimum
     ],
 )
 def test_a_rival_that_the_held_out_data_favour(rival, favoured):
     first = candidate("backlash", 500.0, 50.0, same=("bristle",) if rival.equivalents else ())
-    assert [c.id for c in favoured_held_out([first, rival], 5.0)] == favoured
+    search = SimpleNamespace(significant_validation=5.0, represents=lambda _, other: other == "alike")
+    assert [c.id for c in favoured_held_out([first, rival], search)] == favoured

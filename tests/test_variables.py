@@ -16,3 +16,10 @@ def test_a_positive_parameter_stays_within_its_limits(low, high):
     assert v.log
     for q in (-30.0, -1.0, 0.3, 30.0):
         assert math.isclose(v.p(v.clip(q)), min(max(v.p(q), low), high), rel_tol=1e-12)
+
+
+def test_a_value_that_is_next_to_nothing_has_no_size():
+    """A level of 5e-12 that the records bound to 125 N: scaled by itself no step would show in it."""
+    level = cdf.friction_mass(2.0, 1.0, 1.0).parameters["coulomb.level"]
+    bounded = Variable("level", level, 600.0, (125.0, 800.0), begin=5e-12)
+    assert bounded.scale == 125.0 and Variable("level", level, 600.0, begin=5e-12).scale == 600.0

@@ -50,7 +50,7 @@ def controller_force(loop, record: Measurement) -> np.ndarray:
             "channel 'reference'."
         )
     known, dt = facts(record), record.dt
-    some = np.arange(2 * POINTS_OF_A_SAMPLE * len(record)) / (2 * POINTS_OF_A_SAMPLE)
+    some = np.arange(POINTS_OF_A_SAMPLE * len(record)) / POINTS_OF_A_SAMPLE
     t = dt * some
     held = record.u[some.astype(int)]
     reference = held if record.input_hold == "zoh" else np.interp(some, np.arange(len(record)), record.u)

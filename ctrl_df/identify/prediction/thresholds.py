@@ -57,9 +57,9 @@ FAR_OUT, FAR_LIMIT = 10.0, 100.0
 MOST_SAMPLES = 0.75
 """Quantile of the distances from a decimated input: see `ROUGH`."""
 
-POINTS_OF_A_SAMPLE = 2
-"""Points of a sample over which the force of a controller is averaged: the mean of a parabola then errs by a
-quarter of what its value in the middle does."""
+POINTS_OF_A_SAMPLE = 4
+"""Points of a sample at which a controller's force is worked out; its mean is of every second, the middles
+of two halves: that of a parabola then errs by a quarter of what its value in the middle does."""
 
 FOLLOWED_AS_REFERENCE = 0.5
 """Spread of input minus output over that of the output, below which the input looks like a reference: values

@@ -189,6 +189,10 @@ class Search(ABC):
     def equivalent(self, a, b) -> bool:
         """Whether two confirmed candidates are equivalent on these data, within noise."""
 
+    def represents(self, effect, other) -> bool:
+        """Whether an effect can act as another one along the motion, with other values."""
+        return False
+
     def in_full(self):
         """Return the model without an effect as a whole refit has it; None: no better than it is."""
         return None

@@ -16,6 +16,8 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows
+from ..starting.like_another import like_another
+from ..starting.regression import motion_of
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
@@ -140,6 +142,11 @@ class StructureSearch(Search):
         if all(breaks_away_only(t, self.at.data.scales.speed) for t in (a, b)):
             return True
         return indistinguishable(a.outputs, b.outputs, self.at.noise)
+
+    def represents(self, effect, other) -> bool:
+        """Whether an effect can act as another one along the motion, with other values."""
+        motion = motion_of(self.at.data.train, self.at.data.decimation, self.at.base.block)
+        return like_another(effect, other, motion.x, motion.v) is not None
 
     # --- results --------------------------------------------------------------------------------------
 

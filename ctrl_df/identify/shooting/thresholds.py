@@ -55,6 +55,10 @@ OPEN_BOUND = 1e-3
 LOG_MOST = 40.0
 """Logarithm of a factor by which a parameter may be off its scale: 17 decades are any number."""
 
+NO_SIZE = 1e-9
+"""Size of a value over the natural one of its unit, up to which it is none: a derivative by one of that size
+would be lost in the rounding of what it changes."""
+
 NATURAL = 0.1
 """Size of a parameter that matters, over what the scales of a record make of its unit, but of a mass: a force
 of a tenth of the typical one. Steps and ranges begin with it where the model says nothing; half or twice of

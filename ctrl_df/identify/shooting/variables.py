@@ -15,7 +15,7 @@ from ...units import dimension, size
 from ..prediction.segments import Facts, facts
 from ..prediction.sensed import POSITION, sensed
 from ..prediction.values import in_record
-from .thresholds import LOG_MOST, NATURAL, OPEN_BOUND, PLACE_NOISE, SIZE_PRIOR, TIME_SAMPLES
+from .thresholds import LOG_MOST, NATURAL, NO_SIZE, OPEN_BOUND, PLACE_NOISE, SIZE_PRIOR, TIME_SAMPLES
 
 
 @dataclass(frozen=True)
@@ -85,12 +85,14 @@ class Variable:
         self.lower, self.upper = parameter.lower, parameter.upper
         # Bounded on both sides (a share, a restitution): linear. Strictly positive: logarithmic.
         self.log = parameter.strict and parameter.lower == 0 and math.isinf(parameter.upper)
-        self.scale = abs(self.begin) if self.begin != 0 else natural
         self.natural = natural
         if parameter.strict and not self.log:
             self.lower = parameter.lower + OPEN_BOUND
         if limits is not None:
             self.lower, self.upper = max(self.lower, limits[0]), min(self.upper, limits[1])
+        # of the value that it can have, where it begins; one that is next to nothing says nothing of a size
+        size = abs(min(max(self.begin, self.lower), self.upper))
+        self.scale = size if self.log or size > NO_SIZE * natural else natural
 
     def q(self, p: float) -> float:
         """Return the scaled value of a physical one."""
@@ -127,23 +129,18 @@ def variables_of(block, names, records, known: Facts, limits=None, own=frozenset
     if not names:
         return []
     table = block.parameters
-    limits = limits or {}
-    found = [
-        Variable(k, table[k], natural_scale(table[k].line_unit, known), limits.get(k), begin)
+    spans = dict(limits or {})
+    if isinstance(block, Mechanism):
+        seen = seen_by(block, records, known)
+        for key, effect in block.named_effects.items():
+            for name, (low, high) in effect.bounds(seen).items():
+                least, most = spans.get(f"{key}.{name}", (-math.inf, math.inf))
+                spans[f"{key}.{name}"] = max(least, low), min(most, high)
+    return [
+        Variable(k, table[k], natural_scale(table[k].line_unit, known), spans.get(k), begin)
         for k in names
         for begin in ([in_record(table[k].value, r.name) for r in records] if k in own else [table[k].value])
     ]
-    if isinstance(block, Mechanism):
-        seen = seen_by(block, records, known)
-        proved = {
-            f"{key}.{name}": span
-            for key, effect in block.named_effects.items()
-            for name, span in effect.bounds(seen).items()
-        }
-        for variable in found:
-            low, high = proved.get(variable.name, (-math.inf, math.inf))
-            variable.lower, variable.upper = max(variable.lower, low), min(variable.upper, high)
-    return found
 
 
 class Prior(NamedTuple):
