@@ -10,7 +10,7 @@ from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.simulate.beside import flow
 from ctrl_df.simulate.engine import Engine, constant_drive
 from ctrl_df.simulate.kernel import driver
-from ctrl_df.simulate.passages import strides
+from ctrl_df.simulate.section import intervals
 
 HARDENING = cdf.Mass(9.0, [cdf.Coulomb(5), cdf.Viscous(0.5), cdf.LinearSpring(200.0), cdf.CubicSpring(1e5)])
 A, OMEGA = np.linspace(8, 60, 5), np.linspace(6, 30, 5)
@@ -45,14 +45,14 @@ def test_work_on_threads_stops_where_one_part_fails():
         threads.on_threads(part, [(1,), (2,)], 2)
 
 
-def test_passages_are_those_of_single_runs():
+def test_crossings_are_those_of_single_runs():
     finder = OrbitFinder(cdf.closed_loop(cdf.pid(2000, 44250, 130), cdf.friction_mass(9, 5, 0.5, 5.5)))
     search, engine = finder.poincare, finder.engine
     state = search.start(search.starts.state(3 * search.starts.scale))
-    mine = strides(engine, state, search._signal, search.row, search.stride, np.inf, 1e-8)
+    mine = intervals(engine, state, search._signal, search.row, search.longest, np.inf, 1e-8)
     before = []
     for _ in range(70):  # more than are made in one call
-        ahead = 4 * (before[-1] - before[-2]) if len(before) >= 2 else search.stride
+        ahead = 4 * (before[-1] - before[-2]) if len(before) >= 2 else search.longest
         times = state.time + np.linspace(0.0, ahead, 129)
         run = engine.run(
             state,
@@ -63,13 +63,13 @@ def test_passages_are_those_of_single_runs():
             log=1,
             max_steps=400_000,
         )
-        state, stride = run.state, next(mine)
-        assert stride.passed == (run.reason == driver.SECTION)
-        assert np.isclose(stride.time, state.time, rtol=1e-12, atol=0)
-        assert np.allclose(stride.x, state.x, rtol=1e-9, atol=1e-12 * np.max(np.abs(state.x)))
+        state, interval = run.state, next(mine)
+        assert interval.crossed == (run.reason == driver.SECTION)
+        assert np.isclose(interval.time, state.time, rtol=1e-12, atol=0)
+        assert np.allclose(interval.x, state.x, rtol=1e-9, atol=1e-12 * np.max(np.abs(state.x)))
         peak = np.max(np.abs(run.outputs[: run.recorded, search.row]))
-        assert np.isclose(stride.peak, peak, rtol=1e-9)
-        if stride.passed:
+        assert np.isclose(interval.peak, peak, rtol=1e-9)
+        if interval.crossed:
             before.append(state.time)
 
 

@@ -404,7 +404,7 @@ def test_swings_of_a_law_fade_where_it_is_straight():
 
 
 def test_no_passage_is_lost_between_two_strides_of_samples():
-    """Strides of 1024 samples: a loop of 137 samples a swing, followed over many swings."""
+    """Intervals of 1024 samples: a loop of 137 samples a swing, followed over many swings."""
     H = ct.sample_system(ct.tf([30.0], [1, 3, 3, 1]), 2 * np.pi / np.sqrt(3) / 137, "zoh")
     response = cdf.describing_function_response(
         H, cdf.saturation(1.0), np.geomspace(1.01, 40, 12), np.geomspace(0.3, 10, 20)

@@ -22,13 +22,13 @@ class Settled:
     Attributes
     ----------
     omega : float
-        Swings a second times 2 pi [rad/s], averaged over the last third.
+        Periods a second times 2 pi [rad/s], averaged over the last third.
     force, position : float
         Fundamental amplitudes at that frequency [N], [m].
     peak : float
-        Half of the swing from end to end [m].
+        Half of the peak-to-peak value [m].
     trend : float
-        Swing of the last third over that of the third before.
+        Amplitude of the last third over that of the third before.
     """
 
     omega: float

@@ -161,5 +161,5 @@ def _crossings(key):
 def _end(run) -> Settled:
     end = settled(run)
     if end is None:
-        raise RuntimeError("a run of the demo came to rest that should swing; the engine has changed")
+        raise RuntimeError("a run of the demo came to rest that should oscillate; the engine has changed")
     return end

@@ -84,7 +84,7 @@ def describing_function(
 def quiet_describing_function(
     F, A, omega=None, num_points=100, zero_check=True, try_method=True, output=None, **options
 ):
-    """Return N as `describing_function` does, for callers that judge NaN and regimes by themselves."""
+    """Return N as `describing_function` does, for callers that treat NaN and regimes by themselves."""
     return _evaluated(F, A, omega, num_points, zero_check, try_method, output, options)[0]
 
 

@@ -132,10 +132,10 @@ MOST_TRIES, MOST_APART = 100, 4096
 """Recurrences that are tried; impacts between two states that recurrences are measured from."""
 
 POLISH_STEPS, POLISHED, POLISHED_LATE = 15, 1e-14, 1e-10
-"""Newton's steps for one lap; mismatch at which it is closed, at once or where it shrinks no more."""
+"""Newton's steps for one orbit; mismatch at which it is closed, at once or where it shrinks no more."""
 
-LAP_OFF = 0.01
-"""Time [rad] by which a lap may miss its half periods before it is another one."""
+PERIOD_OFF = 0.01
+"""Time [rad] by which an orbit may miss its half periods before it is another one."""
 
 DIVERGES = 10.0
 """Growth of the mismatch from step to step at which Newton's method is left."""
@@ -389,7 +389,7 @@ SHIFTS = {"place": 1.7, "speed": 0.37, "state": 0.83, "output": 3.7}
 IMPOSED_SAMPLES = 1024
 """A period: harmonics of a dry friction's square wave are then right to 1e-6 (the square of a step)."""
 
-LAPS, SETTLED, CREEPING = 64, 1e-8, 1e-3
+PERIODS_AT_MOST, SETTLED, CREEPING = 64, 1e-8, 1e-3
 """Periods at most until what is hidden repeats; its change over one, over the largest it is, that counts as
 none, and up to which an orbit that creeps on ever more slowly is taken for its limit, to that accuracy."""
 

@@ -23,11 +23,11 @@ class DescribingFunctionWarning(RuntimeWarning):
 
 _MEANING = {
     "stuck": "nothing moves",
-    "resonance": "undamped and driven at its natural frequency, it swings wider and wider",
+    "resonance": "undamped and driven at its natural frequency, its oscillation grows without bound",
     "diverged": "the state runs away",
     "work limit": "the motion had not settled when the bound on work was reached",
     "aperiodic": "the motion has no period: N is an average",
-    "drifting": "the motion travels steadily besides swinging: N leaves the travel out",
+    "drifting": "the motion travels steadily besides oscillating: N leaves the travel out",
     "unstable": "the forced motion repels: N belongs to a motion that no run shows",
 }
 

@@ -155,8 +155,8 @@ def tune_pid(
     Among the gains whose loop, where it is linear, is stable, crosses over within `bandwidth` and keeps its
     sensitivity below `max_sensitivity`, differential evolution looks for those without a limit cycle and,
     among these, for the greatest stiffness against slow forces, kp + ki / bandwidth; where every loop cycles,
-    for the smallest cycle. Each is judged by simulations from twelve starts, not by the describing function,
-    which is blind to the hunting that static friction causes.
+    for the smallest cycle. Each is evaluated by simulations from twelve starts, not by the describing
+    function, which is blind to the hunting that static friction causes.
 
     A loop is linear in the large if its block keeps its gain there (friction, gaps, dead zones are
     negligible then), else in the small (a saturation below its limits). A relay is linear nowhere.
@@ -317,7 +317,7 @@ def _where_linear(structure: Structure, omega) -> tuple[float, np.ndarray]:
             return at, np.broadcast_to(N[int(by_size[1] == at)], omega.shape)
     raise ValueError(
         f"{_OWNER} needs a block that keeps its gain for large or for small amplitudes: there the loop is "
-        f"linear, which bandwidth and margin are judged by. {shown(structure.block)} keeps none. Map the "
+        f"linear, which bandwidth and margin are taken from. {shown(structure.block)} keeps none. Map the "
         "gains of a relay with limit_cycle_map; tune a machine with friction and a limited input without "
         "the limit (block.without_effect), and verify with it."
     )

@@ -37,7 +37,7 @@ class Row:
         What the verdict rests on where there is no exact orbit to rest on: with which prediction this one
         merges, or what was tried and how each try ended.
     motion : Orbit or None
-        Where the simulation alone judges (a pure delay): the motion it settles to, averaged over its periods.
+        Where only a simulation can tell (a pure delay): the motion it settles to, averaged over its periods.
     """
 
     predicted: LimitCycle | None

@@ -38,9 +38,9 @@ from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
     AVERAGED_LEAST,
+    CROSSINGS_A_PERIOD,
     ENOUGH,
     EVENTS_KEPT,
-    LAPS,
     NEAR_MISS,
     NOTHING,
     RETURN_GONE,
@@ -236,7 +236,7 @@ class OrbitFinder:
     def _returns(self, x0, most=RETURNS):
         """Return times after which a simulation from a state comes near it again, nearest first."""
         course = self.poincare.iterate(x0, RETURNS, until_repeated=False)
-        span = course.crossings[-1].time if course.crossings else self.poincare.stride
+        span = course.crossings[-1].time if course.crossings else self.poincare.longest
         times = np.linspace(0.0, span, RETURN_POINTS)
         run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
         states = run.states[: run.recorded]
@@ -370,22 +370,22 @@ class OrbitFinder:
         return orbit
 
     def _closed_crossings(self, attempts, crossings):
-        """Close the orbit that a course's passages come nearest to repeating, after one period or a few."""
+        """Close the orbit that a course's crossings come nearest to repeating, after one period or a few."""
         recent = crossings[-RECENT_CLOSED:]
         least = REPEATS_LEAST * self.poincare.units
         size = np.maximum(np.max(np.abs([crossing.state for crossing in recent]), axis=0), least)
-        for laps_per_period in range(1, LAPS + 1):
+        for count in range(1, CROSSINGS_A_PERIOD + 1):
             apart = [
-                float(np.max(np.abs(recent[k].state - recent[k - laps_per_period].state) / size))
-                for k in range(laps_per_period, len(recent))
+                float(np.max(np.abs(recent[k].state - recent[k - count].state) / size))
+                for k in range(count, len(recent))
             ]
             if not apart:
                 continue
-            k = int(np.argmin(apart)) + laps_per_period
-            if apart[k - laps_per_period] > 0.5:
+            k = int(np.argmin(apart)) + count
+            if apart[k - count] > 0.5:
                 continue
             try:
-                return self.closing.close(recent[k].state, recent[k].time - recent[k - laps_per_period].time)
+                return self.closing.close(recent[k].state, recent[k].time - recent[k - count].time)
             except NoClosure as why:
                 if isinstance(why, Centre):
                     attempts.failures.append(why)
@@ -418,7 +418,7 @@ class OrbitFinder:
 
     # --- averages -----------------------------------------------------------------------------------------
 
-    def _averaged(self, x0, crossings, settled, swings=CROSSINGS_AVERAGED) -> Orbit | None:
+    def _averaged(self, x0, crossings, settled, periods=CROSSINGS_AVERAGED) -> Orbit | None:
         """Average over the periods after a transient, for motions that can only be simulated.
 
         The amplitude is that of the signal the block sees. A block that acts in continuous time sees the held
@@ -426,7 +426,7 @@ class OrbitFinder:
         prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
         """
         begin = self.engine.run(self.poincare.start(x0), crossings[-1].time, rtol=COURSE_RTOL, log=1).state
-        later = self.poincare.iterate(begin, min(swings, len(crossings)), until_repeated=False).crossings
+        later = self.poincare.iterate(begin, min(periods, len(crossings)), until_repeated=False).crossings
         count = len(later) - 1
         if count < AVERAGED_LEAST:
             return None

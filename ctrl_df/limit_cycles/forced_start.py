@@ -105,9 +105,9 @@ def _forced_motion(loop, U, omega, wanted):
         starts[0][0] = -reach
         if core.bodies == 2:
             starts[0][2] = -reach
-            for stretch, speed in FORCED_STARTS:
+            for place, speed in FORCED_STARTS:
                 x = starts[0].copy()
-                x[2] += stretch * core.gap
+                x[2] += place * core.gap
                 x[3] = speed * core.gap * omega
                 x[1] = (
                     -core.masses[1] / core.masses[0] * x[3]

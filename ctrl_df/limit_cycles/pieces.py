@@ -62,8 +62,8 @@ def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
         modes.append(mode)
 
     k = np.arange(1, path.answer.size)
-    swing = [np.linalg.solve(1j * m * path.omega * np.eye(n) - a, -b[:, 0]) for m in k]
-    x = np.real(np.array(swing).T @ (path.answer[1:] * np.exp(1j * k * path.omega * begin)))
+    response = [np.linalg.solve(1j * m * path.omega * np.eye(n) - a, -b[:, 0]) for m in k]
+    x = np.real(np.array(response).T @ (path.answer[1:] * np.exp(1j * k * path.omega * begin)))
     size = np.maximum(np.abs(x), VISIT_SIZE * np.abs(x).max())
     height = float(np.abs(path.waveform).sum())
     times = np.array(times)

@@ -38,7 +38,7 @@ FORCED_PERIODS, FORCED_STEPS = 40, 400_000
 """Of forced motion before it is measured, and their work."""
 
 FORCED_STARTS = ((0.1, 0.0), (0.5, 3.0), (0.5, -3.0))
-"""Stretch of a joint, over its gap, and speed over a gap a radian, from which motions are forced."""
+"""Relative position at a joint, over its gap, and speed over a gap a radian: starts of forced motions."""
 
 MEAN_SEEN = 1e-9
 """Mean of an output, over its harmonics, that an integrator has to hold."""
@@ -46,7 +46,7 @@ MEAN_SEEN = 1e-9
 # --- courses ----------------------------------------------------------------------------------------
 
 ENOUGH = 6
-"""Swings from which an orbit can be judged."""
+"""Crossings from which an orbit can be told."""
 
 RETURN_POINTS, RETURN_GONE, RETURN_NEAR = 4097, 0.1, 0.5
 """Instants among which a course's returns are sought; distance that is away, and near again."""
@@ -73,9 +73,9 @@ shifted."""
 LEFT_ALONE = (0.2, 5)
 """Amplitude of a simulation beside an orbit, over the orbit's, that has not left it."""
 
-RETURNS, LAPS, AVERAGED_LEAST = 4, 4, 4
-"""Returns of a course that are tried as periods, passages that one period may have, and periods of an average
-that are shown, and needed."""
+RETURNS, CROSSINGS_A_PERIOD, AVERAGED_LEAST = 4, 4, 4
+"""Returns of a course that are tried as periods, crossings that one period may have, and periods of an
+average that are shown, and needed."""
 
 MET_LEAST = 8
-"""Passages of a verifying simulation at least."""
+"""Crossings of a verifying simulation at least."""

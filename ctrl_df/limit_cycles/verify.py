@@ -21,7 +21,7 @@ CONFIRMED, SHIFTED = "confirmed", "shifted"
 NONE, NOT_FOUND, UNTESTED = "no such orbit", "not found", "not tested"
 MISSED = "missed by the describing function"
 
-DELAYED = "A pure delay stands in the loop: no exact orbit is computed, the simulation judges."
+DELAYED = "A pure delay stands in the loop: no exact orbit is computed, only a simulation."
 
 _UNHELD = "Newton from the motion it stands on closes no orbit near"
 
@@ -47,8 +47,8 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     Check
         ``.rows``, ``.table()``, ``.orbits``, ``.fate``. Where the loop cannot be simulated (H is measured
         points, or more improper than a PID) rows say ``not tested`` and ``.note`` why. In a loop with a pure
-        delay, whose state is a history, no exact orbit is computed: the simulation judges, and ``.why`` says
-        how. An unstable cycle cannot be seen that way and stays ``not tested``.
+        delay, whose state is a history, no exact orbit is computed: the prediction is compared with a
+        simulation, and ``.why`` says how. An unstable cycle cannot be seen that way and stays ``not tested``.
 
     Examples
     --------

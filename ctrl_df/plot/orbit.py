@@ -10,7 +10,7 @@ from .parts.events import mark_events, shade_sticking
 from .parts.page import legend_above, page
 
 _SMALL = 0.1  # [m, rad]: below it motions are drawn in thousandths
-_CLOSED = 1e-3  # gap between the ends of an orbit, over its swing, that nobody sees
+_CLOSED = 1e-3  # gap between the ends of an orbit, over its extent, that nobody sees
 
 
 def orbit_plot(orbit, *, ax=None, title=None, width=None, **line) -> ct.ControlPlot:

@@ -32,11 +32,11 @@ ROOT = 1e-15
 """Share of a step, and of the size of a margin, to which a root is found: five eps."""
 
 ROUNDED = 1e-12
-"""Relative error of a sum of many rounded terms: five thousand eps. A margin, a jump, the rest of a stretch
+"""Relative error of a sum of many rounded terms: five thousand eps. A margin, a jump, the rest of an interval
 that is smaller is zero."""
 
 SHORTEST = 1e-12
-"""Share of the span of a run: no step or stretch between events shorter than that is progress."""
+"""Share of the span of a run: no step or interval between events shorter than that is progress."""
 
 ALGEBRAIC = 1e-12
 """Determinant of a loop of gains, equal to one without any, below which inputs are wired to themselves."""
@@ -83,8 +83,8 @@ FIRST_LEAST, FIRST_BLIND = 1e-9, 1e-6
 steps, each five times the last, lead from it to any length."""
 
 FADING = 0.98
-"""What is left of a state's size after a step: over fifty steps, more than a swing takes, tolerances do not
-tighten while a state passes zero."""
+"""What is left of a state's size after a step: over fifty steps, more than half a period takes, tolerances do
+not tighten while a state passes zero."""
 
 DENSE = 1e-3
 """Error of a step, times its tolerance, below which a lower order is tried."""
@@ -295,7 +295,7 @@ CHUNK_TIME, CHUNK_LEAST, CHUNK_CHANGE = 0.2, 1e-6, (0.05, 4.0)
 clock tells; least and largest change of the number of steps in it."""
 
 STEPS_AT_ONCE, STEPS_AT_ONCE_MANY = 10_000, 100_000
-"""Steps of a small system until the pace is known, and where many runs or strides are made in one call."""
+"""Steps of a small system until the pace is known, and where many runs or intervals are made in one call."""
 
 SMALL, FEWEST_STEPS = 6, 10
 """States of a small system: twice as many take four times as long; steps at once at least."""
@@ -309,11 +309,11 @@ EVENTS, LOGS = 256, 16
 LOG = 4096
 """Events of a single run between two returns to Python."""
 
-TOGETHER_RUNS, TOGETHER_STRIDES, SPLITS = 256, 64, 64
-"""Runs, strides in one call; kinds of systems in a batch, beyond which they are packed one by one."""
+TOGETHER_RUNS, TOGETHER_INTERVALS, SPLITS = 256, 64, 64
+"""Runs, intervals in one call; kinds of systems in a batch, beyond which they are packed one by one."""
 
-STRIDE_STEPS, STRIDE_PEEKS = 400_000, 129
-"""Steps of a stride at most; points in it, thirty a passage, from which the peak of an output is read."""
+INTERVAL_STEPS, PEAK_SAMPLES = 400_000, 129
+"""Steps of a interval at most; points in it, thirty a crossing, from which the peak of an output is read."""
 
 LARGEST = 2 << 30
 """Memory [bytes] of the outputs and states of a batch."""

@@ -141,7 +141,7 @@ class BacklashAttractor:
     sustained_contact : bool
         Whether chatter completes.
     multiplier : float
-        Largest modulus over one lap (half a period of a symmetric motion); NaN if aperiodic or free.
+        Largest modulus over one orbit (half a period of a symmetric motion); NaN if aperiodic or free.
     residual : float
         As in `backlash_family`.
     share : float
@@ -196,15 +196,15 @@ def backlash_attractors(A, restitution, phases=8, speeds=5, periods=600, transie
         radius = trial[6] if trial[0] == 1 else math.nan
         found.append([_attractor(IMPACT, out, A, 1.0, 2.0, False, radius, closing), 0])
     for phi, w in starts:
-        status, lap, count, phi, w, contact, radius, closing = _settle(A, eps, phi, w, int(transient))
+        status, halves, count, phi, w, contact, radius, closing = _settle(A, eps, phi, w, int(transient))
         out[:] = 0.0
         if status == 2:
             item = _attractor(FREE, out, A, 1.0, 0.0, False, math.nan, 0.0)
         elif status == 1:
             _measure(A, eps, phi, w, count, out)
-            length = 0.5 * lap if lap % 2 == 0 else (1.0 if lap == 1 else float(lap))
-            rate = 2.0 * count / lap
-            item = _attractor(_name(lap, contact), out, A, length, rate, bool(contact), radius, closing)
+            length = 0.5 * halves if halves % 2 == 0 else (1.0 if halves == 1 else float(halves))
+            rate = 2.0 * count / halves
+            item = _attractor(_name(halves, contact), out, A, length, rate, bool(contact), radius, closing)
         else:
             spread = _average(A, eps, phi, w, int(periods), out)
             item = _attractor(APERIODIC, out, A, math.nan, math.nan, False, math.nan, spread)
@@ -257,11 +257,11 @@ def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
         regime[j], residual[j], least = FREE, 0.0, np.inf
         for n in range(starts.shape[0]):
             w = starts[n, 1] * (1.0 + A)
-            status, lap, count, phi, w, contact, _, closing = _settle(A, eps, starts[n, 0], w, transient)
+            status, halves, count, phi, w, contact, _, closing = _settle(A, eps, starts[n, 0], w, transient)
             if status == 1:
                 out[:] = 0.0
                 _measure(A, eps, phi, w, count, out)
-                regime[j], residual[j] = _name(lap, contact), closing
+                regime[j], residual[j] = _name(halves, contact), closing
                 break
             if status == 0:
                 mean[:] = 0.0
@@ -275,12 +275,12 @@ def _row(scaled, eps, periods, transient, starts, harmonics, regime, residual):
 
 
 @njit(cache=True)
-def _name(lap, contact):
-    """Index into `BACKLASH_REGIMES` of a motion that closes after `lap` half periods."""
-    if lap == 1:
+def _name(halves, contact):
+    """Index into `BACKLASH_REGIMES` of a motion that closes after `halves` half periods."""
+    if halves == 1:
         return CONTACT if contact else IMPACT
-    if lap == 2:
+    if halves == 2:
         return ASYMMETRIC
     # an odd number of half periods mirrors the motion: it repeats after twice as many
-    periods = lap if lap % 2 == 1 else lap // 2
+    periods = halves if halves % 2 == 1 else halves // 2
     return min(FREE - 1 + periods, FREE + MOST_PERIODS - 2)

@@ -200,28 +200,29 @@ class _Followed:
 
     def __init__(self, eps, motion):
         self.eps = eps
-        self.lap, self.count, self.contact = int(motion[1]), int(motion[2]), bool(motion[3])
+        self.halves, self.count, self.contact = int(motion[1]), int(motion[2]), bool(motion[3])
         parts = []
         for step in (-FOLLOWED, FOLLOWED):
             nodes = np.zeros((MOST_NODES, 5))
             kept = _follow(
-                motion[0], eps, motion[4], motion[5], self.count, self.lap, self.contact, step, nodes
+                motion[0], eps, motion[4], motion[5], self.count, self.halves, self.contact, step, nodes
             )
             parts.append(nodes[:kept])
         self.nodes = np.concatenate([parts[0][:0:-1], parts[1]])  # ln A, phi, w, n
         self.nodes[:, 1] = np.unwrap(self.nodes[:, 1])
         low, high = self.nodes[0, 0], self.nodes[-1, 0]
         self.grid = np.linspace(low, high, max(6, math.ceil((high - low) / GRID_STEP)))
-        self.regime = BACKLASH_REGIMES[_name(self.lap, self.contact)]
-        period = "a period" if self.lap <= 2 else f"in {self.lap / (1 if self.lap % 2 else 2):g} periods"
-        impacts = self.count * (2 if self.lap % 2 else 1)
+        self.regime = BACKLASH_REGIMES[_name(self.halves, self.contact)]
+        periods = self.halves / (1 if self.halves % 2 else 2)
+        period = "a period" if self.halves <= 2 else f"in {periods:g} periods"
+        impacts = self.count * (2 if self.halves % 2 else 1)
         how = f"{self.regime.split()[0]} motion of {impacts} impacts {period}"
         self.name = "motion with complete chatter" if self.contact else how
 
     def holds(self, motion) -> bool:
         """Whether a motion met lies on this curve."""
         s = math.log(motion[0])
-        if (motion[1], motion[2], motion[3]) != (self.lap, self.count, self.contact) or not (
+        if (motion[1], motion[2], motion[3]) != (self.halves, self.count, self.contact) or not (
             self.nodes[0, 0] - FOLLOWED_LEAST <= s <= self.nodes[-1, 0] + FOLLOWED_LEAST
         ):
             return False
@@ -233,7 +234,7 @@ class _Followed:
         exists, multiplier = np.zeros(s.size, dtype=bool), np.full(s.size, np.nan)
         start = self._between(s, slice(1, 3)).T.copy()
         inside = (s >= self.nodes[0, 0] - FOLLOWED_LEAST) & (s <= self.nodes[-1, 0] + FOLLOWED_LEAST)
-        _at(np.exp(s), self.eps, start, self.count, self.lap, inside, n, exists, multiplier)
+        _at(np.exp(s), self.eps, start, self.count, self.halves, inside, n, exists, multiplier)
         return np.exp(s), n, exists, multiplier
 
     def _between(self, s, columns):
@@ -242,7 +243,7 @@ class _Followed:
 
 @njit(cache=True)
 def _periodic(places, eps, starts, transient, met):
-    """Write the periodic motions that `starts` lead to (A, lap, count, contact, phi, w, n); count them."""
+    """Write the periodic motions that `starts` lead to (A, halves, count, contact, phi, w, n); count them."""
     kept = 0
     out = np.zeros(2, dtype=np.complex128)
     for A in places:
@@ -251,8 +252,8 @@ def _periodic(places, eps, starts, transient, met):
             if k == 3 and kept == first:
                 break  # irregular from all: what hides beside that has a small basin
             w = starts[k, 1] * (1.0 + A)
-            status, lap, count, phi, w, contact, _, _ = settle(A, eps, starts[k, 0], w, transient)
-            if status != 1 or (lap == 1 and count == 1 and not contact):
+            status, halves, count, phi, w, contact, _, _ = settle(A, eps, starts[k, 0], w, transient)
+            if status != 1 or (halves == 1 and count == 1 and not contact):
                 continue
             measure(A, eps, phi, w, count, out)
             new = True
@@ -260,24 +261,24 @@ def _periodic(places, eps, starts, transient, met):
                 known = complex(met[m, 6], met[m, 7])
                 new = new and not (met[m, 2] == count and abs(known - out[1]) < CLOSES * abs(known))
             if new:
-                met[kept, 0], met[kept, 1], met[kept, 2], met[kept, 3] = A, lap, count, contact
+                met[kept, 0], met[kept, 1], met[kept, 2], met[kept, 3] = A, halves, count, contact
                 met[kept, 4], met[kept, 5], met[kept, 6], met[kept, 7] = phi, w, out[1].real, out[1].imag
                 kept += 1
     return kept
 
 
 @njit(cache=True)
-def _follow(A, eps, phi, w, count, lap, contact, step, nodes):
+def _follow(A, eps, phi, w, count, halves, contact, step, nodes):
     """Follow a motion over A, by factors exp(step), until it ceases to attract; return how many nodes."""
     out = np.zeros(2, dtype=np.complex128)
     s, kept, h = math.log(A), 0, 0.0
     dphi, dw = 0.0, 0.0  # by ln A
     while kept < nodes.shape[0]:
         a = math.exp(s + h)
-        ok, p, v, con, radius, closing = polish(a, eps, phi + dphi * h, max(w + dw * h, 0.0), count, lap)
+        ok, p, v, con, radius, closing = polish(a, eps, phi + dphi * h, max(w + dw * h, 0.0), count, halves)
         near = abs(wrap(p - phi)) < FOLLOWS and abs(v - w) < FOLLOWS * (1.0 + a)
         if ok and near:  # where a doubled period ends, the single one is another motion
-            near = shortest(a, eps, p, v, count, lap, con, radius, closing)[1] == lap
+            near = shortest(a, eps, p, v, count, halves, con, radius, closing)[1] == halves
         if not ok or con != contact or not near:
             if kept == 0 or abs(h) < 2.0 * FOLLOWED_LEAST:
                 return kept
@@ -295,14 +296,14 @@ def _follow(A, eps, phi, w, count, lap, contact, step, nodes):
 
 
 @njit(cache=True)
-def _at(A, eps, start, count, lap, inside, n, exists, multiplier):
+def _at(A, eps, start, count, halves, inside, n, exists, multiplier):
     """Fill harmonics, existence and multiplier of a followed motion at places A, from states nearby."""
     for i in range(A.size):
         if not inside[i]:
             continue
-        ok, phi, w, _, radius, _ = polish(A[i], eps, start[i, 0], max(start[i, 1], 0.0), count, lap)
+        ok, phi, w, _, radius, _ = polish(A[i], eps, start[i, 0], max(start[i, 1], 0.0), count, halves)
         if ok:
             n[i] = 0.0
             measure(A[i], eps, phi, w, count, n[i])
             exists[i] = True
-            multiplier[i] = radius ** (2.0 / lap)
+            multiplier[i] = radius ** (2.0 / halves)

@@ -16,12 +16,12 @@ from ..thresholds import (
     ELASTIC_RADIUS,
     EXACT,
     IMPACTS,
-    LAP_OFF,
     MEMORIES,
     MEMORY_LEAST,
     MOST_APART,
     MOST_TRIES,
     NOTHING,
+    PERIOD_OFF,
     POLISH_STEPS,
     POLISHED,
     POLISHED_LATE,
@@ -59,8 +59,8 @@ def event(A, eps, phi, c, s, w, near):
 def settle(A, eps, phi, w, transient):
     """Run until a state recurs (Brent's search) and close the orbit with Newton's method.
 
-    Returns status (0 none found, 1 periodic, 2 free), lap in half periods, impacts of a lap, phi, w, whether
-    contact is sustained, largest multiplier of the lap, closing error.
+    Returns status (0 none found, 1 periodic, 2 free), half periods and impacts of the orbit, phi, w, whether
+    contact is sustained, its largest multiplier, closing error.
     """
     ref_phi, ref_w, since, power, elapsed, clock, tries = phi, w, 0, 8, 0.0, 0.0, 0
     c, s = math.cos(phi), math.sin(phi)
@@ -74,12 +74,12 @@ def settle(A, eps, phi, w, transient):
         elapsed += time + rest
         clock += time + rest
         if abs(wrap(phi - ref_phi)) < RECURS and abs(w - ref_w) < RECURS * (1.0 + A) and tries < MOST_TRIES:
-            lap = round(elapsed / math.pi)
-            if lap >= 1 and abs(elapsed - lap * math.pi) < 2.0 * RECURS:
+            halves = round(elapsed / math.pi)
+            if halves >= 1 and abs(elapsed - halves * math.pi) < 2.0 * RECURS:
                 tries += 1
-                ok, p, v, contact, radius, closing = polish(A, eps, phi, w, since, lap)
+                ok, p, v, contact, radius, closing = polish(A, eps, phi, w, since, halves)
                 if ok:
-                    return shortest(A, eps, p, v, since, lap, contact, radius, closing)
+                    return shortest(A, eps, p, v, since, halves, contact, radius, closing)
         if since == power:
             ref_phi, ref_w, since, elapsed = phi, w, 0, 0.0
             power = min(2 * power, MOST_APART)
@@ -89,21 +89,22 @@ def settle(A, eps, phi, w, transient):
 
 
 @part
-def shortest(A, eps, phi, w, count, lap, contact, radius, closing):
-    """Return the answer of `settle` for a lap that may hold the same orbit several times."""
-    for parts in range(lap, 1, -1):
-        if lap % parts == 0 and count % parts == 0:
-            ok, p, v, con, rad, clo = polish(A, eps, phi, w, count // parts, lap // parts)
+def shortest(A, eps, phi, w, count, halves, contact, radius, closing):
+    """Return the answer of `settle` for `halves` half periods that may hold the same orbit several times."""
+    for parts in range(halves, 1, -1):
+        if halves % parts == 0 and count % parts == 0:
+            ok, p, v, con, rad, clo = polish(A, eps, phi, w, count // parts, halves // parts)
             if ok and abs(wrap(p - phi)) < RECURS and abs(v - w) < RECURS * (1.0 + A):
-                return 1, lap // parts, count // parts, p, v, con, rad, clo
-    return 1, lap, count, phi, w, contact, radius, closing
+                return 1, halves // parts, count // parts, p, v, con, rad, clo
+    return 1, halves, count, phi, w, contact, radius, closing
 
 
 @njit(cache=True)
-def polish(A, eps, phi, w, count, lap):
-    """Close a lap of `count` impacts by Newton's method on the map (phi, w) and its tangent.
+def polish(A, eps, phi, w, count, halves):
+    """Close an orbit of `count` impacts in `halves` half periods.
 
-    Returns whether a stable orbit was found, phi, w, contact, largest multiplier, closing error.
+    By Newton's method on the map (phi, w) and its tangent. Returns whether a stable orbit was found, phi, w,
+    contact, largest multiplier, closing error.
     """
     before = np.inf
     for _ in range(POLISH_STEPS):
@@ -136,7 +137,7 @@ def polish(A, eps, phi, w, count, lap):
                 )
         dp, dw = wrap(p - phi), v - w
         size = abs(dp) + abs(dw) / (1.0 + A)
-        if abs(total - lap * math.pi) > LAP_OFF:
+        if abs(total - halves * math.pi) > PERIOD_OFF:
             return False, phi, w, False, 0.0, 0.0
         if size < POLISHED or (size < POLISHED_LATE and size > 0.25 * before):
             half, det = 0.5 * (j11 + j22), j11 * j22 - j12 * j21
@@ -161,7 +162,7 @@ def polish(A, eps, phi, w, count, lap):
 
 @njit(cache=True)
 def measure(A, eps, phi, w, count, out):
-    """Harmonics C_k/(k^2 A), and -mean(y)/A at index 0, of a periodic motion over one lap."""
+    """Harmonics C_k/(k^2 A), and -mean(y)/A at index 0, of a periodic motion over one orbit."""
     side, clock, area = -1.0, 0.0, 0.0
     c, s = math.cos(phi), math.sin(phi)
     wall = np.zeros(out.size, dtype=np.complex128)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
-from ..thresholds import CREEPING, IMPOSED_SAMPLES, LAPS, NOTHING, SETTLED
+from ..thresholds import CREEPING, IMPOSED_SAMPLES, NOTHING, PERIODS_AT_MOST, SETTLED
 
 
 def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[np.ndarray, float]:
@@ -19,7 +19,7 @@ def force_harmonics(core, amplitude: float, omega: float, orders: int) -> tuple[
     phase = 2 * math.pi * (np.arange(IMPOSED_SAMPLES + 1) + 0.5) / IMPOSED_SAMPLES
     path = sine_path(amplitude, omega, phase)
     z, residual = np.zeros((1, core.nstates - 2)), math.inf
-    for _ in range(LAPS):
+    for _ in range(PERIODS_AT_MOST):
         force, _, states = imposed_forces([core], path, z, states=True)
         before, z = z, states[:, -1]
         size = np.maximum(np.max(np.abs(states), axis=1), NOTHING)

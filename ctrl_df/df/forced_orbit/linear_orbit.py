@@ -26,7 +26,7 @@ class LinearOrbit:
     a, b, c, d : arrays
         ``dx/dt = a x + b u``, ``y = c x + d u`` (one input, one output).
     center : (n,) array
-        State about which it swings.
+        State about which it oscillates.
     mean : float
         Mean of the output.
     travel : float

@@ -26,7 +26,8 @@ class Symmetries:
     Attributes
     ----------
     transform, inverse : (n, n) arrays
-        Two bodies are described by load position, speed of their centre of mass, stretch and relative speed.
+        Two bodies are described by load position, speed of their centre of mass, relative position and
+        relative speed.
     odd : bool
         Whether the laws are odd about the mirror ``x -> offset - x``.
     offset : (n,) array

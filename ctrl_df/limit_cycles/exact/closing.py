@@ -23,6 +23,7 @@ from .thresholds import (
     NEWTON_LONGEST,
     ON_CIRCLE,
     ORBIT_POINTS,
+    PERIOD_CHANGE,
     PERIOD_RTOL,
     RANK,
     REPEATED,
@@ -30,7 +31,6 @@ from .thresholds import (
     STALLS,
     STEPS_A_PERIOD,
     STILL,
-    STRETCH,
 )
 
 
@@ -91,7 +91,7 @@ class Closing:
             best = min(best, mismatch)
             step = self._newton(start, traced, period, size, beside, residual)
             period += step[-1]
-            if not first / STRETCH < period < first * STRETCH:
+            if not first / PERIOD_CHANGE < period < first * PERIOD_CHANGE:
                 raise NoClosure("Newton left for another period", best)
             start = self.rebuilt(start.x + step[:-1])
         if traced is None or self._at_rest(start, traced, period, size):
@@ -140,7 +140,7 @@ class Closing:
         return traced, period
 
     def free_state(self, x0, period, stay=False) -> tuple[Any, Any]:
-        """Move along the orbit to the middle of its longest stretch free of sticking and contact."""
+        """Move along the orbit to the middle of its longest interval free of sticking and contact."""
         state = self.engine.start(x0)
         traced = self.tracer.trace(state, period, differentiate=False)
         if not traced.status.ok or not traced.segments:

@@ -216,7 +216,7 @@ class Explorer:
         return Border(below, above, fates, orbit)
 
     def _slowest(self, x0, course: Course, known) -> Orbit | None:
-        """Unstable orbit near which a course lingers: its passages change least there."""
+        """Unstable orbit near which a course lingers: its crossings change least there."""
         crossings = course.crossings
         if len(crossings) < 4:
             return None

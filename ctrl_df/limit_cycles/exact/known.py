@@ -6,7 +6,7 @@ import numpy as np
 
 from .orbit import Orbit
 from .poincare import CYCLES, Course, Crossing, PoincareSearch, upward_crossings
-from .thresholds import BESIDE, ON, ORBIT_SIZE, PASSAGES, SAME_ORBIT, SAME_ROUGHLY, THERE
+from .thresholds import APPROACHING, BESIDE, ON, ORBIT_SIZE, SAME_ORBIT, SAME_ROUGHLY, THERE
 
 
 class KnownOrbits:
@@ -15,16 +15,16 @@ class KnownOrbits:
     Parameters
     ----------
     search : PoincareSearch
-        Whose passages are compared with those of the orbits: the upward crossings of the signal it watches.
+        Whose crossings are compared with those of the orbits: the upward crossings of the signal it watches.
     orbits : list of Orbit
         Known from the start; further ones are appended to it.
     """
 
     def __init__(self, search: PoincareSearch, orbits: list[Orbit]):
         self.search, self.orbits = search, orbits
-        # a passage tells nothing where the state is a history, or passages are looked for among samples
+        # a crossing tells nothing where the state is a history, or crossings are looked for among samples
         self._telling = not search.tight and not getattr(search.parts, "dt", 0)
-        self._passages: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._crossings: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def kept(self, orbit: Orbit | None) -> Orbit | None:
         """Return the known orbit that this one is, or the orbit itself, now known."""
@@ -37,33 +37,33 @@ class KnownOrbits:
         return orbit
 
     def approached(self, crossings: list[Crossing]) -> Orbit | None:
-        """Return the stable orbit that the last passages come nearer and nearer to, almost there; or None."""
-        if len(crossings) <= PASSAGES:
+        """Return the stable orbit that the last crossings approach and have almost reached; or None."""
+        if len(crossings) <= APPROACHING:
             return None
         for orbit in self.orbits:
             if orbit.stable:
-                apart = [self._distance(orbit, crossing) for crossing in crossings[-PASSAGES:]]
+                apart = [self._distance(orbit, crossing) for crossing in crossings[-APPROACHING:]]
                 if apart[-1] < THERE and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
                     return orbit
         return None
 
     def repeated(self, crossings: list[Crossing]) -> Orbit | None:
-        """Return the orbit that repeating passages are on; None if it is not known."""
+        """Return the orbit that repeating crossings are on; None if it is not known."""
         if len(crossings) < 2:
             return None
         for orbit in self.orbits:
             if not orbit.status.ok:
                 continue
-            passages = len(self._of(orbit)[0])
-            if not passages or len(crossings) <= passages:
+            count = len(self._of(orbit)[0])
+            if not count or len(crossings) <= count:
                 continue
-            spent = crossings[-1].time - crossings[-1 - passages].time
+            spent = crossings[-1].time - crossings[-1 - count].time
             if abs(spent / orbit.period - 1) < ON and self._distance(orbit, crossings[-1]) < THERE:
                 return orbit
         return None
 
     def beside(self, crossing: Crossing) -> Orbit | None:
-        """Return the unstable orbit that a passage is beside; or None."""
+        """Return the unstable orbit that a crossing is beside; or None."""
         for orbit in self.orbits:
             if orbit.stable is False and self._distance(orbit, crossing) < BESIDE:
                 return orbit
@@ -80,7 +80,7 @@ class KnownOrbits:
         return self.approached(course.crossings) or self.repeated(course.crossings)
 
     def _distance(self, orbit: Orbit, crossing: Crossing) -> float:
-        """Largest difference of a state from those of the orbit at its nearest passage, in its sizes."""
+        """Largest difference of a state from those of the orbit at its nearest crossing, in its sizes."""
         states, size = self._of(orbit)
         if not len(states) or not self._telling:
             return np.inf
@@ -88,7 +88,7 @@ class KnownOrbits:
 
     def _of(self, orbit: Orbit):
         """States of an orbit where the signal watched passes zero upwards, and the size of each state."""
-        found = self._passages.get(id(orbit))
+        found = self._crossings.get(id(orbit))
         if found is None:
             states = np.asarray(orbit.states)
             size = np.maximum(np.abs(states).max(axis=1), ORBIT_SIZE * self.search.units)
@@ -96,5 +96,5 @@ class KnownOrbits:
             ups = upward_crossings(y)
             share = y[ups] / (y[ups] - y[ups + 1])
             met = states[:, ups] + share * (states[:, ups + 1] - states[:, ups])
-            found = self._passages[id(orbit)] = (met.T, size)
+            found = self._crossings[id(orbit)] = (met.T, size)
         return found

@@ -34,7 +34,7 @@ from .thresholds import (
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of one mode: its start, its length, and the event that ends it."""
+    """A segment in one mode: its start, its length, and the event that ends it."""
 
     start: State
     length: float

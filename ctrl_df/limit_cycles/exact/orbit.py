@@ -80,7 +80,7 @@ class Orbit:
 
     @property
     def peak(self) -> float:
-        """Half of the peak-to-peak swing of the first output."""
+        """Half of the peak-to-peak value of the first output."""
         return float(np.ptp(self.outputs[0]) / 2)
 
     @property

@@ -11,8 +11,8 @@ import numpy as np
 from ...blocks.elements.element import Element
 from ...cached import cached_property
 from ...simulate.engine import Engine, State
-from ...simulate.passages import strides
 from ...simulate.program.layout import DELAY, H_OUT, KIND, X
+from ...simulate.section import intervals
 from ...status import Status
 from ..thresholds import NOTHING
 from .starts import Starts
@@ -24,6 +24,8 @@ from .thresholds import (
     FAINT,
     FEW,
     GONE,
+    INTERVAL_SAMPLES,
+    LONGEST_INTERVAL,
     LOOK,
     LOOK_POINTS,
     LOOK_RTOL,
@@ -38,8 +40,6 @@ from .thresholds import (
     SAMPLED_WORK,
     STEADY,
     STEPS,
-    STRIDE,
-    STRIDE_SAMPLES,
     SUSTAINED_DECAY,
     SUSTAINED_GROWTH,
     TENFOLD,
@@ -66,9 +66,9 @@ class Course:
     ----------
     crossings : list of Crossing
     fate : str
-        ``rests``, ``cycles`` (the passages repeat), ``diverges``, or ``undecided`` within the bound on work.
+        ``rests``, ``cycles`` (the crossings repeat), ``diverges``, or ``undecided`` within the bound on work.
     growth : float
-        Change of the swings over the second half, a ratio; nan with too few of them.
+        Change of the peaks over the second half, a ratio; nan with too few of them.
     end : ndarray
         State in which it ended.
     """
@@ -79,7 +79,7 @@ class Course:
     end: np.ndarray
 
 
-class _Stretch(NamedTuple):
+class _Followed(NamedTuple):
     """A piece of a course: its end, its work, how it ended, the crossings in it."""
 
     time: float
@@ -112,26 +112,26 @@ class PoincareSearch:
         self.tight = engine.delayed  # no Newton follows
         self.held = by_input and bool(
             getattr(self.parts, "dt", 0)
-        )  # a held input steps: no passage to locate
+        )  # a held input steps: no crossing to locate
         ints = engine.program.ints
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
         self.starts = Starts(loop, engine)
-        self.stride = STRIDE * np.pi / self.starts.pace  # ten swings at the loop's own pace
+        self.longest = LONGEST_INTERVAL * np.pi / self.starts.pace  # ten periods at the loop's own frequency
 
     @property
     def units(self) -> np.ndarray:
-        """What each state is measured in: the largest it becomes in the first swing from the largest."""
-        return self._first_swing[0]
+        """Unit of each state: the largest value in the first period from the largest start."""
+        return self._first_period[0]
 
     @property
     def _unit(self) -> float:
         """What the signal watched is measured in, likewise."""
-        return self._first_swing[1]
+        return self._first_period[1]
 
     @cached_property
-    def _first_swing(self) -> tuple[np.ndarray, float]:
+    def _first_period(self) -> tuple[np.ndarray, float]:
         x0 = self.starts.all()[-1][1]
-        times = np.linspace(0.0, LOOK * self.stride, LOOK_POINTS)
+        times = np.linspace(0.0, LOOK * self.longest, LOOK_POINTS)
         limits: Any = dict(rtol=LOOK_RTOL, log=1, max_steps=LOOK_WORK)
         run = self.engine.run(self.start(x0), times[-1], times=times, **limits)
 
@@ -139,9 +139,9 @@ class PoincareSearch:
             seen = np.abs(values[: max(run.recorded, 1)])
             return np.where(np.isfinite(seen), seen, 0.0).max(axis=0)
 
-        states, swing = largest(run.states), float(largest(run.outputs)[self.row])
+        states, peak = largest(run.states), float(largest(run.outputs)[self.row])
         units = np.where(states > 0, states, max(float(states.max(initial=0.0)), NOTHING))
-        return units, swing if swing > 0 else 1.0
+        return units, peak if peak > 0 else 1.0
 
     def size(self, x) -> float:
         """Largest state in units of the loop."""
@@ -162,37 +162,37 @@ class PoincareSearch:
         start : ndarray or State
             State of the loop; a `State` goes on with the history of its delays.
         count : int
-            Passages at most.
+            Crossings at most.
         longest : float, optional
             Simulated time at most [s].
         until_repeated : bool
-            End as soon as the passages repeat.
+            End as soon as the crossings repeat.
         decided : callable, optional
-            Asked after every passage for the fate of the crossings so far; empty: not yet known.
+            Asked after every crossing for the fate of the crossings so far; empty: not yet known.
 
         Returns
         -------
         Course
-            Without crossings if all work is spent within a few swings.
+            Without crossings if all work is spent within a few periods.
         """
         state = start if isinstance(start, State) else self.start(start)
         crossings: list[Crossing] = []
         quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
         bound = GONE * max(1.0, largest)
-        stretches = self._by_samples(state, limit) if self.held else self._by_passage(state, limit)
+        intervals = self._by_samples(state, limit) if self.held else self._by_crossing(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
         while len(crossings) < count and time < limit and quiet <= PATIENCE and work <= WORK:
-            stretch = next(stretches)
-            if quiet > QUIET and self.size(stretch.x - end) < DEAD * largest:
+            run = next(intervals)
+            if quiet > QUIET and self.size(run.x - end) < DEAD * largest:
                 break
-            time, end, work = stretch.time, stretch.x, work + stretch.steps
-            if stretch.status is Status.DIVERGED or not self.size(end) < bound:
+            time, end, work = run.time, run.x, work + run.steps
+            if run.status is Status.DIVERGED or not self.size(end) < bound:
                 return Course(crossings, DIVERGES, np.inf, end)
-            if not stretch.status.ok:
+            if not run.status.ok:
                 stopped = True  # by its bound on work, or a motion that no step resolves: no fate
                 break
-            found = stretch.found
+            found = run.found
             crossings += found
             quiet = 0 if found else quiet + 1
             highest = max([highest, *(c.peak for c in found)])
@@ -232,14 +232,14 @@ class PoincareSearch:
         return state
 
     def _fades(self, crossings) -> bool:
-        """Whether the swings shrink by a steady ratio where the block is a straight line: so they go on."""
+        """Whether the oscillation shrinks by a steady ratio where the block is linear: so it goes on."""
         recent = crossings[-RECENT:]
         if not max(c.peak for c in recent[-STEPS:]) * self._unit < WITHIN * self.starts.straight:
             return False
         return _endless([1 / max(crossing.peak, NOTHING) for crossing in recent], 1 / FAINT) > 0
 
     def repeats(self, crossings) -> bool:
-        """Whether the last two passages met the same state; closer if no Newton follows."""
+        """Whether the last two crossings met the same state; closer if no Newton follows."""
         sizes = np.max(np.abs([c.state for c in crossings[-6:]]), axis=0)
         largest = max(float(np.max(sizes / self.units)), NOTHING)
         bound = (
@@ -249,19 +249,19 @@ class PoincareSearch:
         )
         return bool(np.all(np.abs(crossings[-1].state - crossings[-2].state) < bound))
 
-    def _by_passage(self, state, limit):
-        # ahead in bounded strides: a loop at rest never crosses again
-        for s in strides(self.engine, state, self._signal, self.row, self.stride, limit, COURSE_RTOL):
-            found = [Crossing(s.time, s.x, s.peak / self._unit)] if s.passed else []
-            yield _Stretch(s.time, s.x, s.steps, s.status, found)
+    def _by_crossing(self, state, limit):
+        # ahead in bounded intervals: a loop at rest never crosses again
+        for s in intervals(self.engine, state, self._signal, self.row, self.longest, limit, COURSE_RTOL):
+            found = [Crossing(s.time, s.x, s.peak / self._unit)] if s.crossed else []
+            yield _Followed(s.time, s.x, s.steps, s.status, found)
 
     def _by_samples(self, state, limit):
-        """Passages between the samples of a held signal, looked at between the ticks."""
+        """Crossings between the samples of a held signal, looked at between the ticks."""
         dt = self.parts.dt
         while True:
-            # from the sample before on, where the last stride ended: no passage is lost between two strides
+            # from the sample before on, where the last interval ended: no crossing is lost between two
             first = np.ceil(state.time / dt - 0.5 - ON_TICK)
-            times = np.maximum((first + 0.5 + np.arange(STRIDE_SAMPLES)) * dt, state.time)
+            times = np.maximum((first + 0.5 + np.arange(INTERVAL_SAMPLES)) * dt, state.time)
             times = times[times <= max(limit, times[1])]
             run = self.engine.run(
                 state, times[-1], times=times, rtol=COURSE_RTOL, log=1, max_steps=SAMPLED_WORK
@@ -271,10 +271,12 @@ class PoincareSearch:
             passing = times[ups] - y[ups] * dt / (y[ups + 1] - y[ups])
             found = []
             for k, (t, x) in enumerate(zip(passing, run.states[ups + 1], strict=True)):
-                swing = np.abs(y[ups[k - 1] if k else 0 : ups[k] + 1])
-                found.append(Crossing(float(t), np.array(x), float(np.max(swing, initial=0.0)) / self._unit))
+                between = np.abs(y[ups[k - 1] if k else 0 : ups[k] + 1])
+                found.append(
+                    Crossing(float(t), np.array(x), float(np.max(between, initial=0.0)) / self._unit)
+                )
             state = run.state
-            yield _Stretch(state.time, state.x, run.steps, run.status, found)
+            yield _Followed(state.time, state.x, run.steps, run.status, found)
 
 
 def upward_crossings(y) -> np.ndarray:
@@ -283,7 +285,7 @@ def upward_crossings(y) -> np.ndarray:
 
 
 def _growth(crossings, ago: int = 0) -> float:
-    """Mean size of the swings in the last quarter over that in the quarter before; or earlier by `ago`."""
+    """Mean peak in the last quarter over that in the quarter before; or earlier by `ago`."""
     quarter = len(crossings) // 4
     if quarter < 2:
         return float("nan")
@@ -312,12 +314,12 @@ def _endless(values, factor: float) -> int:
 
 
 def _explodes(crossings) -> bool:
-    """Whether the swings grow at a steady ratio and without bound."""
+    """Whether the oscillation grows at a steady ratio and without bound."""
     return _endless([c.peak for c in crossings[-RECENT:]], GONE) > 0
 
 
 def _creeps(crossings) -> bool:
-    """Whether every swing takes longer than the one before by a steady ratio, while none is larger.
+    """Whether every period takes longer than the one before by a steady ratio, while none is larger.
 
     So a motion ends whose speed falls by a ratio each time it crosses a gap: its position never settles, its
     speed does.
@@ -333,7 +335,7 @@ def _creeps(crossings) -> bool:
 
 
 def _tendency(crossings) -> str:
-    """Fate of swings that grow or shrink without end: by a steady ratio, not towards some size."""
+    """Fate of oscillations that grow or shrink without end: by a steady ratio, not towards some size."""
     now, earlier = _growth(crossings), _growth(crossings, 1)
     if not now > 0 or not earlier > 0 or max(now, 1 / now) < STEADY:
         return UNDECIDED

@@ -24,14 +24,14 @@ events limit what can be reached."""
 PERIOD_RTOL, COURSE_RTOL, LOOK_RTOL = 1e-11, 1e-8, 1e-6
 """Tolerance of periods that are differentiated; of courses that are followed; of a first look at sizes."""
 
-NEWTON_LONGEST, STRETCH = 0.3, 4.0
+NEWTON_LONGEST, PERIOD_CHANGE = 0.3, 4.0
 """Longest step, in sizes of the orbit; change of the period on the way, as a factor."""
 
 STALLED, STALLS = 0.9, 6
 """Mismatch over the best one that is no progress, and how many such steps end the search."""
 
 STILL = 1e-6
-"""Swing, relative to the motion that Newton started from, below which there is no orbit."""
+"""Amplitude, relative to the motion that Newton started from, below which there is no orbit."""
 
 REPEATED = 100
 """Times `ACCEPTED`: mismatch of a part of an orbit that went round several times."""
@@ -47,7 +47,7 @@ ORBIT_POINTS = 1025
 """Instants of an orbit that is returned: a picture shows no more."""
 
 FREE_POINTS = 65
-"""Instants among which the middle of a free stretch is looked for."""
+"""Instants among which the middle of an interval of free motion is looked for."""
 
 SAME_ORBIT, SAME_ROUGHLY, SAME_SIZES = 1e-4, 2e-2, 10
 """Difference of frequency of two orbits that are one, of averages; times that, of amplitudes."""
@@ -126,7 +126,7 @@ without poles, over a sample."""
 # --- courses ----------------------------------------------------------------------------------------
 
 WORK, SAMPLED_WORK, LOOK_WORK = 300_000, 400_000, 50_000
-"""Integration steps of one course, of one stride between samples, of a first look."""
+"""Integration steps of one course, of one interval between samples, of a first look."""
 
 FEW = 12
 """Crossings within that work, below which it is no use."""
@@ -134,25 +134,26 @@ FEW = 12
 CROSSINGS, CROSSINGS_AVERAGED, CROSSINGS_VERIFIED = 1000, 40, 200
 """Of one course; that an average takes; of the simulation beside a verified orbit."""
 
-STRIDE, LOOK, LOOK_POINTS = 20, 0.1, 129
-"""Half swings, at the loop's own pace, of a stride; share of it that shows sizes, and points in it."""
+LONGEST_INTERVAL, LOOK, LOOK_POINTS = 20, 0.1, 129
+"""Half periods, at the loop's own frequency, of the longest interval without a crossing; share of it that
+shows sizes, and points in it."""
 
 QUIET, PATIENCE = 40, 400
-"""Strides without a passage after which a loop is called at rest: if nothing in it moves on, and while
+"""Intervals without a crossing after which a loop is called at rest: if nothing in it moves on, and while
 something does (an integral that winds up, a slow mode)."""
 
 DEAD = 1e-9
-"""Of the largest state met, below which a loop without passages is at rest."""
+"""Of the largest state met, below which a loop without crossings is at rest."""
 
-STRIDE_SAMPLES, ON_TICK = 1024, 1e-6
-"""In a stride, where passages are looked for among samples; share of a sample within which an instant is
+INTERVAL_SAMPLES, ON_TICK = 1024, 1e-6
+"""In an interval, where crossings are looked for among samples; share of a sample within which an instant is
 one."""
 
 FAINT = 1e-6
-"""Of the highest peak met, below which swings count as rest."""
+"""Of the highest peak met, below which oscillations count as rest."""
 
 REPEATS, REPEATS_EXACTLY, REPEATS_LEAST = 1e-7, 1e-9, 1e-6
-"""Change of a passage, over the size of the state, that is none: where Newton follows, and where none does;
+"""Change of a crossing, over the size of the state, that is none: where Newton follows, and where none does;
 size at least, over the largest."""
 
 EVEN, STEPS, TENFOLD = 0.05, 3, math.log(10.0)
@@ -163,16 +164,16 @@ WITHIN = 0.1
 """Of the input up to which a block is a straight line: there the loop is linear."""
 
 RECENT, RECENT_CLOSED = 64, 12
-"""Laps among which steady growths are looked for; among which the pair is that comes nearest to repeating."""
+"""Crossings among which steady growths are looked for; among which the pair is sought that nearly repeats."""
 
 BEYOND = 10.0
-"""Times the largest start's first swing: growth at a steady ratio from there has no bound."""
+"""Times the largest start's first peak: growth at a steady ratio from there has no bound."""
 
 GONE = 1e4
 """Times what the largest start sets in motion: a loop beyond it has run away."""
 
 STEADY, SUSTAINED_GROWTH, SUSTAINED_DECAY = 1.25, 0.5, 0.9
-"""Change of the swings from the third to the last quarter of a course below which they keep their size, and
+"""Change of the peaks from the third to the last quarter of a course below which they keep their size, and
 the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
 quadratic)."""
 
@@ -181,13 +182,13 @@ HALVINGS, ASKED, WIDTH = 40, (6, 12, 18, 26, 40), 1e-3
 tried for an orbit; relative width of a border whose orbit is known."""
 
 LINGERS, WOUND = 0.3, 1e-9
-"""Change from passage to passage of a course that lingers; factor of growth that is at least more than
+"""Change from crossing to crossing of a course that lingers; factor of growth that is at least more than
 one."""
 
-THERE, BESIDE, ON, PASSAGES = 1e-3, 0.03, 1e-5, 3
-"""Of an orbit's size: a passage so near a stable one, and coming nearer, ends on it; the same for one that
+THERE, BESIDE, ON, APPROACHING = 1e-3, 0.03, 1e-5, 3
+"""Of an orbit's size: a crossing so near a stable one, and coming nearer, ends on it; the same for one that
 lingers beside an unstable one; relative difference of the time between crossings from the period within which
-it is that near; passages in a row that come nearer."""
+it is that near; crossings in a row that come nearer."""
 
 ORBIT_SIZE = 1e-9
 """Size of a state of an orbit at least, over what it is measured in."""

@@ -147,8 +147,8 @@ class Assessor:
     def _late(self, a, w) -> float:
         """Relative error of N for switching at samples only.
 
-        A swing of whole samples answers alike wherever within a sample the law would switch: up to half a
-        sample earlier or later than the mean, an error of N in its phase.
+        An oscillation of whole samples is the same wherever within a sample the law would switch: up to half
+        a sample earlier or later than the mean, an error of N in its phase.
         """
         return 0.5 * w * self.linear.dt if self.linear.dt and jumps(self.method, a) else 0.0
 

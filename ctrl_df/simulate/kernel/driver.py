@@ -431,7 +431,7 @@ def advance(
             t = reached
             copy(x1, x)
             for j in range(n):
-                # a size that forgets slowly: tolerances do not tighten as a state swings through zero
+                # a size that forgets slowly: tolerances do not tighten as a state passes through zero
                 size[j] = max(abs(x[j]), FADING * size[j])
             h = h_next
             if at < 0:

@@ -198,7 +198,7 @@ def prepare8(prog, drive, segment, t, h, x, x1, mode, work, k, g, poly):
 
 @part
 def roughness(size, grain, h, rtol, atol, poly):
-    """Error of the 7th-order interpolant relative to tolerance, judged by its last term.
+    """Error of the 7th-order interpolant relative to tolerance, estimated by its last term.
 
     A long step can be right at its end and poor inside; events and outputs are taken from inside.
     """

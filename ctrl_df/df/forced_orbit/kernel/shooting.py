@@ -165,7 +165,7 @@ def _close(shot, at, drive, time, x, mode, mirrored, rtol, atol, hmax, spectrum,
                 continue
             if known and miss > 0.0 and not _attracts(shot, jacobian):
                 if not fresh_jacobian:
-                    # Broyden's matrix is no proof: differentiate before judging
+                    # Broyden's matrix is no proof: differentiate before it is called unstable
                     if not differentiate(
                         shot, at, drive, time, x0, m0, y1, mirrored, rtol, atol, hmax, budget, first,
                         ONE_SIDED * math.sqrt(rtol), False,

@@ -1,6 +1,6 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""Passages of a signal upwards through zero, one after another, without the interpreter between them."""
+"""Crossings of a Poincaré section, where a signal rises through zero, without the interpreter between."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from .program.layout import H_NG
 from .thresholds import (
     FAR,
     HEIGHT,
+    INTERVAL_STEPS,
+    PEAK_SAMPLES,
     STEPS_AT_ONCE_MANY,
-    STRIDE_PEEKS,
-    STRIDE_STEPS,
-    TOGETHER_STRIDES,
+    TOGETHER_INTERVALS,
     steps_at_once,
 )
 
 
-class Stride(NamedTuple):
-    """A run from one passage to the next, or over some time without any.
+class Interval(NamedTuple):
+    """A run from one crossing to the next, or over some time without any.
 
     Attributes
     ----------
@@ -40,8 +40,8 @@ class Stride(NamedTuple):
         Its end [s].
     x : (n,) array
         State there.
-    passed : bool
-        Whether it ended at a passage.
+    crossed : bool
+        Whether it ended at a crossing.
     peak : float
         Largest magnitude of the output on the way.
     steps : int
@@ -50,16 +50,16 @@ class Stride(NamedTuple):
 
     time: float
     x: np.ndarray
-    passed: bool
+    crossed: bool
     peak: float
     steps: int
     status: Status
 
 
-def strides(
+def intervals(
     engine: Engine, state: State, signal: int, row: int, first: float, limit: float, rtol: float
-) -> Iterator[Stride]:
-    """Run an engine without inputs from passage to passage of a signal, until nobody asks for more.
+) -> Iterator[Interval]:
+    """Run an engine without inputs from crossing to crossing of a signal, until nobody asks for more.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def strides(
     state : State
         Where to begin.
     signal, row : int
-        Signal whose upward passages through zero count, and output whose peaks are taken.
+        Signal whose upward crossings through zero count, and output whose peaks are taken.
     first : float
-        Longest stride while fewer than two passages are known [s]; then four times what the last one took.
+        Longest interval while fewer than two crossings are known [s]; then four times what the last one took.
     limit : float
-        Time at which the last stride ends [s].
+        Time at which the last interval ends [s].
     rtol : float
         As in `Engine.run`.
     """
@@ -81,10 +81,10 @@ def strides(
         history.stored(program, space.work[0])[:] = now.history
     scale = np.zeros((4, int(program.ints[H_NG]) + 1)) if now.scale is None else now.scale
     clock = np.array([now.time, 0, now.step, 0, 0, 0, now.segment, float(now.on_section), -1, 0])
-    together = 1 if engine.calls_python else TOGETHER_STRIDES
+    together = 1 if engine.calls_python else TOGETHER_INTERVALS
     none, counts, drive = np.zeros(1), np.zeros(1, np.int64), constant_drive(np.zeros(engine.ninputs))
-    times = np.zeros(STRIDE_PEEKS)
-    seen = np.zeros((STRIDE_PEEKS, n)), np.zeros((STRIDE_PEEKS, engine.noutputs))
+    times = np.zeros(PEAK_SAMPLES)
+    seen = np.zeros((PEAK_SAMPLES, n)), np.zeros((PEAK_SAMPLES, engine.noutputs))
     spectrum, last = np.zeros((engine.noutputs, 0), complex), np.array([0.0, 0.0, 0.0, float(now.fresh)])
     ends, states, numbers = (
         np.zeros((together, 2)),
@@ -96,7 +96,7 @@ def strides(
         pointers.raised.clear()
         pointers.gave_nan.clear()
         with pointers.interruptible():
-            done = _pass_on(
+            done = _follow(
                 driver.address(), program, drive, clock, now.x, now.mode, times, *seen, rtol, signal, row,
                 max(rtol, HEIGHT), none, counts, np.zeros(1, np.int64), now.x.copy(), scale, space.at,
                 spectrum, first, limit, last, ends, states, numbers, budget,
@@ -107,19 +107,21 @@ def strides(
             x = states[i].copy()
             if reason == driver.NAN and pointers.gave_nan and np.max(np.abs(x), initial=0.0) < FAR:
                 raise RuntimeError(f"{Status.USER_ERROR} ({pointers.gave_nan[0]}).")
-            passed = reason == driver.SECTION
-            yield Stride(float(ends[i, 0]), x, passed, float(ends[i, 1]), int(numbers[i, 1]), STATUS[reason])
+            crossed = reason == driver.SECTION
+            yield Interval(
+                float(ends[i, 0]), x, crossed, float(ends[i, 1]), int(numbers[i, 1]), STATUS[reason]
+            )
 
 
 @njit(error_model="numpy", nogil=True)
-def _pass_on(
+def _follow(
     engine, prog, drive, clock, x, mode, times, xout, yout, rtol, signal, row, height, log_t, log_n, log_k,
     before, scale, space, spectrum, first, limit, last, ends, states, numbers, budget,
 ):  # fmt: skip
-    """Make as many strides as there are rows in `ends`, or fewer; return how many.
+    """Make as many intervals as there are rows in `ends`, or fewer; return how many.
 
-    ``last``: times of the last two passages, their number, whether the state is a fresh one. ``ends``: time
-    and peak of each stride; ``numbers``: why it ended, its steps.
+    ``last``: times of the last two crossings, their number, whether the state is a fresh one. ``ends``: time
+    and peak of each interval; ``numbers``: why it ended, its steps.
     """
     prog, drive, clock, x, mode, times = (
         lean(prog), lean(drive), lean(clock), lean(x), lean(mode), lean(times),
@@ -144,12 +146,12 @@ def _pass_on(
                 engine,
                 (
                     prog, drive, clock, x, mode, until, times, xout, yout, 8, rtol, 0.0, math.inf, True,
-                    False, signal, 0.0, -1, height, min(STRIDE_STEPS - int(clock[3]), budget), log_t, log_n,
+                    False, signal, 0.0, -1, height, min(INTERVAL_STEPS - int(clock[3]), budget), log_t, log_n,
                     log_k, before, scale, int(last[3]), space, spectrum, 0.0,
                 ),
             )  # fmt: skip
             last[3] = 0.0
-            if reason != driver.STEPS or int(clock[3]) >= STRIDE_STEPS:
+            if reason != driver.STEPS or int(clock[3]) >= INTERVAL_STEPS:
                 break
             memo[2] = 1.0
         peak = 0.0
