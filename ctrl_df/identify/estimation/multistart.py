@@ -243,8 +243,8 @@ def thresholds_known(found: FitResult, fit: Callable[..., FitResult]) -> FitResu
 def _uniform(value: float, low: float, high: float) -> float:
     """Return the rms distance of a value from one anywhere between two, or as near as any other was tried."""
     tried = OPEN_RANGE[0] * value
-    below, above = max(value - low, tried), max(high - value, tried)
-    return math.sqrt((below**3 + above**3) / (3 * (below + above)))
+    low, high = min(low, value - tried), max(high, value + tried)
+    return math.hypot((high - low) / math.sqrt(12), 0.5 * (low + high) - value)
 
 
 def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> CandidateFit:
