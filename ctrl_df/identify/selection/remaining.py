@@ -156,9 +156,8 @@ def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
 def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:
     acts = f"It behaves like {missed[0].sentence}. " if missed and missed[0].evidence > 0 else ""
     return (
-        f"The residual contains structure of {left.structure:.2g} beside noise of {left.noise:.2g} (rms of "
-        "the "
-        f"{measure}). "
+        f"The residual contains structure of {left.structure:.2g} beside a rest of {left.noise:.2g}, noise "
+        f"at best (rms of the {measure}). "
         f"{acts}{places(where)}".rstrip()
     )
 
