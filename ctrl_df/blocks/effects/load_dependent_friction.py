@@ -13,8 +13,8 @@ class LoadDependentFriction(Effect):
     """Dry friction of gears, screws and guides that grows with the force carried, ``coefficient |carried|``.
 
     Carried is what passes from the drive to what it moves: with a `share` of the inertia behind the gears,
-    ``share drive + (1 - share) load``, where `load` is what springs, gravity and the like push against the
-    drive. In a block with an elastic joint it is the friction of the motor.
+    ``share drive + (1 - share) load``, where `load` is what acts against the drive, but inertia and dry
+    friction: springs, gravity, and viscous friction too. In a block with an elastic joint it is the friction of the motor.
 
     Parameters
     ----------
