@@ -9,6 +9,7 @@ import rig_physics as physics
 
 import ctrl_df as cdf
 from ctrl_df.identify.compare import compare
+from ctrl_df.identify.datasets.choice import dataset_of
 from ctrl_df.identify.diagnose import diagnose
 from ctrl_df.identify.improve import improve
 from ctrl_df.identify.refit import refit
@@ -245,3 +246,12 @@ def test_a_spring_with_its_resonance_on_the_table_is_found():
     found = diagnose(axis, table, candidates=["linear_spring", "viscous"])
     assert found.verdict == "effect" and found.best.id == "linear_spring"
     assert found.best.parameters["stiffness"] == pytest.approx(200, rel=2e-3)
+
+
+def test_what_was_screened_is_known_of_a_search_over_tables():
+    data = dataset_of(user_block(), table(grid=SMALL, SPRING=150.0))
+    search = data.search(user_block(), data.free_parameters(user_block()))
+    after, found = search.candidates([cdf.LinearSpring, cdf.QuadraticDrag])
+    assert [t.key for t in after.screened] == [t.key for t in found] and not search.screened
+    with pytest.raises(AttributeError, match="first_look"):
+        search.after(first_look=found)

@@ -107,6 +107,8 @@ class Search(ABC):
 
     def after(self, **found) -> Self:
         """Return the search as it stands after this was found; it itself stays what it is."""
+        if unknown := [name for name in found if not hasattr(self, name)]:
+            raise AttributeError(f"a search finds no {', '.join(unknown)}")
         other = copy.copy(self)
         vars(other).update(found)
         return other
