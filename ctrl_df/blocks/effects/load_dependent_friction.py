@@ -14,7 +14,8 @@ class LoadDependentFriction(Effect):
 
     Carried is what passes from the drive to what it moves: with a `share` of the inertia behind the gears,
     ``share drive + (1 - share) load``, where `load` is what acts against the drive, but inertia and dry
-    friction: springs, gravity, and viscous friction too. In a block with an elastic joint it is the friction of the motor.
+    friction: springs, gravity, and viscous friction too. In a block with an elastic joint it is the friction
+    of the motor.
 
     Parameters
     ----------
