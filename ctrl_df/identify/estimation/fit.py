@@ -173,14 +173,18 @@ class FitResult:
         return [x[b] for w, x in zip(self.segments, signals, strict=True) for b in w.blocks]
 
     def with_errors(self, errors: Mapping[str, float]) -> FitResult:
-        """Return the same with standard errors of some parameters known otherwise, where it has any."""
+        """Return the same with further standard errors of some parameters, beside what slopes tell of them.
+
+        Where slopes tell nothing (a null direction), these are all there is.
+        """
         if not len(self.covariance):
             return self
-        covariance = self.covariance.copy()
+        covariance, untold = self.covariance.copy(), in_null_directions(self)
         for name, error in errors.items():
             i = self.names.index(name)
-            covariance[i, :] = covariance[:, i] = 0.0
-            covariance[i, i] = error**2
+            if name in untold:
+                covariance[i, :] = covariance[:, i] = 0.0
+            covariance[i, i] += error**2
         null = [(size, [part for part in parts if part[0] not in errors]) for size, parts in self.null]
         return replace(self, covariance=covariance, null=[(size, parts) for size, parts in null if parts])
 
