@@ -6,7 +6,7 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.segmented import prepare
 from ctrl_df.identify.prediction.simulator import free_run
-from ctrl_df.identify.selection.reference import begun
+from ctrl_df.identify.selection.reference import reference_of
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -22,6 +22,6 @@ def test_a_gap_is_refitted_past_its_impacts(seed):
     table = truth.parameters
     model = truth.with_parameters({k: table[k].value * f for k, f in zip(names, off, strict=True)})
     data = prepare(model, [record])
-    at = begun(model, data.segmentations, names)
+    at = reference_of(model, data.segmentations, names)
     # 2.1 and 2.5 times the noise before, 0.98 and 0.94 now
     assert at.base.train.rmse < 1.1 * data.noise

@@ -96,7 +96,7 @@ def test_other_phase_of_the_record_held_out():
         abs(math.remainder(best.parameters["phase"] - 0.3, 2 * math.pi)) < 0.3
     )  # that of the training record
     data = prepare(best.model, [run], [held])
-    *_, error = data.segmentations[0].judged(best.model)
+    *_, error = data.segmentations[0].evaluated(best.model)
     assert error * np.std(held.y) < 1.1 * 2e-4
 
 

@@ -185,7 +185,7 @@ def test_what_nothing_explains_is_said_in_torques():
         data[cls] = cdf.diagnose(model, record, candidates=["quadratic_drag"])
     line, axis = data.values()
     assert line.verdict == axis.verdict == "unknown"
-    assert "acts like a force" in line.remains and "acts like a torque" in axis.remains
+    assert "behaves like a force" in line.remains and "behaves like a torque" in axis.remains
 
 
 def test_limits_of_an_experiment_are_those_of_the_motion():

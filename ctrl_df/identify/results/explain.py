@@ -74,8 +74,8 @@ def explain(d, words) -> str:
         )
         tried = tried and tried + sensed_side(d, first)
         return (
-            "No single effect of the library explains what is missing: several of them, which improve would "
-            "add one after the other, or something outside it. The refitted model errs by "
+            "No single effect explains what is missing: several may, which improve adds one after the other, "
+            "or something outside the library. The refitted model errs by "
             f"{percent(d.nrmse)}{words.of}. " + " ".join(filter(None, (tried, *d.doubts, d.remains)))
         )
     size = (
