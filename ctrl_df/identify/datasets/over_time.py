@@ -11,7 +11,7 @@ from ..estimation.refit_records import doubts, refit_records, undetermined
 from ..estimation.thresholds import RESTARTS_KEPT, UNCOUNTED
 from ..planning.inputs import input_that_separates
 from ..prediction.loop_force import driven_by_force
-from ..prediction.prepared import REFERENCE
+from ..prediction.prepared import recorded_reference
 from ..prediction.segments import make_segments
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
@@ -104,7 +104,7 @@ class TimeDataset(Dataset):
         )  # fmt: skip
 
     def _tells_references(self) -> bool:
-        return all(any(k in (r.channels or {}) for k in REFERENCE) for r in self.records)
+        return all(recorded_reference(r) is not None for r in self.records)
 
     def search(self, block, free):
         """Return the search over segments of the records."""

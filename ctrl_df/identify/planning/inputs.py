@@ -67,21 +67,15 @@ def input_that_separates(
         )
     t = dt * np.arange(int(round(duration / dt)))
     play = (
-        _Free(models, record, t, centre, reach)
+        _Free(models, record, t, centre, reach, force)
         if loop is None
-        else _Loop(models, loop, record, t, centre, noise)
+        else _Loop(models, loop, record, t, centre, noise, reach)
     )
-    shapes = _shapes(t, record) if loop is None else _references(t, record)
-    sized = [(kind, size * shape) for kind, shape in shapes.items() for size in PLAN_SIZES]
-    # about no force, or about the one at which a machine works that a spring or its weight holds there
-    levels = [0.0, float(np.mean(record.u))] if loop is None else [centre]
+    sized = [(kind, size * shape) for kind, shape in play.shapes.items() for size in PLAN_SIZES]
     best, still = None, 0
-    for level in levels:
-        size = force - abs(level) if loop is None else PLAN_MARGIN * reach
-        best, still = _most_telling(
-            play, [(kind, level + size * shape) for kind, shape in sized], t, names, noise,
-            lambda y: float(np.max(np.abs(y - centre))), (PLAN_MARGIN * reach * PLAN_SLACK, force),
-        )  # fmt: skip
+    for level, size in play.ranges:
+        inputs = [(kind, level + size * shape) for kind, shape in sized]
+        best, still = _most_separating(play, inputs, t, noise, (PLAN_MARGIN * reach * PLAN_SLACK, force))
         if best is not None:
             break
     if best is None and still == len(sized):
@@ -104,27 +98,27 @@ def input_that_separates(
         f"{what}: the outputs of {separated(names)} then differ by at least {digits(best.separation, 2)} "
         f"times the noise, within {digits(best.stroke)} {long} of the centre."
     )
-    return replace(best, reason=reason)
+    return replace(best, candidates=names, reason=reason)
 
 
-def _most_telling(play, inputs, t, names, noise, distance, most) -> tuple[Experiment | None, int]:
+def _most_separating(play, inputs, t, noise, most) -> tuple[Experiment | None, int]:
     """Return the input that separates best, and how many move nothing.
 
     Parameters
     ----------
-    play : callable
-        Returns the outputs of all models, the largest force asked, and how far any two outputs are apart.
+    play : _Free or _Loop
     inputs : list of (str, (n,) array)
-    distance : callable
-        How far an output goes.
+        Kinds, and values at the times `t` (n,).
+    noise : float
+        Of the output.
     most : (float, float)
         Largest distance and force.
     """
     best, best_moves, still = None, False, 0
     for kind, u in inputs:
         ys, asked, gaps = play(u)
-        far = max(map(distance, ys))
-        if not np.isfinite(far) or far > most[0] or asked > most[1] * PLAN_SLACK:
+        far = max(float(np.max(np.abs(y - play.centre))) for y in ys)
+        if not np.isfinite(far) or far > most[0] or asked > most[1]:
             continue
         spans = [float(np.ptp(y)) for y in ys]
         if max(spans) <= noise:
@@ -134,15 +128,26 @@ def _most_telling(play, inputs, t, names, noise, distance, most) -> tuple[Experi
         # a record in which nothing may move teaches one bit, one in which all candidates move their shape
         moves = min(spans) > PLAN_MOVES * max(spans)
         if best is None or (moves, separation) > (best_moves, best.separation):
-            best_moves, best = moves, Experiment(t, u, kind, names, separation, far, "", (), asked)
+            best_moves, best = moves, Experiment(t, u, kind, (), separation, far, "", (), asked)
     return best, still
 
 
 class _Free:
-    """Plays a force on every model."""
+    """Plays a force on every model.
 
-    def __init__(self, models, record, t, centre, reach):
+    Attributes
+    ----------
+    shapes : dict of str to (n,) array
+        Inputs of peak one.
+    ranges : tuple of (float, float)
+        Level and largest deviation of inputs: about no force, or about the mean one of the record, which
+        holds a machine that works on a spring or under its weight.
+    """
+
+    def __init__(self, models, record, t, centre, reach, force):
         self.models, self.record, self.t, self.centre = models, record, t, centre
+        mean = float(np.mean(record.u))
+        self.shapes, self.ranges = _shapes(t, record), ((0.0, force), (mean, force - abs(mean)))
         self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
 
     def __call__(self, u):
@@ -158,20 +163,20 @@ class _Loop:
 
     A good controller hides the differences of the models in their positions; they are in the force. What
     counts is therefore how far one model, driven by the force that another would be given, is from the
-    other's position.
+    other's position. `shapes` and `ranges` are as those of `_Free`, of the reference.
     """
 
-    def __init__(self, models, loop, record, t, centre, noise):
+    def __init__(self, models, loop, record, t, centre, noise, reach):
         from ...simulate.loop import closed_loop
 
         parts = getattr(loop, "parts", None)
         if parts is None:
             raise TypeError(
                 f"loop must come from ctrl_df.closed_loop; got {type(loop).__name__}. Build it from a "
-                "controller "
-                "and the block."
+                "controller and the block."
             )
         self.models, self.record, self.centre = models, record, centre
+        self.shapes, self.ranges = _references(t, record), ((centre, PLAN_MARGIN * reach),)
         self.moves = parts.block.coordinates
         self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
         self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]

@@ -7,7 +7,7 @@ import numpy as np
 from ...simulate.response import event_response
 from ..data.measurement import Measurement
 from ..data.quantities import quantity_of
-from .prepared import REFERENCE
+from .prepared import REFERENCE, recorded_reference
 from .segments import facts
 from .thresholds import FOLLOWED_AS_REFERENCE, POINTS_OF_A_SAMPLE
 
@@ -27,7 +27,7 @@ def driven_by_force(model, record: Measurement) -> Measurement:
         reference of what was not measured.
     """
     parts = getattr(model, "parts", None)
-    if parts is None or any(name in (record.channels or {}) for name in REFERENCE):
+    if parts is None or recorded_reference(record) is not None:
         return record
     if quantity_of(record.input_unit) not in ("position", "velocity"):
         _check_force(record)

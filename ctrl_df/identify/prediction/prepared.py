@@ -37,6 +37,12 @@ class PreparedModel:
     hold: str = ""  # between the values of the drive; as recorded if not said
 
 
+def recorded_reference(record) -> np.ndarray | None:
+    """Return the reference of a loop that a record has beside the force, (n,); None where it has none."""
+    channels = record.channels or {}
+    return next((channels[k] for k in REFERENCE if k in channels), None)
+
+
 def of_system(system, record, u) -> PreparedModel:
     """Return a system of which nothing is known, driven by the input `u` (n,)."""
     return PreparedModel(Engine(system), None, 0, *_before(record, record.t, u))
@@ -44,12 +50,11 @@ def of_system(system, record, u) -> PreparedModel:
 
 def of_loop(loop, record, u, mechanism: bool) -> PreparedModel:
     """Return a loop, driven by the record's reference, or by `u` where it has none."""
-    channels = record.channels or {}
-    reference = next((channels[k] for k in REFERENCE if k in channels), u)
-    block = loop.parts.block
+    reference, block = recorded_reference(record), loop.parts.block
+    driven = u if reference is None else reference
     offset = (loop.nstates or 0) - (block.nstates or 0)
     core = block.core if mechanism else None
-    return PreparedModel(Engine(loop), core, offset, *_before(record, record.t, reference))
+    return PreparedModel(Engine(loop), core, offset, *_before(record, record.t, driven))
 
 
 def of_block(block, record, u, decimation: int) -> PreparedModel:

@@ -43,8 +43,7 @@ def unconfirmed(first) -> str:
     return (
         f"The fitted data favour {named(first.effect)} (log-likelihood higher by "
         f"{first.evidence_fitted:.0f}), but the held-out data do not confirm it "
-        f"({first.evidence_holdout:.1f}): "
-        "it may not act in them. Hold out a record in which it acts."
+        f"({first.evidence_holdout:.1f}): it may not act in them. Hold out a record in which it acts."
     )
 
 
@@ -136,10 +135,8 @@ def falls_behind(first, long) -> str:
     others = " and ".join(f"{percent(error)} {name}" for name, error in who)
     return (
         f"In free prediction over {long.horizon:.3g} s, with internal states continued from segment to "
-        "segment, "
-        f"the error is {percent(long.errors[first.id])} with {named(first.effect)}, but {others}: its "
-        "agreement "
-        "over short segments proves nothing."
+        f"segment, the error is {percent(long.errors[first.id])} with {named(first.effect)}, but {others}: "
+        "its agreement over short segments proves nothing."
     )
 
 
@@ -166,8 +163,7 @@ def grows(short: float, error: float, seconds: float, effect=None) -> str:
     more = "" if effect is None else ": something else is missing, too"
     return (
         f"{who} follows short segments with an error of {percent(short)}, but not long ones: refitted to "
-        "segments "
-        f"of {seconds:.3g} s its error is {percent(error)}{more}."
+        f"segments of {seconds:.3g} s its error is {percent(error)}{more}."
     )
 
 
@@ -200,8 +196,7 @@ def displaces(first) -> str:
     values = " and ".join(f"{k} at {digits(table[k].value)} {table[k].unit}".strip() for k in first.displaced)
     return (
         f"With {named(first.effect)}, parameters of the model itself reach a bound of their range "
-        f"({values}): "
-        f"{named(first.effect)} may stand in for wrong values of these."
+        f"({values}): {named(first.effect)} may stand in for wrong values of these."
     )
 
 
@@ -214,13 +209,9 @@ def explain_so_far(d, words) -> str:
         return f"{size}; no effect tried so far explains this error."
     first, *others = d.ranking[:4]
     behind = f", ahead of {', '.join(named(c.effect) for c in others)}" if others else ""
-    how = (
-        "It is refitted and validated on held-out data"
-        if first.confirmed
-        else "None of them is confirmed yet"
-    )
+    confirmed, not_yet = "It is refitted and validated on held-out data", "None of them is confirmed yet"
+    how = confirmed if first.confirmed else not_yet
     return (
         f"{size}; {named(first.effect)} explains most of this error (with it: "
-        f"{percent(first.nrmse)}){behind}. "
-        f"{how}; the diagnosis is not complete."
+        f"{percent(first.nrmse)}){behind}. {how}; the diagnosis is not complete."
     )

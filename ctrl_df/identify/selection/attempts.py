@@ -18,11 +18,11 @@ from ...simulate.parallel import side_by_side
 from ..estimation.fit import FitResult
 from ..estimation.per_record import begun_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
-from ..prediction.values import feasible
+from ..prediction.values import with_values
 from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
 from ..starting.regression import Start
-from ..starting.resonance_grid import resonating
+from ..starting.resonance_grid import is_joint, resonating
 from ..starting.screen import Screen, starts_for
 from ..thresholds import GIVE_UP
 from .thresholds import (
@@ -131,11 +131,11 @@ def fit_effects(
         return side_by_side(function, jobs, executor)
 
     kinds = [c for c in classes if applicable(c, screen.block)]
-    user = screen.block.with_parameters(feasible(screen.block, dict(nominal)))
+    user = with_values(screen.block, nominal)
     states = screen.data.states_of(user)
     about = screen.data.fit(user, tuple(free), starts=states.starts, iterations=0)
     places = _Places(screen, short, Screen(about, screen.data), tuple(nominal.items()))
-    joints = kinds if screen.block.core.bodies == 1 and not known else []
+    joints = [c for c in kinds if is_joint(c, screen)] if screen.block.core.bodies == 1 and not known else []
     begun = run(_attempts_of, [(c, screen, places, free, known) for c in kinds])
     if on_screened is not None:
         on_screened(_ranked_starts(begun, screen))
@@ -296,7 +296,7 @@ def _best(attempts, count) -> list[Attempt]:
 
 
 def _joint_attempts(job) -> list[Attempt]:
-    """Return the attempts at a joint with a share of the mass behind it; none of other effects."""
+    """Return the attempts at a joint with a share of the mass behind it."""
     cls, share, screen, free = job
     found = []
     for near in resonating(cls, screen, share, JOINTS):
@@ -362,7 +362,7 @@ def _attempt_at_user(cls, screen: Screen, places: _Places, free, starts) -> Atte
 def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt | None:
     """Return the attempt from a start; None where the effect contradicts the block."""
     values = {k: v for k, v in start.values if k in free}
-    base = screen.block.with_parameters(feasible(screen.block, values))
+    base = with_values(screen.block, values)
     block, key = extended(base, start.effect), start.effect.id
     if block is None:
         return None

@@ -24,7 +24,7 @@ from ..estimation.multistart import (
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
-from ..prediction.values import feasible
+from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
 from .equivalence import matching_along
@@ -256,7 +256,7 @@ def _reconciled(
 
 def _about(points, near: FitResult, longer: SegmentedData, far: FitResult) -> FitResult:
     """Return the best of a fit in longer segments and of those started about one in shorter segments."""
-    models = [near.model.with_parameters(feasible(near.model, values)) for values in points]
+    models = [with_values(near.model, values) for values in points]
     begun = side_by_side(
         lambda model: longer.moved(replace(near, model=model), iterations=2, give_up=GIVE_UP * far.rmse),
         models,
@@ -360,7 +360,7 @@ def _cross_started(at: Reference, chosen, those) -> list[CandidateFit]:
 
     def started_there(pair):
         tried, best = pair
-        fit = cross_started(tried, best, fine, matching(tried, best))
+        fit = cross_started(tried, best, fine, matching(tried.block.effects[-1], best.block.effects[-1]))
         return fit and thresholds_refined(fine.validate(replace(tried, train=fit)), fine)
 
     pairs = [(t, best) for best in those for t in chosen if t is not best]

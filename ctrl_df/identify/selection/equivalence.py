@@ -23,14 +23,12 @@ from .thresholds import BUMP_LEFT, CONFIRMED, PASSED
 
 
 def matching_along(data: SegmentedData, block) -> Callable:
-    """Return ``matching(tried, other)``: the effect of a candidate with values that make it act as another.
+    """Return ``matching(effect, other)``: an effect with values that make it act as another; or None.
 
     `data`, `block`: the motion, and the model that is driven along it.
     """
     motion = motion_of(data.train, data.decimation, block)
-    return lambda tried, other: like_another(
-        tried.block.effects[-1], other.block.effects[-1], motion.x, motion.v
-    )
+    return lambda effect, other: like_another(effect, other, motion.x, motion.v)
 
 
 def restarted_from_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
@@ -55,7 +53,7 @@ def restarted_from_better(found: Sequence[CandidateFit], data: SegmentedData, bl
     """
     matching = matching_along(data, block)
     pairs = [(t, best) for i, best in enumerate(found[:CONFIRMED]) for t in found[i + 1 :]]
-    matches = side_by_side(lambda pair: matching(*pair), pairs)
+    matches = side_by_side(lambda pair: matching(*(t.block.effects[-1] for t in pair)), pairs)
     able = [
         (*pair, match)
         for pair, match in zip(pairs, matches, strict=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...simulate.parallel import side_by_side
 from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
-from ..prediction.values import feasible
+from ..prediction.values import with_values
 from ..thresholds import FLOOR, GROWTH, RULED_OUT
 from .evidence import ranked
 from .reference import Reference
@@ -104,7 +104,7 @@ def beyond_range(at: Reference, best: CandidateFit, significant: float, refit: C
     ):
         return None
     free = replace(at, data=replace(at.data, limits={}))
-    regressed = at.base.block.with_parameters(feasible(at.base.block, at.regressed))
+    regressed = with_values(at.base.block, at.regressed)
     begins = (at.base, replace(at.base, train=free.data.fine.fit(regressed, at.base.train.names)))
     other = min((refit(free, begin, seen=True) for begin in begins), key=lambda f: f.train.rmse)
     values = {k: p.value for k, p in other.block.parameters.items()}

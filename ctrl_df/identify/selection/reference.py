@@ -12,7 +12,7 @@ from ..estimation.common_friction import dry_level, inertia, viscous_slope
 from ..estimation.fit import FitResult
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..estimation.thresholds import RESTARTS_KEPT
-from ..prediction.values import feasible
+from ..prediction.values import with_values
 from ..shooting.noise_model import NoiseModel
 from ..starting.regression import force_regression, motion_of
 from ..thresholds import FLOOR, UNMOVED
@@ -116,9 +116,7 @@ class Reference:
         base = self.base
         for best in found[:2]:
             values = {k: best.block.parameters[k].value for k in free}
-            again = self.data.fit(
-                base.block.with_parameters(feasible(base.block, values)), free, iterations=BASE_STEPS
-            )
+            again = self.data.fit(with_values(base.block, values), free, iterations=BASE_STEPS)
             if again.rmse < base.train.rmse:
                 base = CandidateFit("", again)
         return replace(self, base=base)
@@ -133,7 +131,7 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     guess = {k: float(v) for k, v in zip(names, plain, strict=True) if k and v > 0} | own
     guess = {k: v for k, v in guess.items() if k in free}
     if guess:
-        begins.append(block.with_parameters(feasible(block, guess)))
+        begins.append(with_values(block, guess))
     short = [shortest.fit(begin, free, iterations=BASE_STEPS) for begin in begins]
     fits = [data.moved(f, BASE_LONGER_STEPS) for f in short]
     if block.nonsmooth and free:

@@ -16,12 +16,10 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows
-from ..starting.like_another import like_another
-from ..starting.regression import motion_of
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
-from .equivalence import breaks_away_only, indistinguishable
+from .equivalence import breaks_away_only, indistinguishable, matching_along
 from .evidence import ranked, step_as_recorded
 from .named import beyond_range, refitted, whole_refit
 from .reference import Reference, reference_of
@@ -145,8 +143,7 @@ class StructureSearch(Search):
 
     def represents(self, effect, other) -> bool:
         """Whether an effect can act as another one along the motion, with other values."""
-        motion = motion_of(self.at.data.train, self.at.data.decimation, self.at.base.block)
-        return like_another(effect, other, motion.x, motion.v) is not None
+        return matching_along(self.at.data, self.at.base.block)(effect, other) is not None
 
     # --- results --------------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from ...drawing import draw
 from ...numerals import digits
 from ..data.measurement import Measurement
 from ..prediction.loop_force import driven_by_force
-from ..prediction.prepared import REFERENCE
+from ..prediction.prepared import recorded_reference
 from ..prediction.segments import facts, load_of, make_segments
 from ..prediction.simulators import simulator_of
 from ..residuals.motion_phases import reversals
@@ -255,7 +255,7 @@ def missing_force(model, record: Measurement) -> MissingForce:
             "ctrl_df.Mass, TwoMass, Inertia or TwoInertias and effects."
         )
     record = driven_by_force(model, record)
-    if parts is not None and not any(name in (record.channels or {}) for name in REFERENCE):
+    if parts is not None and recorded_reference(record) is None:
         raise ValueError(
             "a missing force of a loop needs the force that was recorded, and the input of "
             f"{record.name!r} may be the reference. State input_unit= of a reference, as that of the output, "

@@ -14,6 +14,11 @@ from .screen import Screen
 from .thresholds import JOINT_DAMPING, JOINT_GAIN, JOINTS_TRIED, RESONANCES
 
 
+def is_joint(cls, screen: Screen) -> bool:
+    """Whether effects of a class divide the mass by an elastic joint."""
+    return cls.from_spring(1.0, 1.0, 0.5, screen.scales.of) is not None
+
+
 def resonating(cls, screen: Screen, share: float, count: int) -> list[FitResult]:
     """Return the baseline with the joints that fit best, as many as `count`: initial states alone fitted.
 

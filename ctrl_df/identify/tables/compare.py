@@ -200,8 +200,7 @@ def plane_regions(points: Points, error) -> Regions:
         what = "amplitudes" if kind == "amplitude" else "frequencies"
         sentence = (
             f"{share:.0%} of the squared error lies at {what} of {label}, against {expected:.0%} of the "
-            "points"
-            f" (p {'< 1e-6' if p < 1e-6 else f'= {p:.2g}'})."
+            f"points (p {'< 1e-6' if p < 1e-6 else f'= {p:.2g}'})."
         )
         regions.append(Region(kind, label, share, expected, p, bias, 1.0, span, sentence))
     regions.sort(key=lambda r: (r.p_value >= LEVEL, -r.excess))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..prediction.values import feasible
+from ..prediction.values import with_values
 from ..shooting.scales import Scales
 from ..shooting.variables import Variable
 from .errors import rms
@@ -180,7 +180,7 @@ class _Job:
 
     def model(self, z):
         values = {v.name: v.p(q) for v, q in zip(self.variables, z, strict=True)}
-        return self.block.with_parameters(feasible(self.block, values)) if values else self.block
+        return with_values(self.block, values)
 
     def errors(self, z) -> np.ndarray:
         self.count += 1

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
-from ..prediction.values import feasible
+from ..prediction.values import with_values
 from ..shooting.scales import Scales
 from ..thresholds import NEARLY_NOTHING
 from .points import Points
@@ -95,7 +95,7 @@ class ForceBalance:
             step = BALANCE_NUDGE * (abs(p.value) or scales.of(p.line_unit))
             if p.value + step > p.upper:
                 step = -step
-            moved.append(block.with_parameters(feasible(block, {name: p.value + step})))
+            moved.append(with_values(block, {name: p.value + step}))
             steps.append(step)
         rows = self.forces([block, *moved])
         missing = self.weight * (self.applied - rows[0])
@@ -122,6 +122,6 @@ class ForceBalance:
             low = p.lower if p.lower > 0 or not p.strict else BALANCE_LOWEST * abs(p.value)
             values[name] = float(np.clip(p.value + delta, low, p.upper))
         try:
-            return block.with_parameters(feasible(block, values))
+            return with_values(block, values)
         except ValueError:
             return None

@@ -307,8 +307,7 @@ class TableSearch(Search):
         look = places(where) or "The error is spread over the whole plane."
         remains = (
             f"The errors of neighbouring points agree: structure of {percent(remainder.structure)} beside "
-            "scatter of "
-            f"{percent(remainder.noise)}. {look}"
+            f"scatter of {percent(remainder.noise)}. {look}"
         )
         far = np.count_nonzero(outlying(best.error))
         note = (
