@@ -305,6 +305,12 @@ def test_trial_states_that_run_away_leave_nothing_behind():
         assert abs(alone[1] / y[k, 0, 1] - 1) < 2e-9  # measured 1e-11, beside these frequencies 5e-10
 
 
+def test_rounding_of_large_positions_does_not_hide_that_an_elastic_gap_is_odd():
+    # the joint is compressed by 1e-5 of the positions whose difference that is
+    joint = block(cdf.TwoMass(1, 3), cdf.Viscous(1.0), cdf.Compliance(500.0, 1.0), cdf.Backlash(0.01))
+    assert DrivenBlock(joint).laws_for(100.0, 1.0).odd
+
+
 # --- channels -----------------------------------------------------------------------------------------------
 
 

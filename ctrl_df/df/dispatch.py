@@ -26,7 +26,7 @@ from .methods import (
     RateLimiterForm,
     Sampled,
 )
-from .thresholds import SAMPLES
+from .thresholds import SAMPLES, STATIC_PROBES
 
 # python-control's own classes, held at import: someone may put ours in their place.
 _SATURATION = descfcn.saturation_nonlinearity
@@ -164,8 +164,8 @@ def _is_static(F, largest) -> bool:
         F = copy.deepcopy(F)  # do not disturb a memory that is the user's
     except Exception:  # whatever cannot be copied is tried as it is
         pass
-    up = largest * np.linspace(-1, 1, 33)
-    for u in up[16:]:
+    up = largest * np.linspace(-1, 1, STATIC_PROBES)
+    for u in up[STATIC_PROBES // 2 :]:
         F(float(u))
     down = [np.squeeze(F(float(u))) for u in up[::-1]]
     again = [np.squeeze(F(float(u))) for u in up]

@@ -8,7 +8,7 @@ import numpy as np
 
 from .methods import Method, Quadrature
 from .threads import go_on
-from .thresholds import NO_GAIN, SMALL
+from .thresholds import NO_GAIN, SMALL, UNBOUNDED
 
 _RECTANGLE = 4  # the grid of distinct A and omega is computed whole up to so many times the points asked
 
@@ -98,7 +98,7 @@ def _slope_at_zero(method, largest, zero_check):
             )
     small = (largest or 1.0) * np.array(SMALL)
     N = method.harmonics(small, None, 1)[0][:, 0, 1]
-    if abs(N[0]) > 5 * abs(N[1]):
+    if abs(N[0]) > UNBOUNDED * abs(N[1]):
         return complex(np.inf)
     return N[0] if abs(N[0]) > NO_GAIN * abs(N[2]) else 0j
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..limit_cycles.predicted.thresholds import LOEB
 from .controller import GAINS
 from .plane import Plane
-from .thresholds import JUMP, POLISH_STEPS, POLISHED, SINGULAR
+from .thresholds import JUMP, POLISH_REACH, POLISH_STEPS, POLISHED, SINGULAR
 
 
 class Segments(NamedTuple):
@@ -115,7 +115,7 @@ def polished(
     """Newton's method from a cycle found on the grid to (ln a, ln omega), and Loeb's sine there."""
     start = np.array([p, q])
     x = start.copy()
-    reach = 3 * np.array([np.diff(plane.log_a).max(), np.diff(plane.log_w).max()])
+    reach = POLISH_REACH * np.array([np.diff(plane.log_a).max(), np.diff(plane.log_w).max()])
     for _ in range(steps):
         F, by_p, by_q = defect(plane, gains, x[:1], x[1:])
         J = np.array([[by_p[0].real, by_q[0].real], [by_p[0].imag, by_q[0].imag]])

@@ -16,6 +16,7 @@ from .thresholds import (
     FOLD_BEYOND,
     FOLD_CLOSED,
     FOLD_LEAST,
+    FOLD_NEWTON,
     FOLD_NUDGE,
     FOLD_POINTS,
     FOLD_REACH,
@@ -153,7 +154,7 @@ def _one_way(equations, plane, u, along):
 
 def _corrected(equations, guess, border):
     u = guess
-    for _ in range(8):
+    for _ in range(FOLD_NEWTON):
         G, J = _linearized(equations, u)
         if not (np.isfinite(G).all() and np.isfinite(J).all()):
             return None

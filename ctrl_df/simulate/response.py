@@ -21,7 +21,7 @@ from ..table import Table
 from .engine import Engine, Event, callback_drive, constant_drive, sampled_drive
 from .program import layout as L
 from .program.parameters import checked_parameters, with_values
-from .thresholds import LOG, MAX_STEPS, ROUNDED, RTOL, RTOL_RANGE, SHOWN
+from .thresholds import CALLBACK_STEP, LOG, MAX_STEPS, ROUNDED, RTOL, RTOL_RANGE, SHOWN
 
 _kept = threading.local()  # the mechanism that each thread has simulated last, and its engine
 
@@ -178,7 +178,7 @@ def event_response(
         raise ValueError(wrong[1])
     drive, samples, keep = _drive(inputs, engine.ninputs, times, input_hold)
     if max_step is None and callable(inputs):
-        limits["max_step"] = 5 * float(np.median(np.diff(times)))
+        limits["max_step"] = CALLBACK_STEP * float(np.median(np.diff(times)))
     run = engine.run(
         engine.start(x0, times[0]), times[-1], drive, times, log=LOG if keep_events else 1, **limits
     )

@@ -23,6 +23,7 @@ from .program.layout import H_NG
 from .thresholds import (
     FAR,
     HEIGHT,
+    INTERVAL_LONGER,
     INTERVAL_STEPS,
     PEAK_SAMPLES,
     STEPS_AT_ONCE_MANY,
@@ -133,7 +134,7 @@ def _follow(
     peeks, spent = times.shape[0], 0
     for i in range(ends.shape[0]):
         begin = clock[0]
-        ahead = 4.0 * (last[0] - last[1]) if last[2] >= 2.0 else first
+        ahead = INTERVAL_LONGER * (last[0] - last[1]) if last[2] >= 2.0 else first
         for k in range(peeks):
             times[k] = begin + k * (ahead / (peeks - 1))
         times[peeks - 1] = begin + ahead

@@ -313,7 +313,15 @@ TOGETHER_RUNS, TOGETHER_INTERVALS, SPLITS = 256, 64, 64
 """Runs, intervals in one call; kinds of systems in a batch, beyond which they are packed one by one."""
 
 INTERVAL_STEPS, PEAK_SAMPLES = 400_000, 129
-"""Steps of a interval at most; points in it, thirty a crossing, from which the peak of an output is read."""
+"""Steps of an interval at most; points in it, thirty a crossing, from which the peak of an output is read."""
+
+INTERVAL_LONGER = 4.0
+"""Longest interval without a crossing, over the one before. Of ten loops verified all come out as at half of
+it, in the same time; at twice one start of a relay's loop is taken to come to rest, which it does not."""
+
+CALLBACK_STEP = 5
+"""Longest step, in those between output times, where the input is a function of time: it may jump anywhere,
+and a longer step would pass over what it does between two outputs."""
 
 LARGEST = 2 << 30
 """Memory [bytes] of the outputs and states of a batch."""

@@ -10,6 +10,7 @@ from ..thresholds import (
     CORNER,
     CORNER_HALVINGS,
     CORNER_LEAST,
+    CORNER_WINDOW,
     DEPTH,
     DIGIT,
     INTERVAL_SHARE,
@@ -159,9 +160,10 @@ def find_corners(law, u) -> np.ndarray:
     y = law(u)
     slope = np.diff(y) / np.diff(u)
     bend = np.abs(np.diff(slope))
-    if bend.size < 7:
+    if bend.size < CORNER_WINDOW:
         return np.zeros(0)
-    around = np.median(np.lib.stride_tricks.sliding_window_view(np.pad(bend, 3, mode="edge"), 7), axis=1)
+    padded = np.pad(bend, CORNER_WINDOW // 2, mode="edge")
+    around = np.median(np.lib.stride_tricks.sliding_window_view(padded, CORNER_WINDOW), axis=1)
     strong = np.nonzero(bend > CORNER * around + CORNER_LEAST * np.abs(slope).max())[0]
     strong = np.sort(strong[np.argsort(bend[strong])[::-1][:MOST_CORNERS]])
     corners = [_bisect_corner(law, u[i], u[i + 2]) for i in strong]

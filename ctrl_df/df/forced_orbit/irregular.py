@@ -14,6 +14,7 @@ from ..thresholds import (
     LONGEST_PERIOD,
     NOTHING,
     RTOL,
+    STEADY_ERRORS,
     STEADY_SLOPE,
     WAITS,
 )
@@ -110,11 +111,7 @@ def _averages(shots, state, orders, averages):
 
 
 def _steady(means, sizes) -> bool:
-    """Whether averages over consecutive blocks scatter and do not tend anywhere.
-
-    A slope is believed from four times its standard error: for eight blocks one steady motion in 200 is then
-    followed longer than need be.
-    """
+    """Whether averages over consecutive blocks scatter and do not tend anywhere."""
     at = np.arange(len(means)) - 0.5 * (len(means) - 1)
     size = np.max(np.abs(means))
     for found, scale in ((means.real, size), (means.imag, size), (sizes, np.max(sizes))):
@@ -122,6 +119,6 @@ def _steady(means, sizes) -> bool:
         slope = at @ values / (at @ at)
         rest = values - values.mean() - slope * at
         error = np.sqrt(rest @ rest / (len(at) - 2) / (at @ at))
-        if abs(slope) > 4 * error and abs(slope) * len(at) > STEADY_SLOPE:
+        if abs(slope) > STEADY_ERRORS * error and abs(slope) * len(at) > STEADY_SLOPE:
             return False
     return True

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...simulate.engine import State
-from ..thresholds import EVEN_LEAST, NOTHING, SLOW_CHANGE
+from ..thresholds import CHANGES_SEEN, EVEN_LEAST, NOTHING, SLOW_CHANGE
 from .driven_block import Laws
 from .fourier import even_share
 from .orbit_search import ClosedOrbit
@@ -73,5 +73,5 @@ def changes(laws: Laws, samples, shots: int):
 
 def slow(laws: Laws, samples) -> bool:
     """Whether a motion changes little, and steadily, from shot to shot: a transient, not chaos."""
-    steps = np.max(np.abs(changes(laws, samples, 1)), axis=1, initial=0.0)[-4:]
+    steps = np.max(np.abs(changes(laws, samples, 1)), axis=1, initial=0.0)[-CHANGES_SEEN:]
     return bool(np.max(steps) < SLOW_CHANGE and np.max(steps) < 2 * np.min(steps))

@@ -12,7 +12,7 @@ from ...blocks.mechanism import Mechanism
 from ...blocks.transparent import without_delays
 from ...simulate.engine import Engine, State
 from ...simulate.program import layout
-from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE
+from ..thresholds import COARSE, WAVE_PERIODS, WAVE_PERIODS_GAP, WAVE_PERIODS_MORE, WAVE_STARTS
 from .damped import close_damped
 from .driven_block import DrivenBlock, Laws
 from .fourier import shifted
@@ -103,9 +103,9 @@ class PeriodicResponse:
         omega = shots.force.omega
         driven = shots.force.A / (sum(core.masses) * omega)
         crossing = gap * omega / np.pi  # one gap in half a period: the two-impact motion
-        for speed in (3.0 * driven, crossing, -crossing, 2.0 * crossing, -driven):
+        for of_driven, of_crossing in WAVE_STARTS:
             x = np.zeros(n)
-            x[2], x[3] = 0.5 * gap, speed
+            x[2], x[3] = 0.5 * gap, of_driven * driven + of_crossing * crossing
             yield engine.start(x), dict(periods=WAVE_PERIODS_GAP, far=True)
 
     def _closed(self, shots, state, orders, periods=0, near=False, far=False) -> ClosedOrbit | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..thresholds import EVENS, LATER, LATEST
+from ..thresholds import CHANGES_SEEN, EVENS, LATER, LATEST
 from .damped import close_damped
 from .irregular import irregular_motion
 from .motion import Motion, Start, changes, motion_of, slow
@@ -45,7 +45,7 @@ def steady_motion(shots: Shots, start: Start, orders: int, *, transient: int, av
         later = max(LATER - transient, 1)
         orbit, state = follow(first, state, later, orders, transient=transient, repels=repels)
     if orbit is None:
-        samples, state, *_ = first.iterates(state, 5)
+        samples, state, *_ = first.iterates(state, CHANGES_SEEN + 1)
         orbit, _ = close_orbit(first, state, orders=orders)
         if orbit is None and first.mirrored and _alternates(laws, samples):
             orbit, _ = close_orbit(first.over(mirrored=False), state, orders=orders)

@@ -17,6 +17,7 @@ from ..threads import go_on
 from ..thresholds import (
     AT_ONCE,
     COARSE,
+    FIRST_STALE,
     FIRST_STEP,
     NAN_AHEAD,
     PUSHED,
@@ -186,7 +187,7 @@ class Shots:
         """Take one; integrals of the outputs against the harmonics go to `spectrum` (rows, orders + 1)."""
         at, period = self.laws.period_map, self.force.period
         state, orders = state.copy(), 1 if spectrum is None else spectrum.shape[1] - 1
-        if not 0.0 < at.clock[2] <= 5 * FIRST_STEP * period:
+        if not 0.0 < at.clock[2] <= FIRST_STALE * FIRST_STEP * period:
             at.clock[2] = FIRST_STEP * period
         reason = apply(
             at.at, self.force.drive, self.span(periods), state.x, state.mode, self.mirrored, rtol, 0.0,

@@ -16,7 +16,7 @@ from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, constant_drive
 from ...simulate.kernel.look import look_at
 from ...simulate.program import layout as L
-from ..thresholds import ALIKE, PROBES, RIPPLED, SHIFTS
+from ..thresholds import ALIKE, AT_REST, GRAIN, INPUT_DECADES, PROBES, RIPPLED, SHIFTS, STATE_DECADES
 
 
 @dataclass
@@ -144,11 +144,11 @@ class Probe:
         """Random states over several decades, bodies within their gaps, some of them at rest."""
         n = self.engine.nstates
         for i in range(PROBES):
-            x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(-4, 1, size=n) * self.sizes.states
-            u = self.rng.normal() * 10.0 ** self.rng.uniform(-1, 2) * self.sizes.force
+            x = self.rng.normal(size=n) * 10.0 ** self.rng.uniform(*STATE_DECADES, size=n) * self.sizes.states
+            u = self.rng.normal() * 10.0 ** self.rng.uniform(*INPUT_DECADES) * self.sizes.force
             for node in _mechanisms(self.prog):
                 at, bodies = node[L.X], self.prog.ints[node[L.AUX] + L.A_BODIES]
-                if i % 3 == 0:
+                if i % AT_REST == 0:
                     x[at + 1 : at + 2 * bodies : 2] = 0.0
                 if bodies == 2:
                     joint, gap = self.prog.ints[node[L.AUX] + L.A_JOINT], self.prog.par[node[L.PAR] + L.P_GAP]
@@ -259,11 +259,13 @@ def _autonomous(probe, samples):
 
 
 def _close(a, b, tol=ALIKE):
-    """Whether two arrays agree, entry by entry: their units differ."""
+    """Whether two arrays (m, n) agree, column by column: their units differ."""
     finite = np.isfinite(b)
     if not np.array_equal(finite, np.isfinite(a)):
         return False
-    return bool(np.all(np.abs(a[finite] - b[finite]) <= tol * np.abs(b[finite])))
+    a, b = np.where(finite, a, 0.0), np.where(finite, b, 0.0)
+    size = np.abs(b)
+    return bool(np.all(np.abs(a - b) <= tol * size + GRAIN * np.max(size, axis=0, initial=0.0)))
 
 
 def _wavelengths(block):

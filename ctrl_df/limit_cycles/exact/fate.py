@@ -11,7 +11,7 @@ from ..thresholds import NOTHING
 from .known import KnownOrbits
 from .orbit import Orbit
 from .poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, PoincareSearch
-from .thresholds import ASKED, CROSSINGS, FACTORS, HALVINGS, LINGERS, WIDTH, WOUND
+from .thresholds import ASKED, CROSSINGS, FACTORS, HALVINGS, LINGERING, LINGERS, WIDTH, WOUND
 
 
 @dataclass(frozen=True)
@@ -228,8 +228,8 @@ class Explorer:
         orbit = known.beside(crossings[k])
         if orbit is not None or change[k] > LINGERS:
             return orbit
-        near = crossings[max(k - 4, 0) : k + 2]
-        padded = [near[0]] * (6 - len(near)) + near if len(near) < 6 else near
+        near = crossings[max(k + 2 - LINGERING, 0) : k + 2]
+        padded = [near[0]] * (LINGERING - len(near)) + near
         orbit = self.close(x0, Course(padded, UNDECIDED, 1.0, course.end), False)
         return known.kept(orbit) if orbit is not None and orbit.stable is False else None
 

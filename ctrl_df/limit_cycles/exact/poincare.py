@@ -38,6 +38,7 @@ from .thresholds import (
     REPEATS_EXACTLY,
     REPEATS_LEAST,
     SAMPLED_WORK,
+    SIZED,
     STEADY,
     STEPS,
     SUSTAINED_DECAY,
@@ -240,7 +241,7 @@ class PoincareSearch:
 
     def repeats(self, crossings) -> bool:
         """Whether the last two crossings met the same state; closer if no Newton follows."""
-        sizes = np.max(np.abs([c.state for c in crossings[-6:]]), axis=0)
+        sizes = np.max(np.abs([c.state for c in crossings[-SIZED:]]), axis=0)
         largest = max(float(np.max(sizes / self.units)), NOTHING)
         bound = (
             REPEATS_EXACTLY * np.maximum(sizes, REPEATS_LEAST * largest * self.units)

@@ -16,7 +16,18 @@ from .crossings import Crossing, Scan, linear_zeros
 from .grade import DOUBTFUL, UNRELIABLE, ForcedMotion, LimitCycle, band, graded, loeb, sensitivity
 from .path import End, follow_path
 from .scan_grid import grid_slope, noisy
-from .thresholds import DYNAMIC_ERROR, FLOOR, FOLD, GUESSED, IRREGULAR, MEMORYLESS_ERROR, SAFETY, VAGUE
+from .thresholds import (
+    DYNAMIC_ERROR,
+    FLOOR,
+    FOLD,
+    GUESSED,
+    IRREGULAR,
+    MEMORYLESS_ERROR,
+    SAFETY,
+    SAME_STEPS,
+    SPREADS,
+    VAGUE,
+)
 
 
 class Assessor:
@@ -47,7 +58,7 @@ class Assessor:
         with np.errstate(all="ignore"):
             values = 1 + self.family.N * self.linear(self.family.omega)
         cells = irregular[:-1, :-1] | irregular[1:, :-1] | irregular[:-1, 1:] | irregular[1:, 1:]
-        reach = 3 * np.array([np.diff(log_a).max(), np.diff(log_w).max()])
+        reach = SAME_STEPS * np.array([np.diff(log_a).max(), np.diff(log_w).max()])
         known = [np.log([c.amplitude, c.omega]) for c in self.named]
         found = []
         for place in linear_zeros(log_a, log_w, values, cells):
@@ -57,7 +68,7 @@ class Assessor:
             w = np.exp(place[1:])
             y, regime, spread = self.method.harmonics(np.exp(place[:1]), w, 1)
             residual = float(abs(1 + y[0, 0, 1] * self.linear(w)[0]))
-            told = residual <= min(max(IRREGULAR, 3 * spread[0, 0]), VAGUE)
+            told = residual <= min(max(IRREGULAR, SPREADS * spread[0, 0]), VAGUE)
             if not noisy(regime, spread)[0, 0] or not told:
                 continue  # a jump between coexisting motions, not a crossing
             note = (
