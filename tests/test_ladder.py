@@ -251,6 +251,20 @@ def test_of_two_that_hide_each_other_neither_need_be_significant():
     assert set(study.effects) == {"coulomb", "constant_force"}
 
 
+def test_a_better_end_is_left_by_its_own_branches():
+    # two pairs of effects, of which neither shows alone
+    levels = {"": 0, "coulomb": 15, "stiction": 10, "hysteresis": 8, "coulomb linear_spring": 200,
+              "coulomb linear_spring constant_force": 215,
+              "coulomb linear_spring constant_force quadratic_drag": 1000}  # fmt: skip
+    data = Data(levels)
+    Given.errors, before = (lambda self, t: (math.exp(-t.level / 100),) * 2), Given.errors
+    try:
+        study = ladder_of(data)
+    finally:
+        Given.errors = before
+    assert set(study.effects) == {"coulomb", "linear_spring", "constant_force", "quadratic_drag"}
+
+
 def test_what_predicts_better_over_long_stretches_goes_first(monkeypatch):
     # over segments hysteresis stands in for both that are missing; freely it follows nothing
     levels = {"": 0, "hysteresis": 700, "linear_spring": 500, "constant_force": 40,

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
 from typing import Any
 
 from ...blocks.effect import Effect
@@ -101,6 +100,11 @@ class Node:
         return replace(self, diagnosis=found, steps=steps, refused=effect)
 
 
+def _key(node: Node, effect: CandidateEffect) -> tuple[str, ...]:
+    """Return the key of the structure of a node with a candidate added."""
+    return node.structure.plus(effect.model).key
+
+
 def plainest(ranking) -> CandidateEffect:
     """Return the simplest of the candidates that the data hardly distinguish from the first."""
     first, near = ranking[0], rivals(ranking)
@@ -137,13 +141,16 @@ class StepwiseSelection:
     def run(self) -> Study:
         """Return the end of the ladder and its neighbours."""
         end, neighbourhood = self._local_best(self._search_from(self.start, None))
-        for node, effect in islice(self._untried(end), BRANCHES):
-            if end.diagnosis.verdict != UNKNOWN:
+        refused: set[tuple[str, ...]] = set()
+        while end.diagnosis.verdict == UNKNOWN and len(refused) < BRANCHES:
+            untried = next(self._untried(end, refused), None)
+            if untried is None:
                 break
-            other = self._branch(
-                end, node, effect, self._study(end.steps, end.search, UNDER_WAY, neighbourhood)
-            )
-            if other is not None:
+            best = self._study(end.steps, end.search, UNDER_WAY, neighbourhood)
+            other = self._branch(end, *untried, best)
+            if other is None:
+                refused.add(_key(*untried))
+            else:
                 end, neighbourhood = self._local_best(self._forward(other))
         steps = self._refitted_in_full(end)
         neighbourhood = replace(neighbourhood, nrmse=steps[-1].nrmse, nrmse_holdout=steps[-1].nrmse_holdout)
@@ -305,9 +312,10 @@ class StepwiseSelection:
 
     # --- other branches ---------------------------------------------------------------------------------
 
-    def _untried(self, end: Node) -> Iterator[tuple[Node, CandidateEffect]]:
+    def _untried(self, end: Node, refused: set[tuple[str, ...]]) -> Iterator[tuple[Node, CandidateEffect]]:
         """Yield candidates not followed on a path: the best of every step before the second of any.
 
+        `refused`: keys of structures that are left out, as are those visited.
         Within a step they are in order of error: where several effects are missing none need stand out alone.
         """
         found = []
@@ -320,11 +328,10 @@ class StepwiseSelection:
                 if c.id in named or not c.nrmse < SHOWS_HARDLY * node.diagnosis.nrmse:
                     continue
                 named |= {c.id, *c.equivalents}
-                key = node.structure.plus(c.model).key
-                found.append(((rank, c.nrmse / node.diagnosis.nrmse, key), node, c))
+                found.append(((rank, c.nrmse / node.diagnosis.nrmse, _key(node, c)), node, c))
                 rank += 1
         for (_, _, key), node, c in sorted(found, key=lambda f: f[0]):
-            if key not in self.visited:
+            if key not in self.visited and key not in refused:
                 yield node, c
 
     def _branch(self, end: Node, node: Node, effect: CandidateEffect, best: Study) -> Node | None:

@@ -4,8 +4,9 @@ RIVALS = 2
 """Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
 
 BRANCHES = 3
-"""Rivals of steps from which a ladder begins again where it ended with something unexplained: of two effects
-hidden one that stands in for both ranks first, and the right ones follow (rigs)."""
+"""Rivals of steps from which a ladder begins again, and ends no better, where it ended with something
+unexplained: of two effects hidden one that stands in for both ranks first, and the right ones follow
+(rigs)."""
 
 STEPS_NEIGHBOUR, STEPS_SAME, STEPS_COMPARED = 8, 4, 6
 """Steps of a fit: of a model that differs by one effect; of one fitted before, over other data; of two models
