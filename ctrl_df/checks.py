@@ -56,7 +56,7 @@ def number(
     remedy: str = CHECK_VALUE,
     infinite: bool = False,
 ) -> float:
-    """Return one real number within its bounds; `lower` itself is excluded if `strict`.
+    """Return one real number within its bounds; `lower` itself is excluded if `strict`, zero without a bound.
 
     A `Column` (one number for each of many runs) is one as well, and a `PerRecord`; both stay what they are.
     """
@@ -65,13 +65,20 @@ def number(
         tail = "Convert text with float()." if isinstance(value, str | bytes) else remedy
         raise TypeError(f"{owner} needs {name} as {kind}; got {shown(value)}. {tail}")
     given = _as_float(value)
-    enough = given > lower if strict else given >= lower
+    enough = above(given, lower, strict)
     finite = infinite or abs(given) < math.inf
     if not (enough and given <= upper and finite):  # NaN fails every comparison
         described = f" ({meaning}, unit {unit or 1})" if meaning else (f" [{unit}]" if unit else "")
         rule = _rule(name, lower, upper, strict, infinite)
         raise ValueError(f"{owner} needs {rule}{described}; got {name}={shown(value)}. {remedy}")
     return given
+
+
+def above(value, lower: float, strict: bool) -> Any:
+    """Whether a value, or each of an array, keeps to a lower bound; strict and -inf: whether it is not 0."""
+    if not strict:
+        return value >= lower
+    return value > lower if lower > -math.inf else (value > 0) | (value < 0)
 
 
 def _as_float(value) -> Any:
@@ -243,4 +250,6 @@ def _rule(name, lower, upper, strict, infinite):
         return f"{name} {'>' if strict else '>='} {lower:g}{end}"
     if math.isfinite(upper):
         return f"{name} <= {upper:g}{end}"
+    if strict:
+        return f"{name} != 0{end}"
     return f"{name}" + (" as a number" if infinite else " finite")

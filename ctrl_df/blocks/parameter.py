@@ -28,7 +28,7 @@ class Parameter:
     lower, upper : float
         Bounds, inclusive unless `strict`.
     strict : bool
-        Whether `lower` itself is excluded.
+        Whether `lower` itself is excluded; without a lower bound, zero.
     free : bool
         Whether a refit moves it unless told otherwise.
     meaning : str
@@ -68,6 +68,11 @@ class Parameter:
     def __post_init__(self):
         if not self.line_unit:
             object.__setattr__(self, "line_unit", self.unit)
+
+    @property
+    def one_sign(self) -> bool:
+        """Whether a value may have any size but not change its sign."""
+        return self.strict and self.lower in (0.0, -math.inf) and math.isinf(self.upper)
 
     def __float__(self) -> float:
         return self.value

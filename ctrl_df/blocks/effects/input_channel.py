@@ -1,5 +1,6 @@
 """Effects on the way of the applied force: saturation, dead zone, gain, lag, delay."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -91,12 +92,12 @@ class InputDeadZone(Effect):
 @register_effect
 @dataclass(frozen=True)
 class InputGain(Effect):
-    """The drive gives `gain` times the commanded force.
+    """The drive gives `gain` times the commanded force; a negative gain reverses it.
 
     Parameters
     ----------
     gain : float
-        Actual over nominal drive gain, > 0.
+        Actual over nominal drive gain, not 0.
 
     Examples
     --------
@@ -105,11 +106,11 @@ class InputGain(Effect):
     2.0
     """
 
-    gain: float = parameter("", strict=True, meaning="actual over nominal drive gain")
+    gain: float = parameter("", lower=-math.inf, strict=True, meaning="actual over nominal drive gain")
 
     role: ClassVar[str] = "input"
-    shows: ClassVar[str] = "error proportional to the applied force"
-    source: ClassVar[str] = "drive gain"
+    shows: ClassVar[str] = "error proportional to the applied force (a negative gain: the force is reversed)"
+    source: ClassVar[str] = "drive gain; a negative one: sign of the force, or of the place, in the record"
 
     def channel(self):
         """Return the straight line."""
@@ -117,13 +118,13 @@ class InputGain(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Return gains about one."""
-        return [cls(g) for g in (0.7, 0.9, 0.97, 1.03, 1.1, 1.3)]
+        """Return gains about one, and the nominal one reversed."""
+        return [cls(g) for g in (0.7, 0.9, 0.97, 1.03, 1.1, 1.3, -1.0)]
 
     @classmethod
     def suggest_on_plane(cls, plane):
-        """Return gains about one."""
-        return [(cls(g), 1.0) for g in (0.7, 0.9, 1.1, 1.4)]
+        """Return gains about one, and the nominal one reversed."""
+        return [(cls(g), 1.0) for g in (0.7, 0.9, 1.1, 1.4, -1.0)]
 
 
 @register_effect

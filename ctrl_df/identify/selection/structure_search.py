@@ -177,6 +177,8 @@ class StructureSearch(Search):
         if len(fit.null) <= len(self.at.base.train.null):
             # the model has these directions without the effect, too: sizes are known but for its scale
             doubtful -= in_null_directions(fit)
+        # whatever its size, it is reversed
+        doubtful -= {k for k in own if table[k].one_sign and values.get(k, 1.0) < 0}
         return tuple(k.rpartition(".")[2] for k in own if k in doubtful)
 
     def displaced(self, candidate):
@@ -258,7 +260,8 @@ class StructureSearch(Search):
             for r, w in zip(self.at.data.train.records, far.segments, strict=True)
         )
         if best is not None:
-            return replace(left, doubt=grows(near.nrmse, far.nrmse, seconds, best.block.effects[-1]))
+            doubt = grows(near.nrmse, far.nrmse, seconds, best.block.effects[-1])
+            return replace(left, doubt=doubt, more=True)
         doubt = grows(near.nrmse, far.nrmse, seconds)
         error = math.sqrt(far.rmse**2 - near.rmse**2)
         return replace(left, structure=max(left.structure, error), unexplained=True, doubt=doubt)

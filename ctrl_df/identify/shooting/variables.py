@@ -1,4 +1,4 @@
-"""Parameters as a solver sees them: scaled, logarithmic where they are positive, kept within their bounds."""
+"""Parameters as a solver sees them: scaled, logarithmic where they keep their sign, kept in their bounds."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def step_of_sensor(block) -> str | None:
 
 
 class Variable:
-    """One parameter: physical value p, scaled value q; strictly positive ones on a logarithmic scale.
+    """One parameter: physical value p, scaled value q; those of one sign on a logarithmic scale.
 
     `begin`: where it begins; of a parameter that every record has for itself, in one of them.
     """
@@ -83,8 +83,8 @@ class Variable:
     def __init__(self, name, parameter, natural, limits=None, begin=None):
         self.name, self.begin = name, parameter.value if begin is None else begin
         self.lower, self.upper = parameter.lower, parameter.upper
-        # Bounded on both sides (a share, a restitution): linear. Strictly positive: logarithmic.
-        self.log = parameter.strict and parameter.lower == 0 and math.isinf(parameter.upper)
+        # Bounded on both sides (a share, a restitution): linear. Of one sign: logarithmic.
+        self.log = parameter.one_sign
         self.natural = natural
         if parameter.strict and not self.log:
             self.lower = parameter.lower + OPEN_BOUND
@@ -93,6 +93,8 @@ class Variable:
         # of the value that it can have, where it begins; one that is next to nothing says nothing of a size
         size = abs(min(max(self.begin, self.lower), self.upper))
         self.scale = size if self.log or size > NO_SIZE * natural else natural
+        if self.log and self.begin < 0:
+            self.scale = -self.scale
 
     def q(self, p: float) -> float:
         """Return the scaled value of a physical one."""
@@ -107,8 +109,9 @@ class Variable:
     def clip(self, q: float) -> float:
         """Return the scaled value within the bounds nearest to `q`."""
         if self.log:
-            low = self.q(self.lower) if self.lower > 0 else -math.inf
-            return min(max(q, low), self.q(self.upper) if self.upper < math.inf else math.inf)
+            near, far = (self.lower, self.upper) if self.scale > 0 else (self.upper, self.lower)
+            low = self.q(near) if near / self.scale > 0 and math.isfinite(near) else -math.inf
+            return min(max(q, low), self.q(far) if math.isfinite(far) else math.inf)
         return min(max(q, self.lower / self.scale), self.upper / self.scale)
 
     def slope(self, q: float) -> float:
@@ -168,7 +171,7 @@ def beforehand(variables, about: Mapping[str, Prior]) -> tuple[np.ndarray, np.nd
     means, precisions, stated = np.zeros((3, len(variables)))
     for i, v in enumerate(variables):
         value, std = about.get(v.name, Prior(math.nan))
-        if math.isnan(value) or (v.log and value <= 0):
+        if math.isnan(value) or (v.log and value / v.scale <= 0):
             continue
         means[i] = v.q(value)
         if std is not None:

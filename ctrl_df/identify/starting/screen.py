@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ...blocks.core import kinetic_level
+from ...checks import above
 from ..estimation.fit import FitResult
 from ..estimation.segmented import SegmentedData
 from ..estimation.starts import continued_states
@@ -163,7 +164,7 @@ def _ranked_starts(effect, screen, total) -> Iterator[Start]:
 def _scaled(effect, factor):
     name, p = next(iter(effect.parameters.items()))
     value = p.value * min(max(factor, -FACTOR_MOST), FACTOR_MOST)
-    if value < p.lower or value > p.upper or (p.strict and value <= p.lower) or value == 0:
+    if not (above(value, p.lower, p.strict) and value <= p.upper and value):
         return None
     return effect.replace(**{name: value})
 

@@ -119,8 +119,11 @@ class ForceBalance:
         values = {}
         for name, delta in zip(names, change / size, strict=True):
             p = table[name]
-            low = p.lower if p.lower > 0 or not p.strict else BALANCE_LOWEST * abs(p.value)
-            values[name] = float(np.clip(p.value + delta, low, p.upper))
+            low, high = p.lower, p.upper
+            if p.strict and low <= 0:  # it keeps its sign
+                nearest = BALANCE_LOWEST * p.value
+                low, high = (nearest, high) if nearest > 0 else (low, nearest)
+            values[name] = float(np.clip(p.value + delta, low, high))
         try:
             return with_values(block, values)
         except ValueError:

@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 
 from ...blocks.parameter import Parameter
-from ...checks import known_name, mapping, number, real_array
+from ...checks import above, known_name, mapping, number, real_array
 from ...values.column import Column
 
 
@@ -79,7 +79,7 @@ def checked_parameters(owner: str, system, params) -> dict[str, np.ndarray]:
 
 
 def _require_bounds(owner, name, array, spec):
-    enough = array > spec.lower if spec.strict else array >= spec.lower
+    enough = above(array, spec.lower, spec.strict)
     wrong = np.flatnonzero(~(enough & (array <= spec.upper)))
     if wrong.size:
         where = f" of run {wrong[0]}" if array.ndim else ""
