@@ -85,23 +85,23 @@ def whole_refit(at: Reference, tried: CandidateFit, prior, seen: bool) -> Candid
     return other if seen else replace(other, validation=tried.validation)
 
 
-def beyond_range(at: Reference, best: CandidateFit, significant: float, refit: Callable):
+def beyond_range(at: Reference, best: CandidateFit, refit: Callable):
     """Return the model without an effect, refitted without limits, where that explains more than the best.
 
     Fits keep the model's own parameters within a range of what they were stated to be. Where one ends at a
-    limit, wrong units of record or model are as likely as a missing effect. Where the error of the best is
-    noise nothing is left to explain.
+    limit, with the best effect or without, or a regression puts it beyond, wrong units of record or model are
+    as likely as a missing effect: a drive gain far from one does what other values of all parameters do, with
+    one more.
 
     Returns
     -------
     tuple of (CandidateFit, tuple of str) or None
         With the parameters that left their range; None: all are within, or it explains no more.
     """
-    values = {k: p.value for k, p in at.base.block.parameters.items()}
     spans = {k: span for k, span in at.data.limits.items() if k in at.base.train.names}
-    if best.train.rmse <= FLOOR * at.data.noise or all(
-        a * ON_LIMIT < values[k] < b / ON_LIMIT for k, (a, b) in spans.items()
-    ):
+    fitted = [{k: p.value for k, p in tried.block.parameters.items()} for tried in (at.base, best)]
+    tables = (*fitted, at.regressed)
+    if all(a * ON_LIMIT < t[k] < b / ON_LIMIT for t in tables for k, (a, b) in spans.items() if k in t):
         return None
     free = replace(at, data=replace(at.data, limits={}))
     regressed = with_values(at.base.block, at.regressed)
@@ -110,4 +110,4 @@ def beyond_range(at: Reference, best: CandidateFit, significant: float, refit: C
     values = {k: p.value for k, p in other.block.parameters.items()}
     left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)
     (again,), _ = ranked(at.base, [other])
-    return (other, left) if left and again.evidence > best.evidence + significant else None
+    return (other, left) if left and again.evidence > best.evidence else None

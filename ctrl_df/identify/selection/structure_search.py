@@ -26,7 +26,7 @@ from .reference import Reference, reference_of
 from .remaining import located, remainder
 from .screening import Screening
 from .search import Remainder, Search, Words
-from .thresholds import EXACT, SIGNIFICANT_HELD, SIZE_KNOWN
+from .thresholds import EXACT, FOLLOWED, SIGNIFICANT_HELD, SIZE_KNOWN
 
 
 class StructureSearch(Search):
@@ -229,7 +229,7 @@ class StructureSearch(Search):
         )  # fmt: skip
         if not significant and self.at.unmoved(self.significant):
             return replace(left, unexplained=True, doubt=explains_nothing())
-        if far := beyond_range(self.at, best, self.significant, self._whole_refit):
+        if far := beyond_range(self.at, best, self._whole_refit):
             other, names = far
             return replace(left, unexplained=True, doubt=far_off(other, names, self.block))
         if self.at.grows:
@@ -249,21 +249,22 @@ class StructureSearch(Search):
         all that is missing, though it is part of it.
         """
         near, far = self.at.nearest, self.at.farthest
+        assert far is not None
+        without = far.rmse
         if best is not None:
             shortest, *_, longest = self.at.segmentations
             near, far = shortest.moved(best.train), longest.reached(best.train)
-        assert far is not None
         if far.rmse <= self.at.grown(near, far) * near.rmse:
             return left
         seconds = max(
             float(np.max(w.ends - w.begins)) * facts(r).dt
             for r, w in zip(self.at.data.train.records, far.segments, strict=True)
         )
+        error = math.sqrt(far.rmse**2 - near.rmse**2)
         if best is not None:
             doubt = grows(near.nrmse, far.nrmse, seconds, best.block.effects[-1])
-            return replace(left, doubt=doubt, more=True)
+            return replace(left, doubt=doubt, more=left.more or error > FOLLOWED * without)
         doubt = grows(near.nrmse, far.nrmse, seconds)
-        error = math.sqrt(far.rmse**2 - near.rmse**2)
         return replace(left, structure=max(left.structure, error), unexplained=True, doubt=doubt)
 
     def located(self, best, remainder, unknown):

@@ -53,9 +53,10 @@ LEFT = 0.2
 unknown hidden leave more to whatever stands in for it, those of the library less."""
 
 FOLLOWED = 0.05
-"""The same share up to which the best candidate is the answer whatever remains: 0.25 % of the power. A right
-law leaves that where the input is not known exactly (a moving base read by an accelerometer: 0.015), one that
-stands in for another law more (rigs with something unknown hidden: 0.07 and more)."""
+"""The same share up to which the best candidate is the answer whatever remains, over segments of any length:
+0.25 % of the power. A right law leaves that where the input is not known exactly (a moving base read by an
+accelerometer: 0.015), one that stands in for another law more (rigs with something unknown hidden: 0.07 and
+more)."""
 
 CURVE_SHARE = 0.15
 """Share of a missing force that is a curve over one quantity from which on that quantity is reported. On 40
