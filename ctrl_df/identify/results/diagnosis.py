@@ -20,8 +20,9 @@ from ..thresholds import RULED_OUT
 from .thresholds import SHOWN_PROBABILITY
 
 CALIBRATED = (
-    "Probabilities are posterior probabilities of the candidates and of nothing being missing, all equal a "
-    "priori, from the likelihood of whitened residuals. Checked on virtual rigs of an independent generator "
+    "Probabilities are posterior ones, of the candidates, all equal a priori, and of nothing being missing, "
+    "with prior odds over each of the likelihood ratio from which an effect is significant; likelihoods are "
+    "of whitened residuals. Checked on virtual rigs of an independent generator "
     "(benchmarks/second.py; figures and rigs in docs/calibration.md): 219 rigs with one hidden effect, named "
     "first in 95 %; 86 with nothing hidden, verdict none in 98 %; of the statements made with a "
     "probability of "
@@ -102,7 +103,8 @@ class CandidateEffect(Brief, Predicting):
         Log-likelihood ratio over the refitted baseline, less the price of its parameters (Schwarz). Of
         several segments held out the one that speaks most for the effect does not count.
     probability : float
-        Among all candidates and "nothing missing", equal before the data.
+        Among all candidates, equal before the data, and "nothing missing", of which the prior odds are the
+        evidence that chance makes: an effect that is not significant is less likely than nothing.
     parameters : dict
         Fitted parameters of the effect.
     equivalents : tuple of str

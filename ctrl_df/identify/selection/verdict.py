@@ -114,7 +114,9 @@ class _Question:
         """Return the diagnosis as it stands with these candidates, best first; it names no effect."""
         search = self.search
         chosen = [t for t in found if t.confirmed]
-        weights = dict(zip((t.key for t in chosen or found), _probabilities(chosen or found), strict=True))
+        weights = dict(
+            zip((t.key for t in chosen or found), _probabilities(chosen or found, search), strict=True)
+        )
         ranking = [_entry(t, search, weights.get(t.key, 0.0), ()) for t in found]
         significant = bool(ranking) and ranking[0].evidence > search.significant
         verdict = NONE if search.exact() else AMBIGUOUS if significant else UNKNOWN
@@ -142,7 +144,7 @@ class _Question:
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
         ranking = []
-        for candidate, weight in zip(chosen, _probabilities(chosen), strict=True):
+        for candidate, weight in zip(chosen, _probabilities(chosen, search), strict=True):
             same = tuple(o.key for o in chosen if o is not candidate and search.equivalent(candidate, o))
             ranking.append(_entry(candidate, search, weight, same))
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
@@ -316,12 +318,16 @@ def _errs_more(first: CandidateEffect, search: Search) -> bool:
     return first.nrmse_holdout > FLOOR * search.errors(search.base)[1]
 
 
-def _probabilities(chosen) -> list[float]:
-    """Return those of candidates, "nothing missing" being one more, all equal before the data."""
+def _probabilities(chosen, search: Search) -> list[float]:
+    """Return those of candidates, "nothing missing" being one more, the candidates equal before the data.
+
+    Prior odds for nothing are those at which chance makes an effect significant: what is not is less likely
+    than nothing.
+    """
     if not chosen:
         return []
-    top = max(chosen[0].evidence, 0.0)
-    weights = np.exp(np.clip([*(t.evidence - top for t in chosen), -top], -EXPONENT, 0))
+    log_odds = [*(t.evidence for t in chosen), search.significant]
+    weights = np.exp(np.clip(np.array(log_odds) - max(log_odds), -EXPONENT, 0))
     return (weights / weights.sum())[:-1].tolist()
 
 
