@@ -30,7 +30,6 @@ class ImposedSimulator(Simulator):
         super().__init__(model, record, **keywords)
         imposable(self.block)
         self.motion = imposed_motion(record)
-        self._extra = self.input - self.facts.load if keywords.get("force") is not None else None
 
     @property
     def position_dependent(self) -> bool:
@@ -60,6 +59,16 @@ class ImposedSimulator(Simulator):
 
     def run_all(self, asked, *, rounded: bool = False) -> list[np.ndarray]:
         """Return the forces of several (segments, values, start), all in one call."""
+        forces = self._forces(asked)
+        return [self._within(f, w) for f, (w, _, _) in zip(forces, asked, strict=True)]
+
+    def run_driven(self, segments, start, inputs) -> list[np.ndarray]:
+        """Return the forces where others (n,) act in place of the recorded load: by so much more."""
+        (force,) = self._forces([(segments, None, start)])
+        return [self._within(force + (u - self.facts.load), segments) for u in inputs]
+
+    def _forces(self, asked) -> np.ndarray:
+        """Return the forces of several (segments, values, start) at all samples of the record."""
         self.runs += len(asked)
         cores = [self._core(values) for _, values, _ in asked]
         z0 = np.array([self._begin(c, w, s) for c, (w, _, s) in zip(cores, asked, strict=True)])
@@ -68,12 +77,12 @@ class ImposedSimulator(Simulator):
         # at rest dry friction may be anything between its two levels: no error within
         between = np.sort([forces[:, at], back], axis=0)
         forces[:, at] = np.clip(self.record.y[at], *between)
-        if self._extra is not None:
-            forces = forces + self._extra
+        return forces
+
+    def _within(self, force, segments: Segments) -> np.ndarray:
+        """Return a force (n,) at the samples of segments; what ran away is set aside."""
         away = float(np.mean(self.record.y)) + FAR_OUT * self.facts.spread
-        return [
-            np.where(np.isfinite(f), f, away)[w.samples] for f, (w, _, _) in zip(forces, asked, strict=True)
-        ]
+        return np.where(np.isfinite(force), force, away)[segments.samples]
 
     def _core(self, values) -> Core:
         model: Any = with_values(self.model, values)

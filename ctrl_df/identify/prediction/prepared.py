@@ -43,21 +43,24 @@ def recorded_reference(record) -> np.ndarray | None:
     return next((channels[k] for k in REFERENCE if k in channels), None)
 
 
-def of_system(system, record, u) -> PreparedModel:
-    """Return a system of which nothing is known, driven by the input `u` (n,)."""
-    return PreparedModel(Engine(system), None, 0, *_before(record, record.t, u))
+def of_system(system, record, u, engine: Engine | None = None) -> PreparedModel:
+    """Return a system of which nothing is known, driven by the input `u` (n,).
+
+    `engine`, here and below: of the same model under another input.
+    """
+    return PreparedModel(engine or Engine(system), None, 0, *_before(record, record.t, u))
 
 
-def of_loop(loop, record, u, mechanism: bool) -> PreparedModel:
+def of_loop(loop, record, u, mechanism: bool, engine: Engine | None = None) -> PreparedModel:
     """Return a loop, driven by the record's reference, or by `u` where it has none."""
     reference, block = recorded_reference(record), loop.parts.block
     driven = u if reference is None else reference
     offset = (loop.nstates or 0) - (block.nstates or 0)
     core = block.core if mechanism else None
-    return PreparedModel(Engine(loop), core, offset, *_before(record, record.t, driven))
+    return PreparedModel(engine or Engine(loop), core, offset, *_before(record, record.t, driven))
 
 
-def of_block(block, record, u, decimation: int) -> PreparedModel:
+def of_block(block, record, u, decimation: int, engine: Engine | None = None) -> PreparedModel:
     """Return a mechanism, driven by the input `u` (n,) in steps of `decimation` samples."""
     t, held, static = record.t, u, record.input_hold == "zoh"
     outside, input_delay = [], 0.0
@@ -88,14 +91,14 @@ def of_block(block, record, u, decimation: int) -> PreparedModel:
     delays = [p.delay if isinstance(p, Delay) else 0.0 for p in tail]
     later = [float(sum(delays[i + 1 :])) for i in range(len(tail))]
     output = [(p, rest) for p, rest in zip(tail, later, strict=True) if not isinstance(p, Delay)]
-    inner = block
-    if outside:
+    if engine is None:
         kept = [e for k, e in block.named_effects.items() if k not in outside]
-        inner = block.with_effects(kept)
+        engine = Engine(block.with_effects(kept) if outside else block)
+    inner: Any = engine.system
     time, value, hold = _driven(record, held, decimation)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
     return PreparedModel(
-        Engine(inner),
+        engine,
         inner.core,
         0,
         time + input_delay if input_delay else time,

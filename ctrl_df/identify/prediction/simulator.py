@@ -50,8 +50,6 @@ class Simulator:
         run as many times faster and the result a little coarser; for first iterations.
     rtol : float
         Relative tolerance of the engine.
-    force : (n,) array or None
-        Input in place of the recorded one.
     begins : str
         How segments begin: `initial_states.FREE`, `CONTINUED` or `MEASURED`.
 
@@ -68,12 +66,11 @@ class Simulator:
         *,
         decimation: int = 1,
         rtol: float = RTOL,
-        force: np.ndarray | None = None,
         begins: str = initial_states.FREE,
     ):
         model = for_record(model, record.name)
         self.model, self.record, self.rtol, self.begins = model, record, rtol, begins
-        self.input = np.asarray(record.u if force is None else force)
+        self.input = np.asarray(record.u)
         self.closed = getattr(model, "parts", None) is not None
         self.block = block_of(model)
         self.mechanism = isinstance(self.block, Mechanism)
@@ -185,8 +182,23 @@ class Simulator:
         list of (n,) arrays
             One for each that is asked for.
         """
+        return self._run([self.prepared(values) for _, values, _ in asked], asked, rounded)
+
+    def run_driven(self, segments: Segments, start: np.ndarray | None, inputs) -> list[np.ndarray]:
+        """Do what `run` does under each of several inputs (n,) in place of the recorded one, in one call.
+
+        Returns
+        -------
+        list of (n,) arrays
+            One for each input.
+        """
+        engine = self.prepared(None).engine
+        parts = [self._driven(self.model, u, engine) for u in inputs]
+        return self._run(parts, [(segments, None, start)] * len(parts), False)
+
+    def _run(self, parts: Sequence[PreparedModel], asked: Sequence[Request], rounded: bool):
+        """Run models made ready over what is asked for, with the values that they have."""
         self.runs += len(asked)
-        parts = [self.prepared(values) for _, values, _ in asked]
         if self.continued:
             outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
         else:
@@ -408,18 +420,20 @@ class Simulator:
         key = None if values is None else tuple(values.items())
         if key in self._prepared:
             return self._prepared[key]
-        model: Any = with_values(self.model, values)
-        if self.closed:
-            part = of_loop(model, self.record, self.input, self.mechanism)
-        elif self.mechanism:
-            part = of_block(model, self.record, self.input, self.decimation)
-        else:
-            part = of_system(model, self.record, self.input)
+        part = self._driven(with_values(self.model, values), self.input)
         require_compiled(part.engine)
         if len(self._prepared) >= _PREPARED:
             del self._prepared[next(iter(self._prepared))]
         self._prepared[key] = part
         return part
+
+    def _driven(self, model: Any, u, engine=None) -> PreparedModel:
+        """Return a model ready to run under the input `u` (n,); `engine`: of it, where there is one."""
+        if self.closed:
+            return of_loop(model, self.record, u, self.mechanism, engine)
+        if self.mechanism:
+            return of_block(model, self.record, u, self.decimation, engine)
+        return of_system(model, self.record, u, engine)
 
     def _start(self, part, segments, w, start, time, hidden) -> State:
         given = hidden | (dict(zip(self.free_states, start, strict=True)) if start is not None else {})

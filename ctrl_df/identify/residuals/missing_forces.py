@@ -21,7 +21,16 @@ from ..prediction.sensed import POSITION, force_scale, sensed
 from ..shooting.noise_model import NoiseModel, noise_of_outputs
 from ..shooting.thresholds import NOISE_ORDER
 from ..thresholds import DEPENDENT, NOTHING, SLOWLY
-from .thresholds import FINER, FREE_STEPS, HUM_FINER, HUM_LEAST, HUM_WINDOW, REVERSAL_REACHES, TEST_FORCE
+from .thresholds import (
+    FINER,
+    FORCES_TOGETHER,
+    FREE_STEPS,
+    HUM_FINER,
+    HUM_LEAST,
+    HUM_WINDOW,
+    REVERSAL_REACHES,
+    TEST_FORCE,
+)
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,9 @@ def missing_forces(tried: CandidateFit, data: SegmentedData, noise: NoiseModel) 
     residual = sensitivity.project(tried.train.residual)
     kinds, tables = list(scene.kinds()), []
     shapes = [shape for _, families in kinds for family in families for shape, _ in family]
-    changes = iter(side_by_side(lambda shape: sensitivity.project(scene.response(shape)), shapes))
+    together = [shapes[i : i + FORCES_TOGETHER] for i in range(0, len(shapes), FORCES_TOGETHER)]
+    responses = side_by_side(lambda some: [sensitivity.project(r) for r in scene.responses(some)], together)
+    changes = iter([change for some in responses for change in some])
     for kind, families in kinds:
         answers = [[(next(changes), span) for _, span in family] for family in families]
         if len(answers) > 1:
@@ -140,9 +151,9 @@ class _Scene:
             for r, w, y in zip(self.view.records, self.view.segments, tried.train.simulated, strict=True)
         ]
 
-    def response(self, shape) -> list[np.ndarray]:
-        """Return the change of output by a force: `shape(motion)` (n,) of one record, of order one."""
-        changes = []
+    def responses(self, shapes) -> list[list[np.ndarray]]:
+        """Return the changes of output by forces: each `shape(motion)` (n,) of one record, of order one."""
+        changes: list[list[np.ndarray]] = [[] for _ in shapes]
         for record, segments, start, y, motion in zip(
             self.view.records,
             self.view.segments,
@@ -152,9 +163,10 @@ class _Scene:
             strict=True,
         ):
             force = record.u if not facts(record).imposed else facts(record).load
-            force = force + self.given * shape(motion)
-            simulator = self.data.simulator(self.fit.model, record, force=force)
-            changes.append((simulator.run(segments, None, start) - y) / self.size)
+            simulator = self.data.simulator(self.fit.model, record)
+            forces = [force + self.given * shape(motion) for shape in shapes]
+            for change, moved in zip(changes, simulator.run_driven(segments, start, forces), strict=True):
+                change.append((moved - y) / self.size)
         return changes
 
     def kinds(self):

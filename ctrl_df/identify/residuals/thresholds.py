@@ -15,6 +15,9 @@ SHORTEST_HORIZON = 0.25
 TEST_FORCE = 3e-3
 """Amplitude of a test force over the rms of the force: linear still, and far above rounding."""
 
+FORCES_TOGETHER = 16
+"""Test forces simulated in one call: it bounds memory and changes no result."""
+
 FINER = 3
 """How many times finer the second grid of test forces is."""
 
