@@ -191,7 +191,7 @@ def joint(seed):
 def test_a_joint_in_presliding_is_not_elastic(known):
     model = cdf.Inertia(3.0).with_effect(cdf.Coulomb(8.0)).with_effect(cdf.Viscous(30.0))
     names = ("compliance", "bristle") if known else ("compliance",)
-    train, held = (joint(seed).decimate(2) for seed in (1, 2))
+    train, held = (joint(seed).decimate(4) for seed in (1, 2))
     found = cdf.diagnose(model, train, holdout=held, candidates=names)
     if known:
         assert found.verdict == "effect" and found.best.id == "bristle" and found.best.determined

@@ -81,7 +81,7 @@ def test_a_single_effect_is_named_first(effect):
 
 def test_a_bump_passed_within_a_sample_is_stiction():
     rig = rigs.draw("stiction", 1005, excitation="multisine", snr_db=40, noise="coloured", n=4000)
-    train, held = of(rig)
+    train, held = (record.decimate(2) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("stiction", "stribeck"))
     assert found.verdict == "effect"
     assert {found.best.id, *found.best.equivalents} == {"stiction", "stribeck"}
@@ -91,12 +91,12 @@ def test_a_bump_passed_within_a_sample_is_stiction():
 def test_what_only_long_segments_show_is_unknown():
     # a notch in the force at one place: short segments begin anew beyond it
     rig = rigs.draw_outside(1005, kind="detent", excitation="multisine", snr_db=40, noise="coloured")
-    train, held = of(rig)
-    few = ("linear_spring", "position_ripple")
-    found = diagnose(rig.baseline, train, holdout=held, candidates=few)
+    train, held = (record.decimate(4) for record in of(rig))
+    found = diagnose(rig.baseline, train, holdout=held, candidates=("linear_spring",))
     assert found.verdict == "unknown"
-    assert found.structure > found.noise
+    assert found.structure > 2 * found.noise
     assert "position" in found.regions
+    assert any("but not long ones" in doubt for doubt in found.doubts)
 
 
 def test_a_stop_that_is_hit_once_is_found_by_what_short_segments_tell_of_the_machine():
@@ -137,15 +137,6 @@ def test_static_levels_are_chosen_before_what_is_held_out_counts_as_luck():
     assert found.verdict == "effect" and found.best.id == "stiction"
     # measured: 0.8 %, which the breaks in these records leave open
     assert found.best.parameters["level"] == pytest.approx(rig.truth["stiction.level"], rel=0.02)
-
-
-def test_a_model_that_follows_short_segments_alone_is_not_complete():
-    rig = rigs.draw("position_ripple", 1022, excitation="steps", noise="coloured")
-    few = ("constant_force", "asymmetric_viscous")
-    found = diagnose(rig.baseline, of(rig)[0], holdout=of(rig)[1], candidates=few)
-    assert found.verdict == "unknown"
-    assert found.structure > 2 * found.noise
-    assert any("but not long ones" in doubt for doubt in found.doubts)
 
 
 def test_a_joint_with_nothing_behind_it_is_no_joint():
@@ -222,10 +213,11 @@ def forced():
     return t, force, x + 1e-4 * np.random.default_rng(0).standard_normal(t.size)
 
 
-@pytest.mark.parametrize("lengths", [1e3, 1e-3])
-def test_a_length_in_another_unit_is_no_missing_effect(forced, lengths):
+@pytest.mark.parametrize(("lengths", "candidate"), [(1e3, "input_gain"), (1e-3, "linear_spring")])
+def test_a_length_in_another_unit_is_no_missing_effect(forced, lengths, candidate):
+    # in mm a gain (as a gap) is ahead of the model by hundreds of nats
     t, force, x = forced
-    found = diagnose(FORCED, Measurement(t, force, lengths * x), candidates=["backlash", "linear_spring"])
+    found = diagnose(FORCED, Measurement(t, force, lengths * x), candidates=[candidate])
     assert found.verdict == "unknown" and "units" in found.explanation
 
 

@@ -65,7 +65,7 @@ def test_it_separates_on_the_true_plant(hidden, other, seed, closed):
 
 
 def test_a_plan_is_ready_to_be_played():
-    rig = rigs.draw("linear_spring", 3, ratio=1.0, snr_db=40, n=4000)
+    rig = rigs.draw("linear_spring", 3, ratio=1.0, snr_db=40, n=1500)
     found = left_open(
         diagnose(rig.baseline, rig.train[0].measurement(), candidates=("linear_spring", "cubic_spring"))
     )

@@ -17,7 +17,7 @@ LAG = ct.tf([1], [1, 2, 2, 1])  # critical gain 3 at sqrt(2) rad/s
 
 @pytest.fixture(scope="module")
 def hunting():
-    return cdf.limit_cycle_map(STICTION, kp=(500, 4000), ki=(0, 80000), kd=130, n=12, exact_check=24)
+    return cdf.limit_cycle_map(STICTION, kp=(500, 4000), ki=(0, 80000), kd=130, n=10, exact_check=16)
 
 
 def _predicted(block, kp, ki, kd, A, omega):
@@ -87,7 +87,7 @@ def test_units_alter_nothing():
 def test_a_saturation_cycles_above_the_critical_gain():
     critical, plant = 4.0, 0.75 * LAG
     found = cdf.limit_cycle_map(
-        cdf.saturation(1), kp=(0.5 * critical, 3 * critical), ki=(0.0, 0.02), plant=plant, n=9, exact_check=8
+        cdf.saturation(1), kp=(0.5 * critical, 3 * critical), ki=(0.0, 0.02), plant=plant, n=9, exact_check=0
     )
     assert found.at(kp=0.9 * critical, ki=0.0).verdict == "rests"
     assert found.at(kp=2 * critical, ki=0.0).verdict == "cycles"
@@ -133,22 +133,22 @@ def test_a_block_without_closed_form_has_a_map():
 
 
 def test_simulations_correct_the_map(hunting):
-    assert len(hunting.checks) == 24 and 0 <= hunting.agreement < 1
+    assert len(hunting.checks) == 16 and 0 <= hunting.agreement < 1
     assert "cycles" in hunting.at(kp=3000, ki=30000).verdict
     assert hunting.at(kp=700, ki=75000).verdict == "diverges"
     assert hunting.at(kp=2000, ki=44250, exact=True).simulated.orbit.omega == pytest.approx(
         11.62868, rel=1e-6
     )
-    plain = cdf.limit_cycle_map(FRICTION, kp=(500, 4000), ki=(0, 80000), kd=130, n=10, exact_check=16)
+    plain = cdf.limit_cycle_map(FRICTION, kp=(500, 4000), ki=(0, 80000), kd=130, n=8, exact_check=8)
     assert (np.char.find(plain.predicted, "cycles") >= 0).any()
     assert not (np.char.find(plain.verdict, "cycles") >= 0).any()
 
 
 def test_the_map_shows_itself(hunting):
     assert len(repr(hunting)) < 200 and "\n" not in repr(hunting)
-    assert "24 points were simulated" in hunting.summary() and "simulated" in str(hunting.table())
+    assert "16 points were simulated" in hunting.summary() and "simulated" in str(hunting.table())
     frame = hunting.to_pandas()
-    assert len(frame) == 144 and set(frame) >= {"kp", "ki", "kd", "verdict", "predicted", "omega"}
+    assert len(frame) == 100 and set(frame) >= {"kp", "ki", "kd", "verdict", "predicted", "omega"}
     assert "<table" in hunting._repr_html_()
     assert hunting.units == {"kp": "N/m", "ki": "N/(m s)", "kd": "N s/m"}
 

@@ -65,20 +65,20 @@ cdf.event_response(user, [0, 1], 0, [1, 0])
 cdf.find_limit_cycle(L)
 answers = {}
 for name in CASES:
-    for delay in (0.15, 0.3):
-        sent = time.time() + delay
-        child = subprocess.Popen(["/bin/sh", "-c", f"sleep {delay}; kill -INT {os.getpid()}"])
-        outcome = "returned"
+    delay = 0.2
+    sent = time.time() + delay
+    child = subprocess.Popen(["/bin/sh", "-c", f"sleep {delay}; kill -INT {os.getpid()}"])
+    outcome = "returned"
+    try:
         try:
-            try:
-                CASES[name]()
-            finally:
-                child.wait()
-        except KeyboardInterrupt:
-            outcome = "interrupted"
-        except BaseException as error:
-            outcome = repr(error)
-        answers[f"{name} {delay}"] = (outcome, time.time() - sent)
+            CASES[name]()
+        finally:
+            child.wait()
+    except KeyboardInterrupt:
+        outcome = "interrupted"
+    except BaseException as error:
+        outcome = repr(error)
+    answers[name] = (outcome, time.time() - sent)
 print(json.dumps(answers))
 """
 
@@ -88,7 +88,7 @@ def test_ctrl_c_ends_compiled_work_within_a_second():
     assert done.returncode == 0, done.stderr
     assert "Exception ignored" not in done.stderr, done.stderr
     answers = json.loads(done.stdout)
-    assert len(answers) == 16
+    assert len(answers) == 8
     for name, (outcome, late) in answers.items():
         assert outcome == "interrupted", f"{name}: {outcome}"
         assert late < 1.0, f"{name}: {late:.2f} s"  # measured 0.03 at worst
