@@ -11,8 +11,6 @@ import numpy as np
 from ...simulate.parallel import check
 from ..prediction.segments import Segments
 from ..prediction.sensed import sensed
-from ..prediction.simulator import Simulator
-from ..prediction.simulators import simulator_of
 from ..thresholds import RTOL
 from .elimination import products_of, states_for
 from .noise_model import power
@@ -67,10 +65,7 @@ class SegmentOutputs:
 
     def __init__(self, problem: Problem, segments: list[Segments], decimation, starts=None, rtol=RTOL):
         self.problem, self.segments, self.decimation, self.rtol = problem, list(segments), decimation, rtol
-        self.simulators: list[Simulator] = [
-            simulator_of(problem.model, r, decimation=decimation, begins=problem.begins, rtol=rtol)
-            for r in problem.records
-        ]
+        self.simulators = problem.simulators(decimation, rtol)
         self.measured = [sensed(r).within(w.samples) for r, w in zip(problem.records, segments, strict=True)]
         reach = [s.priors(w) for s, w in zip(self.simulators, segments, strict=True)]
         if starts is not None:

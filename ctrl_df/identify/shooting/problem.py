@@ -9,6 +9,8 @@ import numpy as np
 from ...values.per_record import PerRecord
 from ..prediction.initial_states import FREE
 from ..prediction.segments import facts_of
+from ..prediction.simulator import Simulator
+from ..prediction.simulators import simulator_of
 from ..prediction.values import block_of, feasible, for_record, in_record, is_own, with_values
 from .thresholds import NUDGE_FIRST
 from .variables import beforehand, variables_of
@@ -57,11 +59,22 @@ class Problem:
         self.about, self.precision, self.stated = beforehand(self.variables, about or {})
         self.steps = np.full(len(self.variables), NUDGE_FIRST)
         self.nfev = 0.0
+        self._simulators: dict[tuple[int, float], list[Simulator]] = {}
         self.noise = math.sqrt(float(np.mean([k.noise**2 for k in self.known])))
 
     def start(self) -> np.ndarray:
         """Return the scaled parameters of the model as it is."""
         return np.array([v.clip(v.q(v.begin)) for v in self.variables])
+
+    def simulators(self, decimation: int, rtol: float) -> list[Simulator]:
+        """Return the model on every record, ready to be run; kept for all stages of the fit."""
+        kept = self._simulators.get((decimation, rtol))
+        if kept is None:
+            kept = self._simulators[decimation, rtol] = [
+                simulator_of(self.model, r, decimation=decimation, begins=self.begins, rtol=rtol)
+                for r in self.records
+            ]
+        return kept
 
     def values(self, theta, k):
         """Return the parameters in record `k` by name, static levels kept above the kinetic one."""
