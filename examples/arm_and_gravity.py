@@ -48,9 +48,10 @@ model = cdf.Inertia(0.09).with_effect(cdf.Coulomb(0.25)).with_effect(cdf.Viscous
 cdf.compare(model, record).missing_force.plot(against="position")
 
 # %%
-# The diagnosis sets it beside everything else in the library:
+# The diagnosis sets it beside other forces that a joint may have:
 
-diagnosis = cdf.diagnose(model, record)
+forces = ["gravity", "linear_spring", "cubic_spring", "constant_force", "stribeck"]
+diagnosis = cdf.diagnose(model, record, candidates=forces)
 print(diagnosis.explanation)
 print(diagnosis.table(rows=4))
 found = diagnosis.best.model

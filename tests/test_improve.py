@@ -1,7 +1,5 @@
 """The ladder: it climbs, it stops, it reports."""
 
-import re
-
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -51,14 +49,6 @@ def test_an_effect_that_stood_in_for_two_gives_way():
     assert last.dropped == ("stribeck",) and last.instead == ("coulomb",)
     assert set(found.effects) == {"coulomb", "quadratic_drag"}
     assert "coulomb" in found.summary()
-
-
-def test_the_report_stands_alone(study, tmp_path):
-    path = tmp_path / "report.html"
-    study[1].report(path)
-    text = path.read_text(encoding="utf-8")
-    assert "linear spring" in text and "data:image/png;base64," in text
-    assert not re.search(r'(src|href)="(?!data:)', text)
 
 
 def test_pictures_show_every_step(study):

@@ -158,11 +158,10 @@ def beside_plain(true, drive=(), gain=1.0, unit="N"):
     ("drive", "gain", "unit"),
     [
         ((), 1.0, "N"),
-        ((cdf.TorqueConstant(2.0),), 2.0, "A"),
         ((cdf.TorqueConstant(2.0, resistance=1.5),), 2.0 / 1.5, "V"),
         ((cdf.InputGain(2.0),), 2.0, "N"),
     ],
-    ids=["newtons", "amperes", "volts", "gain"],
+    ids=["newtons", "volts", "gain"],
 )
 def test_a_spring_is_one_over_position_however_it_is_driven(drive, gain, unit):
     """A constant of the motor scales every force: with all other parameters it would make any."""
