@@ -55,7 +55,7 @@ class Course:
             if not (given is None or truth or callable(given)):
                 raise TypeError(f"{owner} needs {name} as {others}; got {shown(given)}.")
         self.owner, self.began = owner, time.perf_counter()
-        self.latest: Any = None
+        self._latest: Callable[[], Any] | None = None
         self._callback, self._progress = callback, progress
         self._until = math.inf
         if budget is not None:
@@ -88,10 +88,17 @@ class Course:
 
     def known(self, answer: Any) -> None:
         """Keep an answer as it stands, and let it be heard of."""
-        self.latest = answer
-        _log.debug("%s: known so far\n%s", self.owner, answer)
-        if self._callback is not None:
-            self._callback(answer)
+        self._keep(lambda: answer)
+
+    def _keep(self, answer: Callable[[], Any]) -> None:
+        """Keep an answer that is made where it is heard of, or where it is the last one known."""
+        self._latest = answer
+        if self._callback is not None or _log.isEnabledFor(logging.DEBUG):
+            made = answer()
+            self._latest = lambda: made
+            _log.debug("%s: known so far\n%s", self.owner, made)
+            if self._callback is not None:
+                self._callback(made)
         parallel.check()
 
     def within(self, whole: Callable[[Any], Any]) -> Course:
@@ -104,7 +111,7 @@ class Course:
 
     def left(self) -> float | None:
         """Return how many seconds are left; None: no end is set, or nothing is known yet."""
-        if self.latest is None or math.isinf(self._until):
+        if self._latest is None or math.isinf(self._until):
             return None
         return max(self._until - time.perf_counter(), 0.0)
 
@@ -136,11 +143,12 @@ class Course:
         except parallel.TimeUp:
             status = BUDGET_SPENT
         except KeyboardInterrupt:
-            if self.latest is None:
+            if self._latest is None:
                 raise
             status = INTERRUPTED
         _log.info("%s: %s after %.1f s, at: %s", self.owner, status, self.seconds, self._stage)
-        return replace(self.latest, status=status, seconds=self.seconds)
+        assert self._latest is not None  # no end is set before
+        return replace(self._latest(), status=status, seconds=self.seconds)
 
     @property
     def seconds(self) -> float:
@@ -165,7 +173,10 @@ class _Part(Course):
         self.outer.detail(text, *values)
 
     def known(self, answer):
-        self.outer.known(self.whole(answer))
+        self._keep(lambda: answer)
+
+    def _keep(self, answer):
+        self.outer._keep(lambda: self.whole(answer()))
 
     def left(self):
         return self.outer.left()

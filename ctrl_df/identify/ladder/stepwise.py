@@ -233,8 +233,8 @@ class StepwiseSelection:
         known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
         found = known.diagnosis
         self.course.stage("all models over the same data")
-        steps = self._on_common_data((*steps, step_of(found)), known.search)
-        node = Node(structure.at(found.model), known.search, found, steps, parent)
+        alike = self._on_common_data((*steps, step_of(found)), known.search)
+        node = Node(structure.at(found.model), known.search, found, alike, parent)
         self.visited[structure.key] = node
         return node
 
