@@ -108,7 +108,6 @@ def test_what_leaves_no_trace_is_named():
 @pytest.mark.parametrize(
     ("name", "added", "rivals"),
     [
-        ("quadratic_drag", dict(DRAG=60.0), ("stribeck", "linear_spring")),
         ("linear_spring", dict(SPRING=150.0), ("quadratic_drag", "input_delay")),
         ("input_delay", dict(DELAY=0.012), ("sensor_delay", "quadratic_drag")),
     ],
@@ -182,8 +181,10 @@ def test_outside_the_candidates_is_unknown():
 
 def test_a_table_held_out():
     data, held = (table(grid=MIDDLE, DRAG=60.0, seed=seed) for seed in (0, 9))
-    found = diagnose(user_block(), data, holdout=held, candidates=FEW[:2])
-    assert found.best.id == "quadratic_drag"
+    found = diagnose(user_block(), data, holdout=held, candidates=("quadratic_drag", "stribeck"))
+    assert found.verdict == "effect" and found.best.id == "quadratic_drag" and found.best.determined
+    assert found.best.parameters["coefficient"] == pytest.approx(60.0, rel=0.05)
+    assert found.best.nrmse_holdout < 0.006 and not found.best.equivalents
     assert found.holdout[0] is held
     drawn = found.plot()
     assert drawn.axes.size == 3 and "quadratic drag" in drawn.axes.flat[2].get_title()

@@ -271,7 +271,6 @@ def recorded(block, t, u, seed=0):
     [
         cdf.LinearSpring(-12.0),
         cdf.CubicSpring(-40.0),
-        cdf.LoadDependentFriction(0.12),
         cdf.PositionDependentFriction(0.8, 0.3, 0.5),
         cdf.Hysteresis(1.5, 0.02),
     ],
@@ -279,7 +278,6 @@ def recorded(block, t, u, seed=0):
 )
 def test_it_is_named_among_its_likes(hidden):
     likes = {"linear_spring": "cubic_spring", "cubic_spring": "linear_spring", "hysteresis": "linear_spring",
-             "load_dependent_friction": "position_dependent_friction",
              "position_dependent_friction": "load_dependent_friction"}  # fmt: skip
     rng, t = np.random.default_rng(3), 2e-3 * np.arange(2000)
     tones, phases = rng.uniform(0.3, 3, 8), rng.uniform(0, 6, 8)
