@@ -143,8 +143,10 @@ def scaled(value, factor, at):
 
 
 def modules_with(name):
-    """Return the modules of the library that have a constant of this name."""
-    return [m for k, m in sys.modules.items() if k.startswith("ctrl_df") and name in vars(m)]
+    """Return the modules of the library that have a constant of this name from a file of thresholds."""
+    modules = [m for k, m in sys.modules.items() if k.startswith("ctrl_df") and name in vars(m)]
+    values = [vars(m)[name] for m in modules if m.__name__.endswith(".thresholds")]
+    return [m for m in modules if any(vars(m)[name] is value for value in values)]
 
 
 def changes(before, after) -> list[str]:

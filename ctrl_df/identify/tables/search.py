@@ -17,6 +17,7 @@ from ..estimation.common_friction import inertia
 from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
+from ..selection.thresholds import LEFT
 from ..starting.extend import applicable
 from ..thresholds import DISTINGUISHED
 from .candidate import fit_either, try_effect
@@ -40,7 +41,6 @@ from .thresholds import (
     TABLE_ITERATIONS,
     TABLE_STEPS,
     TOP_FREQUENCIES,
-    UNEXPLAINED,
     WORK_MEDIUM,
 )
 from .uncertainty import uncertainty
@@ -267,9 +267,7 @@ class TableSearch(Search):
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
-        unexplained = (
-            structure > 2.0 * noise and structure > UNEXPLAINED * there and not self._scattered(shown)
-        )
+        unexplained = structure > 2.0 * noise and structure > LEFT * there and not self._scattered(shown)
         return Remainder(noise, structure, unexplained)
 
     def _split(self, t) -> tuple[float, float]:
