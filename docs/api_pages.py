@@ -14,7 +14,7 @@ GROUPS = {
 RESULTS = {
     "limit_cycles.check": ("Check", "Row"),
     "limit_cycles.exact.orbit": ("NoOrbit",),
-    "limit_cycles.exact.fate": ("Fate",),
+    "limit_cycles.exact.basins": ("Fate",),
     "simulate.response": ("EventResponse",),
     "simulate.batch": ("BatchResponse",),
     "identify.results.comparison": ("Comparison", "RecordComparison"),

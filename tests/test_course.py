@@ -16,7 +16,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 import ctrl_df as cdf
-from ctrl_df.identify.course import Course
+from ctrl_df.identify.monitor import Monitor
 from ctrl_df.simulate import parallel
 
 RIG = rigs.draw("linear_spring", 11, snr_db=60, n=4000)
@@ -139,12 +139,12 @@ def test_progress_and_log(told, caplog, capsys):
 
 
 def test_a_stage_that_lasts_tells_that_it_goes_on(monkeypatch):
-    monkeypatch.setattr("ctrl_df.identify.course.PROGRESS_EVERY", 0.05)
-    monkeypatch.setattr(Course, "beat", 0.02)
+    monkeypatch.setattr("ctrl_df.identify.monitor.PROGRESS_EVERY", 0.05)
+    monkeypatch.setattr(Monitor, "beat", 0.02)
     lines = []
-    course = Course("improve", lines.append)
-    course.stage("four rests")
-    with parallel.watched(course):
+    monitor = Monitor("improve", lines.append)
+    monitor.stage("four rests")
+    with parallel.watched(monitor):
         parallel.side_by_side(time.sleep, [0.3, 0.1, 0.1, 0.1])
     assert len(lines) > 3 and all("s, four rests" in line for line in lines)
     assert "jobs done" in lines[1]

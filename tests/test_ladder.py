@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.course import Course
 from ctrl_df.identify.ladder.revision import revised
 from ctrl_df.identify.ladder.stepwise import StepwiseSelection
 from ctrl_df.identify.ladder.structure import Structure
+from ctrl_df.identify.monitor import Monitor
 from ctrl_df.identify.selection.long_prediction import LongPrediction
 from ctrl_df.identify.selection.search import Located, Remainder, Search, Words
 from ctrl_df.identify.starting.extend import applicable, extended
@@ -57,14 +57,14 @@ class Given(Search):
     def fitted(self, block, names, iterations):
         return Fit(block, self.data.level(block), block.newest if block.effects else "", len(names))
 
-    def candidates(self, classes, executor=None, course=None):
+    def candidates(self, classes, executor=None, monitor=None):
         made = [self.data.made(c.id, self.block) for c in classes if applicable(c, self.block)]
         blocks = [extended(self.block, effect) for effect in made]
         found = [self.fitted(b, (), 0) for b in blocks if b is not None]
         ranked = self.ranked(self.base, [replace(t, extra=1) for t in found])
         return self.after(screened=ranked), ranked
 
-    def confirm(self, found, course=None):
+    def confirm(self, found, monitor=None):
         return self, [replace(t, confirmed=True) for t in found]
 
     def ranked(self, base, judged):
@@ -124,14 +124,14 @@ class Data:
         return Given(self, block, free)
 
 
-def ladder_of(data, names=tuple(MADE), most=5, course=None):
+def ladder_of(data, names=tuple(MADE), most=5, monitor=None):
     def free(block):
         return [k for k, p in block.parameters.items() if p.free]
 
     classes = [cdf.effect_class(n) for n in names]
-    course = course or Course("improve")
-    ladder = StepwiseSelection(data, data.start, classes, free, most, None, course)
-    return course.run(ladder.run)
+    monitor = monitor or Monitor("improve")
+    ladder = StepwiseSelection(data, data.start, classes, free, most, None, monitor)
+    return monitor.run(ladder.run)
 
 
 def test_one_effect_and_its_neighbours():
@@ -332,6 +332,6 @@ def test_ctrl_c_keeps_the_best_so_far(after):
             raise KeyboardInterrupt
 
     data = Data({"": 0, "linear_spring": 900, "constant_force": 300, "constant_force linear_spring": 1200})
-    study = ladder_of(data, course=Course("improve", False, stop, None))
+    study = ladder_of(data, monitor=Monitor("improve", False, stop, None))
     assert study.status in ("interrupted", "complete") and study.model is study.steps[-1].model
     assert study.summary() and str(study.neighbours) is not None

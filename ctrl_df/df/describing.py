@@ -54,7 +54,7 @@ def describing_function(
     Returns
     -------
     ndarray of complex
-        N, with the shape of A and omega broadcast; NaN where there is no periodic answer.
+        N, with the shape of A and omega broadcast; NaN where there is no periodic response.
 
     Warns
     -----

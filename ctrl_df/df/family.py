@@ -68,7 +68,7 @@ class Family:
 
     @property
     def N(self) -> np.ndarray:
-        """Describing function, complex, shape (na, nw); NaN where there is no periodic answer."""
+        """Describing function, complex, shape (na, nw); NaN where there is no periodic response."""
         return self.harmonics[..., 1]
 
     @property

@@ -28,7 +28,7 @@ class Method:
     needs_omega : bool
         Whether N depends on frequency.
     dynamic : bool
-        Whether the block is a nonlinear one with dynamics: it answers harmonics less the higher they are.
+        Whether the block is a nonlinear one with dynamics: it responds to harmonics less the higher they are.
     static : bool
         Whether the block is a law over the amplitude alone, whose corners are looked for.
     quick : bool
@@ -46,7 +46,7 @@ class Method:
     at_once : int or None
         Points computed between two chances to interrupt; None: it hears Ctrl-C by itself.
     caveat : str
-        What every answer of it has to be read with.
+        What all its values have to be read with.
     """
 
     block: Any

@@ -31,7 +31,7 @@ ON_GRID = 1e-12
 # --- memoryless laws --------------------------------------------------------------------------------
 
 EVEN_SEEN = 1e-9
-"""Even harmonics, over the largest, from which an answer is asymmetric."""
+"""Even harmonics, over the largest, from which a response is asymmetric."""
 
 MOST_STAIRS = 2_000_000
 """Edges of a quantizer that are summed one by one."""
@@ -394,8 +394,8 @@ FORCED = 1e-12
 """Rate of a free speed, over its terms, that a constant force makes, and not rounding."""
 
 PROBES, ALIKE, RIPPLED, GRAIN = 24, 1e-9, 1e-6, 64 * np.finfo(float).eps
-"""Random states at which laws are asked; relative difference of two answers that are one; and after a
-wavelength, which users round; of the largest answer, what rounding leaves of a small one: the force of a
+"""Random states at which laws are asked; relative difference of two values that are one; and after a
+wavelength, which users round; of the largest value, what rounding leaves of a small one: the force of a
 joint that is hardly compressed is a difference of large positions."""
 
 STATE_DECADES, INPUT_DECADES, AT_REST = (-4, 1), (-1, 2), 3

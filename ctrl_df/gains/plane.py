@@ -142,8 +142,8 @@ def _scales(structure, gains) -> tuple[float, float]:
     loop: Any = structure.loop(gains)
     starts = PoincareSearch(loop, Engine(loop)).starts
     if isinstance(loop.parts.block, Mechanism):
-        return starts.pace, starts.scale * sum(starts.core.masses) * starts.pace**2
-    return starts.pace, starts.scale
+        return starts.omega, starts.scale * sum(starts.core.masses) * starts.omega**2
+    return starts.omega, starts.scale
 
 
 def _amplitudes(method, a, w):

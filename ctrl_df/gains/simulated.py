@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
-from ..limit_cycles.exact.fate import Fate
+from ..limit_cycles.exact.basins import Fate
 from ..limit_cycles.exact.orbit import Orbit
 from ..limit_cycles.finder import OrbitFinder
 from ..simulate.parallel import require_compiled, side_by_side

@@ -14,8 +14,8 @@ from .arguments import (
     own_parameters,
     with_those,
 )
-from .course import Course
 from .datasets.choice import dataset_of
+from .monitor import Monitor
 from .results.diagnosis import Diagnosis
 from .selection.verdict import diagnosed
 
@@ -107,7 +107,7 @@ def diagnose(
     """
     checked_executor("diagnose", executor)
     classes = effect_classes(candidates)
-    course = Course("diagnose", progress, callback, budget)
+    monitor = Monitor("diagnose", progress, callback, budget)
     dataset = dataset_of(model, data, holdout).driven_by_force(model)
     block = mechanism_of(model)
     limits = check_limits("diagnose", block, limits)
@@ -123,9 +123,9 @@ def diagnose(
         return dataset.search(model, [k for k in dataset.free_parameters(model) if k not in kept])
 
     def work():
-        course.stage("the model refitted")
-        part = course.within(attrgetter("diagnosis"))
+        monitor.stage("the model refitted")
+        part = monitor.within(attrgetter("diagnosis"))
         search = dataset.search(block, names)
         return diagnosed(search, classes, executor, part, limits, search_with).diagnosis
 
-    return course.run(work)
+    return monitor.run(work)

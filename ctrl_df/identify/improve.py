@@ -12,9 +12,9 @@ from .arguments import (
     own_parameters,
     with_those,
 )
-from .course import Course
 from .datasets.choice import dataset_of
 from .ladder.stepwise import StepwiseSelection
+from .monitor import Monitor
 from .results.ladder import Step, Study
 
 __all__ = ["Step", "Study", "improve"]
@@ -83,7 +83,7 @@ def improve(
     """
     max_effects = count("improve", "max_effects", max_effects, least=0, meaning="longest ladder")
     checked_executor("improve", executor)
-    course = Course("improve", progress, callback, budget)
+    monitor = Monitor("improve", progress, callback, budget)
     dataset = dataset_of(model, train, holdout, "train").driven_by_force(model)
     start, classes = mechanism_of(model), effect_classes(candidates)
     check_quantities(start, (*dataset.records, *dataset.validation))
@@ -95,5 +95,5 @@ def improve(
     def free_of(block) -> list[str]:
         return [k for k in dataset.free_parameters(block) if k not in kept]
 
-    selection = StepwiseSelection(dataset, start, classes, free_of, max_effects, executor, course)
-    return course.run(selection.run)
+    selection = StepwiseSelection(dataset, start, classes, free_of, max_effects, executor, monitor)
+    return monitor.run(selection.run)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..table import Table, frame, without_empty
-from .exact.fate import Fate
+from .exact.basins import Fate
 from .exact.orbit import Orbit
 from .predicted.grade import LimitCycle
 
@@ -63,7 +63,7 @@ class Row:
 
     @property
     def in_band(self) -> bool | None:
-        """Whether the stated error bands hold the true answer; None without a pair."""
+        """Whether the stated error bands hold the exact orbit; None without a pair."""
         truth = self.exact or self.motion
         if self.predicted is None or truth is None:
             return None

@@ -1,4 +1,4 @@
-"""`find_limit_cycle`: where an exact orbit is sought, and what came of it."""
+"""`find_limit_cycle`: where an exact orbit is sought, and how it is found."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ import numpy as np
 from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine
-from ..simulate.loop import answers_at_once
+from ..simulate.loop import has_direct_feedthrough
 from ..status import Status
 from .arguments import check_search, checked_guess
+from .exact.basins import Explorer
 from .exact.closing import Centre, Closing, NoClosure
-from .exact.fate import Explorer
 from .exact.orbit import NoOrbit, Orbit, Try
 from .exact.poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch
 from .exact.shrinking import Merged, trace
 from .exact.thresholds import (
-    COURSE_RTOL,
     CROSSINGS,
     CROSSINGS_AVERAGED,
     PIECES,
     RECENT_CLOSED,
     REPEATS_LEAST,
     STEPS_A_PERIOD,
+    TRAJECTORY_RTOL,
 )
 from .forced_start import harmonic_start, path_starts
 from .pieces import by_pieces
-from .predicted.answer import responder
 from .predicted.linear import LinearPart
 from .predicted.path import End, Path, corrected_near, follow_path
+from .predicted.waveform_response import response_of
 from .thresholds import (
     AT_ITS_END,
     AVERAGE_POINTS,
@@ -74,7 +74,7 @@ def find_limit_cycle(
     search_time : float
         Longest simulation of the search [s]; by default some hundred periods.
     raise_on_failure : bool
-        Raise RuntimeError (with the answer as ``.orbit``) instead of returning a `NoOrbit`.
+        Raise RuntimeError (with the result as ``.orbit``) instead of returning a `NoOrbit`.
 
     Returns
     -------
@@ -108,12 +108,12 @@ def find_limit_cycle(
             "verify), or put a lag of the same time (input_lag) in its place."
         )
     orbit, none = finder.search(search_time) if guess is None else finder.from_guess(guess)
-    answer = none if orbit is None else orbit
-    if raise_on_failure and (not answer or not answer.status.ok):
-        error = RuntimeError(str(answer) if not answer else str(answer.status))
-        error.orbit = answer  # type: ignore[attr-defined]
+    result = none if orbit is None else orbit
+    if raise_on_failure and (not result or not result.status.ok):
+        error = RuntimeError(str(result) if not result else str(result.status))
+        error.orbit = result  # type: ignore[attr-defined]
         raise error
-    return answer
+    return result
 
 
 @dataclass
@@ -135,17 +135,17 @@ class _Attempts:
     def centre(self) -> bool:
         return any(isinstance(why, Centre) for why in self.failures)
 
-    def tell(self, start: str, outcome: str) -> None:
+    def note(self, start: str, outcome: str) -> None:
         """Take note of a try."""
         self.tried.append(Try(start, outcome))
 
     def failed(self, start: str, why: NoClosure) -> None:
         """Take note of a try that closed no orbit."""
         self.failures.append(why)
-        self.tell(start, str(why))
+        self.note(start, str(why))
 
     def none(self) -> NoOrbit:
-        """Return what the answer is where nothing was found, with all that was tried."""
+        """Return the result where nothing was found, with all that was tried."""
         status = Status.NOT_FOUND
         if self.merged:
             status = Status.NO_SUCH_ORBIT
@@ -179,7 +179,7 @@ class OrbitFinder:
         self.by_simulation = self.sampled or self.engine.delayed
         self.closing: Any = None if self.engine.delayed else Closing(loop, self.engine, max_iterations)
         self.poincare = PoincareSearch(loop, self.engine)
-        self.explorer = Explorer(self.poincare, partial(self._closed_from, _Attempts()))
+        self.explorer = Explorer(self.poincare, partial(self._orbit_near, _Attempts()))
 
     # --- from a guess -------------------------------------------------------------------------------------
 
@@ -194,7 +194,7 @@ class OrbitFinder:
         if isinstance(guess, np.ndarray):
             return self._from_state(attempts, guess)
         amplitude, omega = (guess.amplitude, guess.omega) if hasattr(guess, "amplitude") else guess
-        told = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
+        guessed = f"amplitude {amplitude:.5g}, omega {omega:.5g} rad/s"
         if self.by_simulation:
             return self._simulated(attempts, self._start(guess, amplitude, omega), "the prediction")[0]
         others: list[Orbit] = []
@@ -202,7 +202,7 @@ class OrbitFinder:
         for name, path in self._paths(guess, amplitude, omega):
             orbit = self._closed_path(attempts, path, name)
             if orbit is not None and self._belongs(orbit, path):
-                return self._noted(orbit, amplitude, omega, told)
+                return self._noted(orbit, amplitude, omega, guessed)
             others += [orbit] if orbit is not None else []
         if attempts.merged and not any(_near(o, amplitude, omega) for o in others):
             return None
@@ -214,7 +214,9 @@ class OrbitFinder:
             others += [orbit] if orbit is not None else []
         if not others:
             return None
-        return self._noted(min(others, key=lambda o: _distance(o, amplitude, omega)), amplitude, omega, told)
+        return self._noted(
+            min(others, key=lambda o: _distance(o, amplitude, omega)), amplitude, omega, guessed
+        )
 
     def _from_orbit(self, attempts, guess):
         start = guess.states[:, 0]
@@ -235,8 +237,8 @@ class OrbitFinder:
 
     def _returns(self, x0, most=RETURNS):
         """Return times after which a simulation from a state comes near it again, nearest first."""
-        course = self.poincare.iterate(x0, RETURNS, until_repeated=False)
-        span = course.crossings[-1].time if course.crossings else self.poincare.longest
+        trajectory = self.poincare.iterate(x0, RETURNS, until_repeated=False)
+        span = trajectory.crossings[-1].time if trajectory.crossings else self.poincare.longest
         times = np.linspace(0.0, span, RETURN_POINTS)
         run = self.engine.run(self.engine.start(x0), span, times=times, rtol=RETURN_RTOL, log=1)
         states = run.states[: run.recorded]
@@ -253,10 +255,10 @@ class OrbitFinder:
         if path is not None:
             yield "its path", path
         elif self.parts is not None and not getattr(guess, "branch", ""):
-            answer, linear = self._answer()
-            if answer is None:
+            response, linear = self._response()
+            if response is None:
                 return
-            steady_state, count = answer
+            steady_state, count = response
             path = follow_path(steady_state, count, linear, amplitude, omega)
             if path.end is not End.REACHED:
                 # no prediction stands at an arbitrary guess: to all its harmonics at once
@@ -265,11 +267,11 @@ class OrbitFinder:
                     yield "harmonic balance from the guess", direct
             yield "its path", path
 
-    def _answer(self):
+    def _response(self):
         block = self.parts.block
         fed_back = self.loop.output_labels[0]
         output = fed_back if fed_back in getattr(block, "output_labels", ()) else None
-        return responder(block, method_for(block, output)), LinearPart(self.parts.controller)
+        return response_of(block, method_for(block, output)), LinearPart(self.parts.controller)
 
     def _closed_path(self, attempts, path: Path, name):
         if path.end is End.MERGED:
@@ -281,7 +283,7 @@ class OrbitFinder:
             attempts.failed(name, Merged(why))
             return None
         if path.end is not End.REACHED:
-            attempts.tell(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)")
+            attempts.note(name, f"{path.end.value} (at {path.share:.0%} of the harmonics)")
             return None
         earlier = len(attempts.failures)
         (start,), period = path_starts(self.loop, path, 1), 2 * np.pi / path.omega
@@ -328,12 +330,12 @@ class OrbitFinder:
             wanted = gain * amplitude if np.isfinite(gain) else None
         return harmonic_start(self.loop, amplitude, omega, wanted, getattr(guess, "motion", None))
 
-    def _noted(self, orbit, amplitude, omega, told):
+    def _noted(self, orbit, amplitude, omega, guessed):
         if _near(orbit, amplitude, omega):
             return orbit
         return replace(
             orbit,
-            note=f"the guess ({told}) led to another orbit: amplitude {orbit.amplitude:.5g}, omega "
+            note=f"the guess ({guessed}) led to another orbit: amplitude {orbit.amplitude:.5g}, omega "
             f"{orbit.omega:.5g} rad/s",
         )
 
@@ -342,35 +344,35 @@ class OrbitFinder:
     def search(self, search_time=None) -> tuple[Orbit | None, NoOrbit]:
         """Return an orbit that simulations from starts of many sizes end on, or that parts their fates.
 
-        And what was tried. Stable ones come first; averages over irregular motion are an answer only where
+        And what was tried. Stable ones come first; averages over irregular motion are a result only where
         nothing repeats.
         """
         attempts = _Attempts()
-        explorer = Explorer(self.poincare, partial(self._closed_from, attempts))
+        explorer = Explorer(self.poincare, partial(self._orbit_near, attempts))
         fate = explorer.explore(search_time, edges=not self.by_simulation)
         for row in fate:
-            attempts.tell(f"rest, displaced: {row.size:.3g} {self.poincare.starts.unit}", row.told)
+            attempts.note(f"rest, displaced: {row.size:.3g} {self.poincare.starts.unit}", row.told)
         found = [o for o in fate.orbits if o.status.ok] or fate.orbits[:1]
         return min(found, key=lambda o: o.stable is not True, default=None), attempts.none()
 
-    def _closed_from(self, attempts, x0, course, complete=True) -> Orbit | None:
-        """Orbit that a course comes near: closed where it can be, else an average where it is sustained."""
-        crossings = course.crossings
-        if len(crossings) < ENOUGH or course.fate in (RESTS, DIVERGES):
+    def _orbit_near(self, attempts, x0, trajectory, complete=True) -> Orbit | None:
+        """Orbit near a trajectory: closed where it can be, else an average where the motion is sustained."""
+        crossings = trajectory.crossings
+        if len(crossings) < ENOUGH or trajectory.fate in (RESTS, DIVERGES):
             return None
         if not np.all(np.isfinite(crossings[-1].state)):
             return None
         if self.by_simulation:
             return self._averaged(x0, crossings, self.poincare.repeats(crossings))
         orbit = self._closed_crossings(attempts, crossings)
-        if complete and course.fate == UNDECIDED and orbit is not None and orbit.stable is False:
+        if complete and trajectory.fate == UNDECIDED and orbit is not None and orbit.stable is False:
             orbit = None  # one of many that an irregular motion passes: rounding tells which
-        if orbit is None and complete and course.fate == UNDECIDED and len(crossings) >= CROSSINGS:
+        if orbit is None and complete and trajectory.fate == UNDECIDED and len(crossings) >= CROSSINGS:
             return self._averaged(x0, crossings, False)
         return orbit
 
     def _closed_crossings(self, attempts, crossings):
-        """Close the orbit that a course's crossings come nearest to repeating, after one period or a few."""
+        """Close the orbit that the crossings come nearest to repeating, after one period or a few."""
         recent = crossings[-RECENT_CLOSED:]
         least = REPEATS_LEAST * self.poincare.units
         size = np.maximum(np.max(np.abs([crossing.state for crossing in recent]), axis=0), least)
@@ -392,16 +394,16 @@ class OrbitFinder:
         return None
 
     def _simulated(self, attempts, x0, name, search_time=None):
-        """Follow the loop from a start; close what it comes to. Returns (orbit or None, course)."""
-        course = self.poincare.iterate(x0, CROSSINGS, search_time)
-        orbit = self._closed_from(attempts, x0, course)
+        """Follow the loop from a start; close what it comes to. Returns (orbit or None, trajectory)."""
+        trajectory = self.poincare.iterate(x0, CROSSINGS, search_time)
+        orbit = self._orbit_near(attempts, x0, trajectory)
         words = {RESTS: "comes to rest", DIVERGES: "diverges", CYCLES: "repeats"}.get(
-            course.fate, "no period"
+            trajectory.fate, "no period"
         )
         if orbit is not None:
             words = f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s"
-        attempts.tell(name, words)
-        return orbit, course
+        attempts.note(name, words)
+        return orbit, trajectory
 
     def _closed(self, attempts, start, period, name, close=None) -> Orbit | None:
         try:
@@ -409,7 +411,7 @@ class OrbitFinder:
         except NoClosure as why:
             attempts.failed(name, why)
             return None
-        attempts.tell(name, f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s")
+        attempts.note(name, f"leads to the orbit {orbit.amplitude:.5g} @ {orbit.omega:.5g} rad/s")
         return orbit
 
     def feasible(self, x):
@@ -425,7 +427,9 @@ class OrbitFinder:
         steps of a sampled controller; a law without time sees their values alone, the sequence that the
         prediction of a discrete H speaks of, which is 1/sinc(omega dt/2) larger than the wave of steps.
         """
-        begin = self.engine.run(self.poincare.start(x0), crossings[-1].time, rtol=COURSE_RTOL, log=1).state
+        begin = self.engine.run(
+            self.poincare.start(x0), crossings[-1].time, rtol=TRAJECTORY_RTOL, log=1
+        ).state
         later = self.poincare.iterate(begin, min(periods, len(crossings)), until_repeated=False).crossings
         count = len(later) - 1
         if count < AVERAGED_LEAST:
@@ -439,7 +443,7 @@ class OrbitFinder:
             begin,
             t0 + span,
             times=times,
-            rtol=COURSE_RTOL,
+            rtol=TRAJECTORY_RTOL,
             spectrum=spectrum,
             omega=omega,
             max_step=period / STEPS_A_PERIOD,
@@ -447,7 +451,7 @@ class OrbitFinder:
         if not run.status.ok:
             return None
         amplitudes = 2 * np.abs(spectrum[:, 1]) / span
-        if self.poincare.held and answers_at_once(self.parts.block):
+        if self.poincare.held and has_direct_feedthrough(self.parts.block):
             amplitudes = amplitudes / np.sinc(omega * self.parts.dt / (2 * np.pi))
         exact = settled and self.engine.delayed and not self.sampled
         return Orbit(

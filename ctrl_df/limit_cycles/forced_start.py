@@ -11,9 +11,9 @@ from ..df.describing import quiet_describing_function as describing_function
 from ..df.dispatch import method_for
 from ..simulate.engine import Engine, harmonic_drive
 from ..simulate.sampled import Sampled
-from .exact.thresholds import COURSE_RTOL, STEPS_A_PERIOD
-from .predicted.answer import responder
+from .exact.thresholds import STEPS_A_PERIOD, TRAJECTORY_RTOL
 from .predicted.path import Path
+from .predicted.waveform_response import response_of
 from .thresholds import FORCED_PERIODS, FORCED_STARTS, FORCED_STEPS, MEAN_SEEN
 
 
@@ -90,8 +90,8 @@ def _forced_motion(loop, U, omega, wanted):
     block, amplitude = loop.parts.block, abs(U[1])
     if not block.nstates:
         if len(U) > 2:
-            answer = responder(block, method_for(block))
-            Y = None if answer is None else answer[0](U, omega)[0]
+            known = response_of(block, method_for(block))
+            Y = None if known is None else known[0](U, omega)[0]
             if Y is not None:
                 return np.zeros(0), Y
         return np.zeros(0), np.array([0.0, complex(describing_function(block, amplitude)) * U[1]])
@@ -129,7 +129,7 @@ def _forced_from(engine, core, row, x0, U, omega):
 
 def _options(period, U) -> dict[str, Any]:
     return dict(
-        rtol=COURSE_RTOL,
+        rtol=TRAJECTORY_RTOL,
         max_step=period / STEPS_A_PERIOD / (len(U) - 1) ** 0.5,
         log=1,
         max_steps=FORCED_STEPS,

@@ -61,9 +61,9 @@ def by_pieces(loop: Any, path: Path) -> tuple[np.ndarray, float] | None:
         mode[:n, :n], mode[:n, n] = a - slope * b @ c, -b[:, 0] * intercept
         modes.append(mode)
 
-    k = np.arange(1, path.answer.size)
+    k = np.arange(1, path.response.size)
     response = [np.linalg.solve(1j * m * path.omega * np.eye(n) - a, -b[:, 0]) for m in k]
-    x = np.real(np.array(response).T @ (path.answer[1:] * np.exp(1j * k * path.omega * begin)))
+    x = np.real(np.array(response).T @ (path.response[1:] * np.exp(1j * k * path.omega * begin)))
     size = np.maximum(np.abs(x), VISIT_SIZE * np.abs(x).max())
     height = float(np.abs(path.waveform).sum())
     times = np.array(times)

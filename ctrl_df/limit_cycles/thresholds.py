@@ -18,7 +18,7 @@ ROUNDED = 1e-12
 # --- exact orbits -----------------------------------------------------------------------------------
 
 RETURN_RTOL = 1e-9
-"""Relative error of a step of a course whose returns are sought."""
+"""Relative error of a step of a trajectory whose returns are sought."""
 
 # --- other ways to close an orbit -------------------------------------------------------------------
 
@@ -43,13 +43,13 @@ FORCED_STARTS = ((0.1, 0.0), (0.5, 3.0), (0.5, -3.0))
 MEAN_SEEN = 1e-9
 """Mean of an output, over its harmonics, that an integrator has to hold."""
 
-# --- courses ----------------------------------------------------------------------------------------
+# --- trajectories ----------------------------------------------------------------------------------------
 
 ENOUGH = 6
 """Crossings from which an orbit can be told."""
 
 RETURN_POINTS, RETURN_GONE, RETURN_NEAR = 4097, 0.1, 0.5
-"""Instants among which a course's returns are sought; distance that is away, and near again."""
+"""Instants among which a trajectory's returns are sought; distance that is away, and near again."""
 
 AVERAGE_POINTS, EVENTS_KEPT = 2049, 200
 """Instants of an averaged motion that is returned, and events."""
@@ -74,7 +74,7 @@ LEFT_ALONE = (0.2, 5)
 """Amplitude of a simulation beside an orbit, over the orbit's, that has not left it."""
 
 RETURNS, CROSSINGS_A_PERIOD, AVERAGED_LEAST = 4, 4, 4
-"""Returns of a course that are tried as periods, crossings that one period may have, and periods of an
+"""Returns of a trajectory that are tried as periods, crossings that one period may have, and periods of an
 average that are shown, and needed."""
 
 MET_LEAST = 8

@@ -9,10 +9,10 @@ from ..simulate.loop import closed_loop
 from ..status import Status
 from .arguments import check_search
 from .check import Check, Row, in_band
-from .exact.fate import Fate
-from .exact.known import KnownOrbits
+from .exact.basins import Fate
+from .exact.known_orbits import KnownOrbits
 from .exact.orbit import NoOrbit, Orbit
-from .exact.thresholds import COURSE_RTOL, CROSSINGS_VERIFIED, STEPS_A_PERIOD
+from .exact.thresholds import CROSSINGS_VERIFIED, STEPS_A_PERIOD, TRAJECTORY_RTOL
 from .finder import OrbitFinder
 from .predicted.grade import LimitCycle
 from .thresholds import CONFIRMED_WITHIN, LEFT_ALONE, MET_LEAST, SAME_CYCLE
@@ -78,14 +78,14 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
 
     orbits: list[Orbit] = []
     known = KnownOrbits(finder.poincare, orbits)
-    led: dict[int, Orbit] = {}
-    sought: dict[int, NoOrbit] = {}
+    from_path: dict[int, Orbit] = {}
+    searches: dict[int, NoOrbit] = {}
     # only a loop of closed_loop tells what is block, what controller, and so where a prediction begins
     for cycle in cycles if finder.parts is not None else []:
-        found, sought[id(cycle)] = finder.from_guess(cycle)
+        found, searches[id(cycle)] = finder.from_guess(cycle)
         orbit = known.kept(found)
         if found is not None and orbit is not None and not found.note:
-            led[id(cycle)] = orbit
+            from_path[id(cycle)] = orbit
     fate = Fate()
     if search:
         beside = KnownOrbits(finder.poincare, list(orbits))
@@ -93,14 +93,14 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
         for orbit in fate.orbits:
             if orbit.status.ok or not orbits:
                 known.kept(orbit)
-    partner = _pairs(cycles, orbits, led)
+    partner = _pairs(cycles, orbits, from_path)
     if finder.engine.delayed:
         return Check(tuple(_by_simulation(cycles, orbits, partner)), [], DELAYED, loop, fate)
     rows = []
     for cycle in cycles:
         match = partner.get(id(cycle))
         if match is None:
-            rows.append(_unpaired(cycle, sought.get(id(cycle))))
+            rows.append(_unpaired(cycle, searches.get(id(cycle))))
         else:
             rows.append(Row(cycle, match, simulated(finder, match), _verdict(cycle, match)))
     paired = {id(orbit) for orbit in partner.values()}
@@ -110,16 +110,16 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     return Check(tuple(rows), orbits, loop=loop, fate=fate)
 
 
-def _unpaired(cycle: LimitCycle, sought: NoOrbit | None) -> Row:
+def _unpaired(cycle: LimitCycle, search: NoOrbit | None) -> Row:
     """Row of a prediction without an orbit: `no such orbit` only where that was shown."""
     if cycle.branch:
         return Row(cycle, None, None, NOT_FOUND, _UNHELD)
-    if sought is not None and sought.status is Status.NO_SUCH_ORBIT:
-        return Row(cycle, None, None, NONE, next(t.outcome for t in sought.tried if "merge" in t.outcome))
+    if search is not None and search.status is Status.NO_SUCH_ORBIT:
+        return Row(cycle, None, None, NONE, next(t.outcome for t in search.tried if "merge" in t.outcome))
     tried = (
         ""
-        if sought is None or not sought.tried
-        else "; ".join(f"{t.start}: {t.outcome}" for t in sought.tried)
+        if search is None or not search.tried
+        else "; ".join(f"{t.start}: {t.outcome}" for t in search.tried)
     )
     return Row(cycle, None, None, NOT_FOUND, tried)
 
@@ -148,8 +148,8 @@ def _by_simulation(cycles, motions, partner):
             yield Row(None, None, (motion.omega, motion.output_amplitude), MISSED, why, motion)
 
 
-def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
-    """Pair predictions with orbits, each once: those their own path led to first, then the nearest.
+def _pairs(cycles, orbits, from_path) -> dict[int, Orbit]:
+    """Pair predictions with orbits, each once: those their own path from_path to first, then the nearest.
 
     An orbit within a prediction's stated band, or near it, is taken for it; agreeing on stability brings the
     two nearer.
@@ -157,7 +157,7 @@ def _pairs(cycles, orbits, led) -> dict[int, Orbit]:
     near = []
     for cycle in cycles:
         for orbit in orbits:
-            own = led.get(id(cycle)) is orbit
+            own = from_path.get(id(cycle)) is orbit
             if own or _close(cycle, orbit) or in_band(cycle, orbit):
                 distance = abs(np.log(cycle.omega / orbit.omega)) + 0.5 * abs(
                     np.log(cycle.amplitude / orbit.amplitude)
@@ -198,7 +198,7 @@ def simulated(
     run = engine.run(
         engine.start(met[-1][1]),
         period,
-        rtol=COURSE_RTOL,
+        rtol=TRAJECTORY_RTOL,
         max_step=period / STEPS_A_PERIOD,
         spectrum=spectrum,
         omega=omega,

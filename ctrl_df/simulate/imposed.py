@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks.core import Core
-from .kernel.imposed import answer, room
+from .kernel.imposed import force_along, work_arrays
 from .parallel import Elsewhere, Stopped, flag
 from .program.imposed import laws_of
 from .program.pointers import raise_kept
@@ -155,10 +155,10 @@ def imposed_forces(
     stop = np.zeros(1, np.int64) if stop is None else stop
     open_at, back = np.full(n, -1), np.empty((rows, len(path.open)))
     open_at[path.open] = np.arange(len(path.open))
-    done = answer(
+    done = force_along(
         laws.table, laws.par, laws.mass, laws.span, laws.asked, laws.presliding, path.nodes, path.samples,
         np.ascontiguousarray(z0, dtype=float).reshape(rows, laws.states), rtol, stop,
-        room(laws.states), out, open_at, back, kept,
+        work_arrays(laws.states), out, open_at, back, kept,
     )  # fmt: skip
     raise_kept()
     if not done:

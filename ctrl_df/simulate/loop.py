@@ -101,7 +101,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
             "an improper controller needs a block with a velocity output v for its derivative; "
             f"{block.name} has {', '.join(block.output_labels)}. Filter the derivative: pid(..., tf=...)."
         )
-    if controller.isdtime(strict=True) and answers_at_once(block) and np.any(np.asarray(proper.D)):
+    if controller.isdtime(strict=True) and has_direct_feedthrough(block) and np.any(np.asarray(proper.D)):
         raise ValueError(
             f"{block.name} and the discrete controller answer each other within one sample (an algebraic "
             "loop, D != 0), so the loop has no order of steps; give the controller one sample of delay."
@@ -127,7 +127,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     return loop
 
 
-def answers_at_once(block) -> bool:
+def has_direct_feedthrough(block) -> bool:
     """Whether a block is a law without time: its output follows a jump of its input."""
     if isinstance(block, Element):
         return not isinstance(block.primitive, RateLimiter)

@@ -18,7 +18,7 @@ from .engine import STATUS
 from .groups import Group
 from .kernel import driver, many
 from .kernel.many import Drives, How, Rows
-from .kernel.space import lent_space
+from .kernel.space import pooled_space
 from .parallel import processors
 from .program import pointers
 from .program.layout import H_AFFINE
@@ -181,7 +181,7 @@ def _rows(groups, runs, x0, begin, end, times, drive, first, count, max_steps, e
     return Rows(
         each(x0, shape=(runs, engine.nstates)), mode, modes, clock, each(end), each(max_steps, np.int64),
         each(drive, np.int64), par, times, first, count, at[:-1].copy(),
-        np.empty((int(at[-1]), engine.noutputs)), each(many.NOT_BEGUN, np.int64), np.zeros(runs, np.int64),
+        np.empty((int(at[-1]), engine.noutputs)), each(many.NOT_STARTED, np.int64), np.zeros(runs, np.int64),
     )  # fmt: skip
 
 
@@ -214,8 +214,8 @@ class _Work:
         curved = int(self.groups[0].engine.program.ints[H_AFFINE])
         if curved not in _ready:
             # compiled, or read from its file, before any thread asks for it
-            with ExitStack() as lent:
-                self._run(self._desk(self.groups[0], lent), self.groups[0], np.zeros(0, np.int64))
+            with ExitStack() as stack:
+                self._run(self._context(self.groups[0], stack), self.groups[0], np.zeros(0, np.int64))
             _ready.add(curved)
         # this thread only waits: it is the one that hears Ctrl-C
         workers = [
@@ -241,27 +241,27 @@ class _Work:
             self._work(todo)
         finally:
             todo.clear()
-            begun = [helper for helper in helpers if not helper.cancel()]
-            wait(begun)
-        for helper in begun:
+            started = [helper for helper in helpers if not helper.cancel()]
+            wait(started)
+        for helper in started:
             helper.result()
         if self.stop[0]:
             raise parallel.Stopped
 
     def one_by_one(self) -> None:
         """Make all runs in this thread: they call functions back that nobody knows to be safe elsewhere."""
-        with ExitStack() as lent:
+        with ExitStack() as stack:
             for group in self.groups:
-                desk = self._desk(group, lent)
+                context = self._context(group, stack)
                 for run in group.runs:
-                    self._called_back(desk, group, run)
+                    self._called_back(context, group, run)
 
-    def _called_back(self, desk, group, run):
+    def _called_back(self, context, group, run):
         """Make one run that calls functions back."""
         pointers.raised.clear()
         pointers.gave_nan.clear()
         with pointers.interruptible():
-            self._run(desk, group, np.array([run]))
+            self._run(context, group, np.array([run]))
         try:
             pointers.raise_kept()
         except RuntimeError as error:
@@ -293,31 +293,31 @@ class _Work:
                 yield group, group.runs[i : i + size].astype(np.int64)
 
     def _work(self, todo):
-        desk = at = None
-        with ExitStack() as lent:
+        context = at = None
+        with ExitStack() as stack:
             while not self.stop[0]:
                 try:
                     group, runs = todo.popleft()
                 except IndexError:
                     return
                 if group is not at:
-                    desk, at = self._desk(group, lent), group
-                self._run(desk, group, runs)
+                    context, at = self._context(group, stack), group
+                self._run(context, group, runs)
 
-    def _desk(self, group, lent: ExitStack):
-        space = lent.enter_context(lent_space(group.engine.program))
+    def _context(self, group, stack: ExitStack):
+        space = stack.enter_context(pooled_space(group.engine.program))
         states = self.kept if self.states else np.empty_like(self.kept)
-        return many.make_desk(group.engine, space, states, self.states, self.logged, self.stop)
+        return many.make_context(group.engine, space, states, self.states, self.logged, self.stop)
 
-    def _run(self, desk, group, runs):
+    def _run(self, context, group, runs):
         done = 0
         while True:
-            done = many.run_rows(desk, self.rows, self.drives, group.par, self.how, runs, done)
-            used = int(desk.tally[0])
+            done = many.run_rows(context, self.rows, self.drives, group.par, self.how, runs, done)
+            used = int(context.tally[0])
             if used:
-                log = (desk.log_row, desk.log_t, desk.log_n, desk.log_k)
+                log = (context.log_row, context.log_t, context.log_n, context.log_k)
                 self.log.append(tuple(column[:used].copy() for column in log))
-                desk.tally[0] = 0
+                context.tally[0] = 0
             if done == len(runs) or self.stop[0]:
                 return
 

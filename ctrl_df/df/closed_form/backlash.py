@@ -46,7 +46,7 @@ def backlash_family(
 ):
     """Harmonics of the load position of two masses with a gap, under ``F = a cos(omega t)`` on the motor.
 
-    Where several motions coexist the answer is, in this order: the symmetric motion with two impacts a
+    Where several motions coexist the result is, in this order: the symmetric motion with two impacts a
     period if it exists and is stable; else the motion that a release from sustained contact leads to; else
     (no contact remains, or the average of an irregular motion says little) those that four impacts of
     different phase and speed lead to. `backlash_attractors` lists all.

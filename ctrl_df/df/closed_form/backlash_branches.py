@@ -175,10 +175,10 @@ def coexisting_branches(motor_mass, load_mass, gap, restitution, A) -> list[Bran
     eps = float(restitution)
     met = np.zeros((places.size * IMPACT_STARTS.shape[0], 8))
     met = met[: _periodic(places, eps, IMPACT_STARTS, BRANCH_TRANSIENT, met)]
-    curves: list[_Followed] = []
+    curves: list[_ContinuedMotion] = []
     for motion in met:
         if not any(curve.holds(motion) for curve in curves):
-            curves.append(_Followed(eps, motion))
+            curves.append(_ContinuedMotion(eps, motion))
     return [
         Branch(c.name, c.regime, c.grid, _Scaled(c, motor_mass, load_mass, gap))
         for c in curves
@@ -195,7 +195,7 @@ def _sampled(A):
     return np.exp(steps[:: math.ceil(steps.size / MOST_PLACES)] * COEXISTING)
 
 
-class _Followed:
+class _ContinuedMotion:
     """A periodic motion that attracts, over the range of A in which it does; its parameter is ln A."""
 
     def __init__(self, eps, motion):

@@ -87,7 +87,7 @@ def close_damped(
 
 def _solved(trials, y, patient):
     """Return coordinates of an orbit and the error that they have, or None; its Jacobian is the last one."""
-    f = trials.missed(y)
+    f = trials.mismatch(y)
     best, error, last = y, np.inf, np.inf
     for _ in range(DAMPED_STEPS):
         size = trials.size.copy()
@@ -109,10 +109,10 @@ def _solved(trials, y, patient):
         y, f = shorter
         if trials.rtol > FINE:
             trials = replace(trials, rtol=FINE)
-            f = trials.missed(y)
+            f = trials.mismatch(y)
     if trials.rtol > FINE:
         return None
-    miss = trials.length(trials.missed(best), size)
+    miss = trials.length(trials.mismatch(best), size)
     closed = error < GOOD_LATE * GOOD or (error < POOR and miss < FINE_LATE * FINE)
     return (best, float(error)) if closed else None
 
@@ -127,7 +127,7 @@ def _shortened(trials, y, step, size, least):
         trial = trials.clipped(y + share * step)
         trials.size[:] = size
         try:
-            f = trials.missed(trial)
+            f = trials.mismatch(trial)
             ahead = trials.step(f)
         except RanAway:
             ahead = None
@@ -173,7 +173,7 @@ class _Trials:
         s = self.shots.laws.symmetries
         return np.clip(y, s.lower, s.upper)
 
-    def missed(self, y):
+    def mismatch(self, y):
         """Return end less start of one shot from y, in all coordinates; takes note of sizes."""
         transform = self.shots.laws.symmetries.transform
         state = self.shots.state_at(y, self.mode)
@@ -185,9 +185,9 @@ class _Trials:
             raise RanAway from stop
         except RuntimeError as error:  # a law asked where no motion leads may fail
             raise RanAway from error
-        missed = transform @ end.x
-        mismatch_of(self.shots.laws.period_map.at, transform @ state.x, missed)
-        return missed
+        mismatch = transform @ end.x
+        mismatch_of(self.shots.laws.period_map.at, transform @ state.x, mismatch)
+        return mismatch
 
     def differentiate(self, y, f):
         """Take the Jacobian at y, whose shot misses by f; False where a shot fails."""

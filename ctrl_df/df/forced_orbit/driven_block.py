@@ -125,7 +125,7 @@ class DrivenBlock:
     def laws_for(self, A: float, omega: float, near: Laws | None = None) -> Laws:
         """Return the laws for motions under a force of this size.
 
-        `near` is returned if its motions are not far from them. Without it the answer depends on the size
+        `near` is returned if its motions are not far from them. Without it the result depends on the size
         alone.
         """
         sizes = Sizes(self.free_motion(A, omega), A, omega)

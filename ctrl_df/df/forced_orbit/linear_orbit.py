@@ -1,4 +1,4 @@
-"""The periodic answer of a system whose laws are linear, in closed form, however light the damping.
+"""The periodic response of a system whose laws are linear, in closed form, however light the damping.
 
 Where all laws of a program are affine and none ever switches, dx/dt = a x + b u + e, and the forced motion at
 omega solves (j omega - a) x = b u. Free positions and speeds are left out of the question whether it
@@ -47,7 +47,7 @@ class LinearOrbit:
     runaway: bool
     poles: Any
 
-    def answer(self, A: float, omega: float, orders: int):
+    def response(self, A: float, omega: float, orders: int):
         """Return (Y_k for k = 0..orders, regime, state at t = 0); NaN where no periodic motion attracts."""
         y, omega = np.full(orders + 1, np.nan + 0j), float(omega)
         size = np.max(np.abs(self.poles), initial=0.0)

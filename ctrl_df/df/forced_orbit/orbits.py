@@ -29,7 +29,7 @@ from .shots import Force, OutOfWork, Shots, Work
 def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, averages=64, max_steps=1_000_000):
     """Harmonics of the steady motion on a grid, by forced periodic orbits.
 
-    Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the answer
+    Each point starts from its neighbour, from large amplitudes downwards; where motions coexist the result
     is the one reached that way.
 
     Parameters
@@ -57,7 +57,7 @@ def orbit_family(block, A, omega, *, orders=9, output=None, transient=4, average
         Index into `ORBIT_REGIMES`.
     residual : (na, nw)
         Mismatch after the period relative to the size of the orbit; for averaged motions twice the standard
-        error of the fundamental, relative. NaN where there is no answer.
+        error of the fundamental, relative. NaN where there is no response.
 
     Raises
     ------
@@ -148,7 +148,7 @@ class OrbitSolver:
             laws.reset()
             start = Start(laws)
         if laws.linear is not None:
-            y, regime, x = laws.linear.answer(A, omega, orders)
+            y, regime, x = laws.linear.response(A, omega, orders)
             state = None if x is None else State(0.0, x, self.block.engine.modes.copy())
             residual = np.nan if np.isnan(y[1]) else 0.0
             return Point(self._outer(y, A, omega, laws, regime), regime, residual, Start(laws, state))

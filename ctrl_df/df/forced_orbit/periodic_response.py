@@ -19,7 +19,7 @@ from .fourier import shifted
 from .orbit_search import ClosedOrbit, close_orbit
 from .shots import Force, OutOfWork, Shots, Work
 
-# Steps, delays and samplers answer small changes of the state with none, later, or at their ticks: no Newton.
+# Steps, delays and samplers respond to small changes of the state not at all, later, or at their ticks.
 _UNSUITED = (layout.QUANTIZER, layout.DELAY, layout.SAMPLED)
 
 
@@ -56,21 +56,21 @@ class PeriodicResponse:
     def __call__(self, U, omega: float, motion: ForcedState | None = None):
         """Return Y_k, k < len(U), for the input ``Re sum U_k exp(j k omega t)``, and its motion.
 
-        None and the motion given where there is no answer.
+        None and the motion given where there is no response.
         """
-        return next(self._answers(U, omega, motion), (None, motion))
+        return next(self._responses(U, omega, motion), (None, motion))
 
     def nearest(self, U, omega: float, apart: Callable, near: float):
-        """Return of the answers from all starts the one least ``apart(Y)``; the first one `near`."""
+        """Return of the responses from all starts the one least ``apart(Y)``; the first one `near`."""
         best, least = (None, None), np.inf
-        for Y, motion in self._answers(U, omega, None):
+        for Y, motion in self._responses(U, omega, None):
             if apart(Y) < least:
                 best, least = (Y, motion), apart(Y)
             if least < near:
                 break
         return best
 
-    def _answers(self, U, omega, motion):
+    def _responses(self, U, omega, motion):
         U, omega, block = np.asarray(U, dtype=complex), float(omega), self.block
         if block is None:
             return

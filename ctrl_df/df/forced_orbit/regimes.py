@@ -24,7 +24,7 @@ ORBIT_REGIMES = (
     "resonance",
     *(f"subharmonic {k}" for k in range(2, LONGEST_PERIOD + 1)),
 )
-"""Names of the answers: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
+"""Names of the motions: a sliding mass that never rests; one that does; nothing moves (N is NaN); impacts
 without and with sustained contact; one period but no half-wave symmetry although the laws have it; several
 periods, with their number; none; no dry friction and no contact; the state runs away (NaN); the bound on
 work was hit (NaN); the mass travels steadily besides oscillating (the ramp is no part of the harmonics);

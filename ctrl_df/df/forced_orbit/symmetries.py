@@ -100,7 +100,7 @@ class Sizes:
 
 
 class Samples(NamedTuple):
-    """What the laws answer at random states `x` (m, n) and inputs `u` (m,): rates, margins, outputs."""
+    """Values of the laws at random states `x` (m, n) and inputs `u` (m,): rates, margins, outputs."""
 
     x: np.ndarray
     u: np.ndarray

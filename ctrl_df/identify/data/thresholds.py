@@ -16,20 +16,23 @@ SINGLE = 2
 """Jumps up to which none is a step of a coarse sensor: there and back again is no motion."""
 
 USUAL_STEPS = (0.05, 0.95)
-"""Quantiles between which steps of time lie that are usual."""
+"""Quantiles between which steps of time lie that are usual: one in ten may be a hole, or written twice, and
+the clock still counts as regular."""
 
 REGULAR = 0.01
-"""Difference of steps of time, over their median, that is jitter."""
+"""Difference of steps of time, over their median, that is jitter: a motion of some ten samples a period or
+more moves by 0.6 % of its amplitude in it at most."""
 
 MOST_COLUMNS = 99
-"""Of a matrix: more is a row of samples."""
+"""Columns of a matrix that are read: instruments have tens of channels."""
 
 BLOCK, SAMPLE_ROWS = 100_000, 2000
-"""Rows converted at once, so that memory stays near the size of the file; rows that the decimal mark is read
-off."""
+"""Rows converted at once: some ten megabytes of texts, so that memory stays near the size of the file. Rows
+that the decimal mark is read off: a column may begin with whole numbers."""
 
 BINARY, BINARY_LOOK = 0.002, 100_000
-"""Share of control characters from which a file is no text; characters that are looked at."""
+"""Share of control characters from which a file is no text: of random bytes a tenth are (26 of 256), of text
+none but stray ones. Characters that are looked at: bounds work."""
 
 NANOSECONDS = 1e9
 """In a second: times of day are kept as whole ones."""
@@ -37,23 +40,29 @@ NANOSECONDS = 1e9
 # --- signals ----------------------------------------------------------------------------------------
 
 FEW_VALUES, ON_STEP, ON_STEPS = 0.9, 0.05, 0.9
-"""Share of different values, over the samples, up to which a signal may be rounded; distance from a multiple
-of the step, over it, and share of the samples within it."""
+"""Share of different values, over the samples, up to which a signal may be rounded: a tenth of them repeat.
+Distance from a multiple of the step, over it, and share of the distances within it: of values that keep to no
+grid a tenth do."""
 
 SPECTRUM_LENGTH = 16
-"""Samples of a segment of a spectrum at least."""
+"""Samples of a segment of a spectrum at least: four of its nine frequencies are then in the upper half, which
+tells the noise (`white_level`)."""
 
 WHITE_BAND = 0.95
 """Share of the Nyquist frequency up to which noise is white: beyond, filters of instruments act."""
 
 FLOOR_LEAST = 1e-14
-"""Noise floor, over the largest power, that rounding makes."""
+"""Noise floor, over the largest power, that rounding makes: of Hann's window and a sum of some samples, fifty
+eps."""
 
 CUTOFF_LOWEST, CUTOFF_HIGHEST = 0.1, 0.4
-"""Cutoff of a signal that is all noise, over the Nyquist frequency; the highest, over the sampling rate."""
+"""Cutoff of a signal that is all noise, over the Nyquist frequency: a tenth of the noise stays. The highest,
+over the sampling rate: the bilinear transform has no room above, and differences of samples, whose gain at it
+is 23 % of a derivative's, say nothing there."""
 
 PADDING = 30
-"""Samples by which a signal is continued at its ends, at least, before it is filtered."""
+"""Samples by which a signal is continued at its ends, at least, before it is filtered: twice what SciPy's
+``sosfiltfilt`` takes for two sections."""
 
 DECIMATED_BAND, DECIMATED_RIPPLE = 0.7, 5e-4
 """Band that decimation keeps, over the new Nyquist frequency; its ripple [dB]: flat within 1e-4, 49 dB down
@@ -78,15 +87,18 @@ SEGMENTS, SEGMENTS_CUTOFF = 12, 24
 sought."""
 
 ABOVE_NOISE, BEYOND_EDGE, CUTOFF_PERIODS = 10.0, 1.5, 4
-"""Power over the noise floor that is signal; cutoff over its highest frequency; periods of a cutoff in a
-record, at least."""
+"""Power over the noise floor that is signal: of a spectrum of 24 segments, some 23 averages, noise exceeds it
+at no frequency by chance (exp(-160)). Cutoff over the highest such frequency, where Butterworth's low-pass,
+both ways, keeps 1 - 1.5^-8, 96 %; periods of a cutoff in a record, at least."""
 
 LOW_PASS_ORDER, LOW_PASS_MEMORY = 4, 3
-"""Order of the low-pass before derivatives, twice for both ways; periods of its cutoff after which it has
-forgotten."""
+"""Order of the low-pass before derivatives, twice for both ways: its fall of 48 dB an octave is far more than
+the 12 dB by which a second derivative rises. Periods of its cutoff after which it has forgotten: its slowest
+poles, at 67.5 degrees, have then decayed by exp(-7)."""
 
 DECIMATED_ORDER, DECIMATED_MEMORY = 9, 40
-"""Order of the low-pass before decimation, odd: exact at 0 Hz; new samples after which it has forgotten."""
+"""Order of the low-pass before decimation, odd: exact at 0 Hz; new samples after which it has forgotten: its
+slowest poles have decayed by exp(-9)."""
 
-WINDOW_LEAST = 9
-"""Samples that a window of a record has to be longer than: a record has ten (`MINIMUM`)."""
+WINDOW_LEAST = MINIMUM - 1
+"""Steps that a window of a record has to be longer than, to hold a record."""

@@ -19,7 +19,7 @@ from typing import Any
 from ...blocks.effect import Effect
 from ...cached import cached_property
 from ...numerals import percent
-from ..course import COMPLETE, UNDER_WAY, Course
+from ..monitor import COMPLETE, UNDER_WAY, Monitor
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
@@ -127,12 +127,12 @@ class StepwiseSelection:
     max_effects : int
         Most effects added.
     executor : concurrent.futures.Executor or None
-    course : Course
+    monitor : Monitor
         Receives the `Study` as it stands.
     """
 
-    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor, course: Course):
-        self.dataset, self.free, self.executor, self.course = dataset, free, executor, course
+    def __init__(self, dataset, start, classes, free: Callable, max_effects: int, executor, monitor: Monitor):
+        self.dataset, self.free, self.executor, self.monitor = dataset, free, executor, monitor
         self.classes = sorted(dict.fromkeys(classes), key=lambda c: c.id)
         self.max_effects = max_effects
         self.start = Structure(start, len(start.effects))
@@ -163,7 +163,7 @@ class StepwiseSelection:
         the last fit that has not.
         """
         *steps, last = end.steps
-        self.course.stage("the parameters of the last model")
+        self.monitor.stage("the parameters of the last model")
         refitted = end.search.in_full()
         again = None if refitted is None else end.search.final([refitted], self.free)
         if again is None:
@@ -186,7 +186,7 @@ class StepwiseSelection:
         while (best := node.next) is not None:
             step = _step(node.diagnosis, best.model, (best.nrmse, best.nrmse_holdout), _addition(best))
             self._publish((*node.steps, step), node.search)
-            self.course.stage("earlier effects examined again")
+            self.monitor.stage("earlier effects examined again")
             revision = self._revised(node, best)
             if revision.structure.key in self.visited:
                 break
@@ -216,7 +216,7 @@ class StepwiseSelection:
         known.
         """
         steps = parent.steps if parent else ()
-        self.course.stage(f"step {len(steps)}: the model refitted")
+        self.monitor.stage(f"step {len(steps)}: the model refitted")
         search = self.dataset.search(structure.block, self.free(structure.block))
         last = step or (steps[-1] if steps else None)
 
@@ -230,9 +230,9 @@ class StepwiseSelection:
             return best or self._study((*steps, step_of(known.diagnosis)), known.search, UNDER_WAY)
 
         room = len(structure.added) < self.max_effects
-        known = diagnosed(search, self.classes if room else [], self.executor, self.course.within(so_far))
+        known = diagnosed(search, self.classes if room else [], self.executor, self.monitor.within(so_far))
         found = known.diagnosis
-        self.course.stage("all models over the same data")
+        self.monitor.stage("all models over the same data")
         alike = self._on_common_data((*steps, step_of(found)), known.search)
         node = Node(structure.at(found.model), known.search, found, alike, parent)
         self.visited[structure.key] = node
@@ -272,7 +272,7 @@ class StepwiseSelection:
     def _neighbourhood(self, end: Node) -> tuple[Neighbourhood, Neighbours]:
         """Fit every neighbour of a model in which nothing more was found."""
         self._publish(end.steps, end.search)
-        self.course.stage("every effect left out in turn")
+        self.monitor.stage("every effect left out in turn")
         neighbourhood = Neighbourhood(end.structure, end.search, self.free)
         neighbourhood.add(end.diagnosis, end.refused)
         neighbourhood.drop_each()
@@ -281,7 +281,7 @@ class StepwiseSelection:
         errors = end.search.errors(neighbourhood.own)
         for place in reversed(range(len(end.structure.added))):
             self._publish(end.steps, end.search, Neighbours(neighbourhood.rows(), *errors, complete=False))
-            self.course.stage(f"exchanges of {end.structure.added[place].id.replace('_', ' ')}")
+            self.monitor.stage(f"exchanges of {end.structure.added[place].id.replace('_', ' ')}")
             neighbourhood.exchange(place, self._alternatives(end, place))
         neighbourhood.merge()
         table = Neighbours(neighbourhood.rows(), *errors)
@@ -365,12 +365,12 @@ class StepwiseSelection:
     # --- reporting --------------------------------------------------------------------------------------
 
     def _publish(self, steps, search: Search, neighbours: Neighbours | None = None) -> None:
-        self.course.known(self._study(steps, search, UNDER_WAY, neighbours))
+        self.monitor.known(self._study(steps, search, UNDER_WAY, neighbours))
 
     def _study(self, steps, search: Search, status: str, neighbours: Neighbours | None = None) -> Study:
         return Study(
             tuple(steps), steps[-1].model, outcome(steps), search.relative(last_diagnosis(steps).noise),
-            self.start.block, self.dataset.records, self.dataset.validation, self.course.seconds, status,
+            self.start.block, self.dataset.records, self.dataset.validation, self.monitor.seconds, status,
             neighbours or Neighbours(complete=False),
         )  # fmt: skip
 

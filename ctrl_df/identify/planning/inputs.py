@@ -10,6 +10,7 @@ import numpy as np
 
 from ...blocks.coordinates import moving_in
 from ...numerals import digits
+from ..estimation.thresholds import SCREEN_SAMPLES
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..prediction.simulator import free_run
@@ -20,7 +21,6 @@ from .thresholds import (
     PLAN_MARGIN,
     PLAN_MOVES,
     PLAN_PEAK,
-    PLAN_SAMPLES,
     PLAN_SINES,
     PLAN_SIZES,
     PLAN_SLACK,
@@ -151,7 +151,7 @@ class _Free:
         self.scale = centre + reach * np.linspace(-1, 1, len(t))  # tells the simulator how far outputs may go
 
     def __call__(self, u):
-        decimation = max(1, len(self.t) // PLAN_SAMPLES)
+        decimation = max(1, len(self.t) // SCREEN_SAMPLES)
         played = _played(self.record, self.t, u, self.scale)
         ys = [free_run(m, played, position=self.centre, decimation=decimation) for m in self.models]
         gaps = [_apart(self.record, self.t, a - b) for i, a in enumerate(ys) for b in ys[i + 1 :]]
@@ -179,8 +179,8 @@ class _Loop:
         self.shapes, self.ranges = _references(t, record), ((centre, PLAN_MARGIN * reach),)
         self.moves = parts.block.coordinates
         self.loops = [closed_loop(parts.controller, m, parts.dt) for m in models]
-        self.t = t[:: max(1, len(t) // PLAN_SAMPLES)]
-        self.decimation = max(1, len(t) // PLAN_SAMPLES)
+        self.t = t[:: max(1, len(t) // SCREEN_SAMPLES)]
+        self.decimation = max(1, len(t) // SCREEN_SAMPLES)
         # The controller passes the noise of the sensor on to the drive.
         self.noise_peak = PLAN_PEAK * noise * _fastest_gain(parts.controller, parts.dt or float(t[1] - t[0]))
 

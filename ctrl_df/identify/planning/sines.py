@@ -11,9 +11,9 @@ import numpy as np
 from ...blocks.coordinates import moving_in
 from ...numerals import digits
 from ..results.experiment import Experiment, separated
-from ..tables.thresholds import WORK_MEDIUM
+from ..tables.thresholds import SCATTER_LEAST, WORK_MEDIUM
 from ..thresholds import NOTHING
-from .thresholds import COUNTED, PLANE, PLANE_BEYOND, SETTLE, SIGMA_LEAST, SINE_SAMPLES, SINES
+from .thresholds import COUNTED, PLANE, PLANE_BEYOND, SETTLE, SINE_SAMPLES, SINES
 
 
 def stepped_sines(
@@ -64,7 +64,7 @@ def stepped_sines(
         found.append(np.asarray(describing_function(m, A[:, None], omega[None], **options)))
     size = np.max(np.abs(np.nan_to_num(found)), axis=0)
     far = A[:, None] * size
-    sigma = max(diagnosis.noise, SIGMA_LEAST)
+    sigma = max(diagnosis.noise, SCATTER_LEAST)
     gaps = [
         np.abs(np.nan_to_num(a) - np.nan_to_num(b)) / np.maximum(size, NOTHING)
         for a, b in itertools.combinations(found, 2)

@@ -12,9 +12,9 @@ from ...cached import cached_property
 from ..data import derivatives
 from ..data.imposed import imposed_motion, imposes_motion
 from ..data.measurement import Measurement
-from ..thresholds import NOISE_FREE, NOTHING, UNPLACED
+from ..thresholds import NOISE_FREE, NOTHING, SEGMENT_SAMPLES, UNPLACED
 from .sensed import POSITION, driving_force, force_scale, place_unit, sensed
-from .thresholds import HALF_LEAST, HALF_MOST, HALF_PERIOD, PART_LEAST, TURNS_SAMPLES, USUAL_SEGMENT_LEAST
+from .thresholds import HALF_LEAST, HALF_MOST, HALF_PERIOD, TURNS_SAMPLES, USUAL_SEGMENT_LEAST
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,7 @@ def make_segments(record: Measurement, length: float | None = None) -> Segments:
 def cut(record: Measurement, count: int) -> Segments:
     """Cut a record into `count` segments of equal time, of 20 samples at least."""
     n = len(record)
-    count = max(min(count, n // PART_LEAST), 1)
+    count = max(min(count, n // SEGMENT_SAMPLES), 1)
     edges = np.searchsorted(record.t, np.linspace(record.t[0], record.t[-1], count + 1))
     edges[0], edges[-1] = 0, n
     edges = np.unique(edges)

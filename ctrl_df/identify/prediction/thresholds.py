@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ..thresholds import SEGMENT_SAMPLES
+
 HIDDEN_RTOL = 1e-4
 """Tolerance of hidden states under an imposed motion: of steps no longer than a sample it leaves errors of
 some 1e-6 of the force, and is twice as fast as 1e-6 (records)."""
@@ -25,7 +27,8 @@ FORGOTTEN = 1e-3
 time constants."""
 
 LONG_BEFORE = 1e3
-"""Durations of a record before it from which its first value has held: any lag has settled."""
+"""Durations of a record before it from which its first value has held: a lag that is seen at all, of ten
+durations, has settled to exp(-100)."""
 
 RESTORING = 0.1
 """Force between two rms positions to either side, over the typical one, with which free runs do not drift: a
@@ -38,21 +41,22 @@ record) is of no use to a fit, and is given up before it holds up the others."""
 TURNS_SAMPLES = 2000
 """Samples among which turning points are counted: a record of a hundred swings has twenty in each."""
 
-USUAL_SEGMENT_LEAST = 40
-"""Samples of a segment of usual length at least: a few of them go to its initial state."""
+USUAL_SEGMENT_LEAST = 2 * SEGMENT_SAMPLES
+"""Samples of a segment of usual length at least: twice the shortest one that may be asked for."""
 
 HALF_PERIOD, HALF_LEAST, HALF_MOST = 0.25, 4, 8
-"""Half of the span over which a state is read off: periods of the cutoff, samples at least, parts of the
-record at most."""
-
-PART_LEAST = 20
-"""Samples of a part of a record at least: states and a few errors."""
+"""Half of the span over which a parabola is laid to read off a state: in periods of the cutoff, so that its
+slope is 3 % low for a sine of a third of that frequency, 23 % at it; in samples at least, nine then for three
+coefficients; of a record at most, a quarter of it in all."""
 
 FRICTION_SLOPE = 3.0
-"""Slope of the hyperbolic tangent that a presliding force follows over the typical speed: 0.995 there."""
+"""Slope of the hyperbolic tangent that stands for a presliding force over the speed: at the typical speed
+friction acts in full, tanh(3) = 0.995."""
 
 FAR_OUT, FAR_LIMIT = 10.0, 100.0
-"""Spreads of an output from its mean that stand for a run that failed; typical sizes beyond which one has."""
+"""Spreads of an output from its mean that stand for one that is no number: a hundred times the power of the
+best constant, which no fit prefers. Times these, where an output that grows without bound is cut off: of two
+such runs the worse one is still told, and no square overflows."""
 
 MOST_SAMPLES = 0.75
 """Quantile of the distances from a decimated input: see `ROUGH`."""

@@ -14,16 +14,16 @@ from ..data.imposed import imposes_motion
 from ..data.measurement import Measurement
 from ..estimation.fit import FitResult, fit_segments
 from ..estimation.starts import same_begins
+from ..estimation.thresholds import DECIMATION
 from ..prediction.initial_states import CONTINUED, FREE
 from ..prediction.segments import cut, facts
 from ..prediction.sensed import sensed
 from ..prediction.simulators import simulator_of
+from ..shooting.thresholds import SHORTEST_SEGMENT
 from ..thresholds import FULL_SAMPLES, NOTHING
 from .thresholds import (
-    HORIZON_DECIMATION,
     HORIZON_FIRST,
     HORIZON_LAST,
-    HORIZON_LEAST,
     HORIZON_ON,
     HORIZON_TOLERANCE,
     HORIZONS,
@@ -110,7 +110,7 @@ def _ladder(model, records, most) -> list[FitResult]:
     decimation = max(1, round(max(map(len, records)) / FULL_SAMPLES))
     first, found = simulator_of(model, records[0]), []
     if first.mechanism and not first.closed and not any(map(imposes_motion, records)):
-        least = [max(SHORTEST_HORIZON * facts(r).swing, HORIZON_LEAST * facts(r).dt) for r in records]
+        least = [max(SHORTEST_HORIZON * facts(r).swing, SHORTEST_SEGMENT * facts(r).dt) for r in records]
         halvings = min(int(math.log2(max(r.duration / s, 1.0))) for r, s in zip(records, least, strict=True))
         for k in range(min(halvings, most - 1), 0, -1):
             found.append(_fitted(model, records, 2**k, decimation, CONTINUED, found))
@@ -122,7 +122,7 @@ def _fitted(model, records, parts, decimation, begins, shorter) -> FitResult:
     segments = [cut(r, parts) for r in records]
     near: Any = same_begins(shorter[-1], segments) if shorter else None
     for rate, iterations in (
-        (HORIZON_DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST),
+        (DECIMATION * decimation, HORIZON_ON if shorter else HORIZON_FIRST),
         (decimation, HORIZON_LAST),
     ):
         found = fit_segments(

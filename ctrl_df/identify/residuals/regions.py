@@ -18,14 +18,13 @@ import numpy as np
 from ...blocks.coordinates import moving_in
 from ...numerals import SMALLEST_P, digits
 from ..data.quantities import word_of
-from ..thresholds import LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
+from ..thresholds import BY_CHANCE, LEVEL, NEARLY_NOTHING, NOTHING, RECORD_SAMPLES
 from .motion_phases import reversals, swing, time_since
 from .residual_tests import autocorrelation
 from .thresholds import (
     AFTER_REVERSAL,
     BAND_LOWEST,
     BANDS_LEAST,
-    CORRELATED,
     EDGE_ZERO,
     FAINT,
     FASTEST,
@@ -256,7 +255,7 @@ class _Null:
     def _correlation(self, r):
         rho = autocorrelation(r, self.lags)
         # Lags whose correlation is within three standard errors of none add noise only.
-        rho = np.where(rho**2 > CORRELATED**2 / self.n, rho, 0.0)
+        rho = np.where(rho**2 > BY_CHANCE**2 / self.n, rho, 0.0)
         rho[0] = 1.0
         return rho
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from statistics import NormalDist
 
+from ..estimation.thresholds import RTOL_COARSE
+
 HORIZONS = 8
 """Lengths of free prediction at most, each half of the one above: of a record of 64 motions a half is the
 shortest."""
@@ -12,73 +14,82 @@ shortest."""
 SHORTEST_HORIZON = 0.25
 """The shortest, in to-and-fro motions: over less the fitted position and speed follow nearly anything."""
 
-TEST_FORCE = 3e-3
-"""Amplitude of a test force over the rms of the force: linear still, and far above rounding."""
+TEST_FORCE = round(math.sqrt(RTOL_COARSE), 3)
+"""Amplitude of a test force over the rms of the force, 0.003: curvature, in proportion to it, and the error
+of simulations over it, in inverse proportion, are then as large as each other."""
 
 FORCES_TOGETHER = 16
 """Test forces simulated in one call: it bounds memory and changes no result."""
 
 FINER = 3
-"""How many times finer the second grid of test forces is."""
+"""How many times finer the second grid of test forces is, half a decade: what is narrower than a bump of the
+first by more than its root, 1.7, is nearer to one of the second."""
 
 REVERSAL_REACHES = (0.03, 0.1, 0.3, 1.0)
-"""Travel after a reversal [typical positions] over which a force may build up."""
+"""Travel after a reversal [typical positions] over which a force may build up: exponentials half a decade
+apart, of which one correlates by 0.96 or more with any between."""
 
 FAINT = 1e-30
-"""Power, over all of it, that is none."""
+"""Power, over all of it, that is none: the square of rounding, of some five eps."""
 
 EDGE_ZERO = 1e-3
-"""Edges of regions nearer to zero than this share of the largest are called zero."""
+"""Edges of regions nearer to zero than this share of the largest are called zero: labels have three
+digits."""
 
 TWO_SIDED = round(NormalDist().inv_cdf(0.975), 2)
 """Standard deviations of a 95 % band."""
 
 WHITENESS_LAGS = 25
-"""Lags of a test of whiteness at most."""
+"""Lags of a test of whiteness at most: as many as MATLAB's ``resid`` takes."""
 
 INPUT_LAGS = 3000
-"""Lags of a test for traces of the input at most; a tenth of the samples."""
+"""Lags of a test for traces of the input at most: bounds work, for inputs that remember longer."""
 
 DECORRELATED = round(math.exp(-1), 2)
 """Correlation at which a first-order signal has forgotten: 1/e."""
 
 FASTEST, LOW_SPEED, MEDIUM_SPEED = 0.95, 0.1, 0.6
-"""Quantile of the speeds that is fast, and shares of it below which a motion is slow, and of medium speed."""
+"""Quantile of the speeds that is fast: one in twenty may be noise. Shares of it below which a motion is slow,
+and of medium speed: a sine is slow for 6 % of the time, at medium speed for 35 %, fast for 59 %."""
 
 AFTER_REVERSAL = 0.15
-"""Share of the time between two reversals that is just after one."""
+"""Share of the time between two reversals that is just after one: a sine then has reached half its speed, and
+travelled a twentieth of the way."""
 
 REGION_SAMPLES = 60
-"""Independent samples of a region at least."""
+"""Independent samples of a region from which its mean is tested with the spread that it leaves: Student's
+quantile at 1 % is then 3 % beyond that of a known spread."""
 
 FREE_STEPS = {"position": (0.005, 12), "low_speed": (0.01, 12), "load": (0.01, 8)}
 """Range of a quantity left out at either end, as a quantile, and steps of a free force over it."""
 
-HUM_WINDOW = 161
-"""Frequencies whose median is the power beside a hum."""
+HUM_FINER, HUM_LEAST = 4, 3
+"""Parts of a line of a spectrum into which it is divided: halfway between two of them a hum loses 1 % of its
+amplitude under Hann's window. Periods of a hum in a record at least: the window spreads a trend over two."""
+
+HUM_WINDOW = 10 * 4 * HUM_FINER + 1
+"""Frequencies whose median is the power beside a hum, 161: ten times those that it fills itself under Hann's
+window, four lines."""
 
 HORIZON_TOLERANCE = 1e-2
-"""Relative gain at which initial states of a segment have converged."""
+"""Relative gain of the cost at which initial states of a segment have converged: the error itself is then
+known to half a per cent."""
 
-HORIZON_LEAST = 50
-"""Samples of the shortest horizon at least."""
-
-HORIZON_DECIMATION, HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 4, 8, 3, 2
-"""Initial states for a horizon: decimation of the first fit, its steps, those where a shorter one is known,
-and those at the full rate."""
-
-CORRELATED = 3.0
-"""Standard errors of a correlation beyond which it is one."""
+HORIZON_FIRST, HORIZON_ON, HORIZON_LAST = 8, 3, 2
+"""Steps of initial states for a horizon: of the first, of those where a shorter one is known, and at the full
+rate. Half and twice of them move the error of the true structure by 6 % at most (a ripple, a joint, Stribeck
+friction: `benchmarks/half_and_twice.py horizons`)."""
 
 REGION_LEAST, BANDS_LEAST, BAND_LOWEST = 8, 6, 2.5
-"""Samples of a region, and bands of a spectrum, at least; its lowest frequency, in cycles of the record."""
+"""Samples of a region at least, the eighth part of the shortest record taken (`RECORD_SAMPLES`) being six;
+bands of a spectrum at least, one and two neighbours to either side besides one; its lowest frequency, in
+cycles of the record: beyond the two over which Hann's window spreads a mean."""
 
 LAGS_TESTED, LAGS_SHARE, LAGS_FORGOTTEN = 20, (5, 10, 4), 5
-"""Lags of a test for traces of the input; parts of a record that its lags are at most (whiteness, input,
-spread); times after which the input has forgotten, in those of a first-order signal."""
-
-HUM_FINER, HUM_LEAST = 4, 3
-"""Parts of a line of a spectrum into which it is divided; periods of a hum in a record at least."""
+"""Lags of a test for traces of the input, about as many as of one of whiteness. Parts of a record that lags
+are at most: a fifth in a test of whiteness (Hyndman & Athanasopoulos, Forecasting, sec. 5.4); a tenth where
+the memory of the input is measured, so that nine tenths of the samples have a partner; a quarter in its test.
+Correlation times over which these lags are spread: exp(-5), 0.7 %, is left of a first-order signal."""
 
 COARSE = 0.4
 """rms residual over the step up to which rounding can be what makes it: alone it makes 1/sqrt(12) = 0.29."""

@@ -13,8 +13,8 @@ from ...drawing import draw, go_on
 from ...numerals import certainty as sure
 from ...numerals import digits, percent
 from ...table import Brief
-from ..course import COMPLETE
 from ..data.measurement import Measurement
+from ..monitor import COMPLETE
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..thresholds import RULED_OUT
 from .thresholds import SHOWN_PROBABILITY

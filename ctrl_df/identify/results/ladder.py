@@ -10,7 +10,7 @@ from typing import Any
 from ...drawing import draw, go_on
 from ...numerals import percent
 from ...table import Brief
-from ..course import COMPLETE
+from ..monitor import COMPLETE
 from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, which_errors
 from .neighbours import Neighbours
 from .thresholds import LEAST_WIDTH

@@ -1,15 +1,18 @@
-"""What results say: tuned numbers."""
+"""What results say: tuned numbers, each with what it follows from."""
 
 from __future__ import annotations
 
+from ..thresholds import LEVEL
+
 SPECTRUM_LEAST = 100
-"""Samples of a record at least for a spectrum of its error."""
+"""Samples of a record at least for a spectrum of its error: two decades of frequency."""
 
 SMOOTHED_ENDS = 0.6
-"""Periods of the cutoff at either end that a smoothed signal is not used of."""
+"""Periods of the cutoff at either end that a smoothed signal is not used of: the low-pass has forgotten a
+quarter of what lies beyond (`LOW_PASS_MEMORY`)."""
 
-SHOWN_PROBABILITY = 0.01
-"""Of a candidate that is worth a word."""
+SHOWN_PROBABILITY = LEVEL
+"""Probability of a candidate beyond which it is worth a word: that of a chance that tests take."""
 
 LEAST_WIDTH = 30
-"""Letters of the first column of a ladder."""
+"""Letters of the first column of a ladder: the longest name of an effect has 27."""

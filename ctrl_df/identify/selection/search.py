@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, Self
 
-from ..course import Course
+from ..monitor import Monitor
 from ..results.diagnosis import Diagnosis
 
 
@@ -124,14 +124,14 @@ class Search(ABC):
         """The data to fit, and those held out."""
 
     @abstractmethod
-    def candidates(self, classes, executor=None, course: Course | None = None) -> tuple[Self, list[Any]]:
+    def candidates(self, classes, executor=None, monitor: Monitor | None = None) -> tuple[Self, list[Any]]:
         """Return the search that knows them, and every effect fitted that can be added, best evidence first.
 
         Parameters
         ----------
         classes : sequence of effect classes
         executor : concurrent.futures.Executor or None
-        course : Course or None
+        monitor : Monitor or None
             Receives the intermediate results.
         """
 
@@ -153,10 +153,10 @@ class Search(ABC):
         return search.ranked(known, [replace(t, extra=t.extra - more) for t in found])
 
     @abstractmethod
-    def confirm(self, found, course: Course | None = None) -> tuple[Self, list[Any]]:
+    def confirm(self, found, monitor: Monitor | None = None) -> tuple[Self, list[Any]]:
         """Refit baseline and best candidates carefully; return the search that knows them, and these.
 
-        `found`, what is returned: candidates, best first; `course`: see `candidates`.
+        `found`, what is returned: candidates, best first; `monitor`: see `candidates`.
         """
 
     @abstractmethod

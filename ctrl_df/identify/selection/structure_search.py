@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from ..course import Course
 from ..estimation.fit import in_null_directions
 from ..estimation.refit_records import indistinguishable_parameters, undetermined
 from ..estimation.segmented import CandidateFit, SegmentedData, prepare
 from ..estimation.thresholds import RESTARTS_KEPT
+from ..monitor import Monitor
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
 from ..results.explain import explains_nothing, far_off, grows
@@ -99,11 +99,11 @@ class StructureSearch(Search):
 
     # --- the steps ------------------------------------------------------------------------------------
 
-    def candidates(self, classes, executor=None, course=None):
+    def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted over short segments or those that they need."""
-        course = course or Course()
+        monitor = monitor or Monitor()
         at, found = self._screening(classes, executor).run(
-            self.at, partial(self._report, course), course.stage
+            self.at, partial(self._report, monitor), monitor.stage
         )
         return self.after(at=at, screened=found), found
 
@@ -111,11 +111,11 @@ class StructureSearch(Search):
         """Return effects that may replace the last one of a model, with evidence over it."""
         return self._screening(classes, executor).rivals(self.at, model, names)
 
-    def confirm(self, found, course=None):
+    def confirm(self, found, monitor=None):
         """Refit baseline and best candidates at the full rate."""
-        course = course or Course()
-        at, chosen = confirmed(self.at, found, self.stages, partial(self._report, course), course.stage)
-        course.stage("refit of the candidates that may be named")
+        monitor = monitor or Monitor()
+        at, chosen = confirmed(self.at, found, self.stages, partial(self._report, monitor), monitor.stage)
+        monitor.stage("refit of the candidates that may be named")
         at, chosen = refitted(at, chosen, self.significant, self._whole_refit)
         return self.after(at=at), chosen
 
@@ -132,8 +132,8 @@ class StructureSearch(Search):
         classes = [c for c in classes if self.applies(c)]
         return Screening(classes, self.free, nominal, self.disturbs, executor)
 
-    def _report(self, course: Course, at: Reference, found) -> None:
-        course.known((self.after(at=at), found))
+    def _report(self, monitor: Monitor, at: Reference, found) -> None:
+        monitor.known((self.after(at=at), found))
 
     def equivalent(self, a: CandidateFit, b: CandidateFit) -> bool:
         """Whether two candidates are equivalent on these data, within noise or as a limit of each other."""

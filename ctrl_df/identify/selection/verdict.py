@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...simulate.parallel import side_by_side
-from ..course import COMPLETE, UNDER_WAY, Course
+from ..monitor import COMPLETE, UNDER_WAY, Monitor
 from ..results.diagnosis import (
     AMBIGUOUS,
     EFFECT,
@@ -50,7 +50,7 @@ def diagnosed(
     search: Search,
     classes,
     executor=None,
-    course: Course | None = None,
+    monitor: Monitor | None = None,
     limits=None,
     search_with: Callable[[Any], Search] | None = None,
 ) -> Diagnosed:
@@ -63,7 +63,7 @@ def diagnosed(
         Candidates; with none the model alone is diagnosed.
     executor : concurrent.futures.Executor or None
         Runs fits in parallel; None: threads of this process do.
-    course : Course or None
+    monitor : Monitor or None
         Receives the diagnosis as it stands.
     limits : mapping or None
         What the next experiment may do to the machine.
@@ -76,20 +76,20 @@ def diagnosed(
     def so_far(known) -> Diagnosed:
         return _Question(known[0], began, limits).so_far(known[1])
 
-    def diagnose_rest(block, part: Course) -> Diagnosis:
+    def diagnose_rest(block, part: Monitor) -> Diagnosis:
         assert search_with is not None
         return diagnosed(search_with(block), classes, executor, part).diagnosis
 
-    course = (course or Course()).within(so_far)
+    monitor = (monitor or Monitor()).within(so_far)
     first: Diagnosed | None = None
     refuted: tuple[tuple[str, str], ...] = ()
     while True:
         left = [c for c in classes if c.id not in dict(refuted)]
-        after, found = search.candidates(left, executor, course)
-        after, chosen = after.confirm(found, course)
-        course.stage("verdict")
+        after, found = search.candidates(left, executor, monitor)
+        after, chosen = after.confirm(found, monitor)
+        monitor.stage("verdict")
         known, refutation = _Question(after, began, limits, refuted).answer(
-            chosen, found, course, diagnose_rest if search_with else None
+            chosen, found, monitor, diagnose_rest if search_with else None
         )
         ranking = known.diagnosis.ranking
         if first is not None and not (ranking and is_significant(ranking[0], after)):
@@ -97,8 +97,8 @@ def diagnosed(
         if refutation is None or len(refuted) == REFUTED_MOST:
             return known
         first = first or known
-        course.known((after, found))
-        course.stage(
+        monitor.known((after, found))
+        monitor.stage(
             f"the search repeated without {refutation[0].replace('_', ' ')}, which long horizons refute"
         )
         refuted = (*refuted, refutation)
@@ -128,7 +128,7 @@ class _Question:
         self,
         chosen: Sequence,
         found: Sequence,
-        course: Course,
+        monitor: Monitor,
         diagnose_rest: Callable[..., Diagnosis] | None,
     ) -> tuple[Diagnosed, tuple[str, str] | None]:
         """Return the diagnosis, and the refutation of the first candidate (id, reason) if there is one.
@@ -137,7 +137,7 @@ class _Question:
         each, set the error above which fits of others were given up: the search is then repeated without it.
 
         Where the residual with the first is more than noise, a second effect is missing or it stands in for
-        one outside the library: `diagnose_rest(block, course)` is the diagnosis of the model with the first;
+        one outside the library: `diagnose_rest(block, monitor)` is the diagnosis of the model with the first;
         None: that is not examined here.
         """
         search = self.search
@@ -162,7 +162,7 @@ class _Question:
             verdict = AMBIGUOUS
         long_run: list = []
         if verdict == EFFECT or (verdict == AMBIGUOUS and not inconclusive):
-            course.stage("free prediction over long horizons")
+            monitor.stage("free prediction over long horizons")
             long_run = [base, *compared(ranking, search.significant)]
         # independent of each other; the longest first
         significant = verdict != NONE
@@ -193,8 +193,8 @@ class _Question:
             and remainder.more
             and not inconclusive
         ):
-            course.stage(f"the residual with {ranking[0].id.replace('_', ' ')}")
-            second = diagnose_rest(best.block, course.within(lambda _: (search, chosen)))
+            monitor.stage(f"the residual with {ranking[0].id.replace('_', ' ')}")
+            second = diagnose_rest(best.block, monitor.within(lambda _: (search, chosen)))
             verdict = UNKNOWN if second.verdict == UNKNOWN else verdict
             doubts = (*doubts, leaves(ranking[0], second))
         doubts = (*doubts, *(why for _, why in self.refuted), *search.open_directions())

@@ -38,7 +38,7 @@ class Curve:
     p_value: float = 1.0
 
 
-def known_to_make(force, std, own, known) -> tuple[float, float]:
+def explained_shares(force, std, own, known) -> tuple[float, float]:
     """Return the share of a force's square that own regressors make, and that which a constant adds."""
     root, use = 1.0 / std[known], known
     y, columns = force[use] * root, _weighed(own[use], root)
@@ -73,7 +73,7 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     order = np.argsort(values[use], kind="stable")
     root = 1.0 / std[use]
     rest = _weighed(beside[use], root)
-    y, count, together = force[use] * root, CURVE_BINS, 1.0
+    y, count, correlation_length = force[use] * root, CURVE_BINS, 1.0
     bins, both, fit, left = np.zeros(len(use), int), rest, np.zeros(0), y
     # the autocorrelation of what neither explains gives the independent instants, and so the bins
     for _ in range(2):
@@ -82,12 +82,12 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
         both = np.column_stack([rest, (bins[:, None] == np.arange(count)) * root[:, None]])
         fit = np.linalg.lstsq(both, y, rcond=DEPENDENT)[0]
         left = y - both @ fit
-        together = _together(left)
-        count = int(np.clip(len(use) / together / CURVE_ALONE, CURVE_LEAST, count))
+        correlation_length = _correlation_length(left)
+        count = int(np.clip(len(use) / correlation_length / CURVE_ALONE, CURVE_LEAST, count))
     count = int(bins.max()) + 1
     alone = np.column_stack([_weighed(own[use], root), root])
     before = y - alone @ np.linalg.lstsq(alone, y, rcond=DEPENDENT)[0]
-    free = max(len(use) / together, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
+    free = max(len(use) / correlation_length, both.shape[1] + 2.0) - np.array([alone.shape[1], both.shape[1]])
     power = np.array([before @ before, left @ left])
     share = 1.0 - power[1] / free[1] / max(power[0] / free[0], NOTHING)
     more = max(both.shape[1] - alone.shape[1], 1)
@@ -97,7 +97,7 @@ def curve_over(values, force, std, own, beside, known) -> Curve:
     total = np.bincount(bins, weight, count)
     at = np.bincount(bins, weight * values[use], count) / total
     mean = np.bincount(bins, weight * partial, count) / total
-    error = np.sqrt(together / total)
+    error = np.sqrt(correlation_length / total)
     share, p_value = float(np.clip(share, 0.0, 1.0)), float(f_distribution.sf(ratio, more, free[1]))
     return Curve(at, mean, error, np.array([values[use], partial]), share, p_value)
 
@@ -107,8 +107,8 @@ def _weighed(columns, root) -> np.ndarray:
     return columns[:, scale > 0] / scale[scale > 0] * root[:, None]
 
 
-def _together(d) -> float:
+def _correlation_length(d) -> float:
     """Return over how many samples a force is much the same: they count as one."""
-    alike = autocorrelation(d, max(len(d) // 4 - 1, 0))
-    until = np.argmax(alike < UNLIKE) if np.any(alike < UNLIKE) else len(alike)
-    return 1.0 + 2.0 * float(np.sum(alike[1:until]))
+    rho = autocorrelation(d, max(len(d) // 4 - 1, 0))
+    first = np.argmax(rho < UNLIKE) if np.any(rho < UNLIKE) else len(rho)
+    return 1.0 + 2.0 * float(np.sum(rho[1:first]))

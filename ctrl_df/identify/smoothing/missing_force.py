@@ -24,7 +24,7 @@ from ..residuals.motion_phases import reversals
 from ..residuals.regions import Region, Regions, chance
 from ..shooting.variables import default_free
 from ..thresholds import BY_CHANCE, DEPENDENT, LEVEL, NOTHING, SLOWLY
-from .curves import Curve, curve_over, known_to_make
+from .curves import Curve, curve_over, explained_shares
 from .smoother import smooth_record
 from .thresholds import FORCE_KNOWN, MADE_LEAST, PARAMETER_NUDGE
 
@@ -127,7 +127,7 @@ class MissingForce:
     @cached_property
     def made(self) -> tuple[float, float]:
         """Share of its square that other values of the model's own parameters make; that a constant adds."""
-        return known_to_make(self.force, self.std, self.own, self.known)
+        return explained_shares(self.force, self.std, self.own, self.known)
 
     @property
     def _left(self) -> bool:

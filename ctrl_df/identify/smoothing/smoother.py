@@ -80,16 +80,16 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
     scale = np.median(std, axis=0)
     scale[-1] = known.force
     mean, cov = mean / scale, np.array([np.diag((row / scale) ** 2) for row in std])
-    leak = _leak(steps, known, scale)
+    process_noise = _process_noise(steps, known, scale)
     first = cov[0]
     force, time = SMOOTHER_BEGIN
-    begin = _Found(mean, cov, np.log([force, time * known.swing, known.noise]))
-    about = (steps, scale, leak, first, known)
+    initial = _Estimate(mean, cov, np.log([force, time * known.swing, known.noise]))
+    about = (steps, scale, process_noise, first, known)
     # a law of friction changes at once, one of a place smoothly: the record tells which it is
-    rough = _rounds(begin, False, *about)
-    smooth = _rounds(rough, True, *about)
-    found = max((rough, smooth), key=lambda f: f.evidence)
-    mean, cov, sizes, evidence = found.mean, found.cov, found.sizes, found.evidence
+    rough = _iterated(initial, False, *about)
+    smooth = _iterated(rough, True, *about)
+    best = max((rough, smooth), key=lambda f: f.evidence)
+    mean, cov, sizes, evidence = best.mean, best.cov, best.sizes, best.evidence
     return Smoothed(
         _middles(steps.times), _middles(mean[:, :-1] * scale[:-1]), mean[:-1, -1] * scale[-1],
         np.sqrt(cov[:-1, -1, -1]) * scale[-1], steps.own(mean * scale), math.exp(sizes[0]) * scale[-1],
@@ -98,7 +98,7 @@ def smooth_record(block: Mechanism, record: Measurement) -> Smoothed:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Estimate:
     """Means and covariances of states and force, the sizes they go with, and their evidence."""
 
     mean: np.ndarray
@@ -107,28 +107,30 @@ class _Found:
     evidence: float = -math.inf
 
 
-def _rounds(begun: _Found, smooth: bool, steps: Steps, scale, leak, first, known) -> _Found:
+def _iterated(
+    initial: _Estimate, smooth: bool, steps: Steps, scale, process_noise, first, known
+) -> _Estimate:
     """Linearize and smooth in turn, until the force stays."""
-    mean, cov, sizes, evidence = begun.mean, begun.cov, begun.sizes, begun.evidence
-    for turn in range(SMOOTHER_ROUNDS):
+    mean, cov, sizes, evidence = initial.mean, initial.cov, initial.sizes, initial.evidence
+    for iteration in range(SMOOTHER_ROUNDS):
         lin = _scaled(steps.linearized(mean * scale, cov * np.outer(scale, scale)), scale)
-        model = _Model(lin, steps, leak, mean[0], first, known, smooth)
-        if turn < SMOOTHER_ESTIMATED:
-            sizes = model.likeliest(sizes, SMOOTHER_DAMPED[min(turn // 2, 1)])
-        new, cov, _ = model.smoothed(sizes)
+        model = _Model(lin, steps, process_noise, mean[0], first, known, smooth)
+        if iteration < SMOOTHER_ESTIMATED:
+            sizes = model.most_probable(sizes, SMOOTHER_DAMPED[min(iteration // 2, 1)])
+        smoothed_mean, cov, _ = model.smoothed(sizes)
         evidence = model.evidence(sizes)
-        moved = np.max(np.abs(new - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
-        mean = new
-        if turn > 1 and moved < SMOOTHER_STILL:
+        change = np.max(np.abs(smoothed_mean - mean)[:, -1] / np.sqrt(cov[:, -1, -1]))
+        mean = smoothed_mean
+        if iteration > 1 and change < SMOOTHER_STILL:
             break
-    return _Found(mean, cov, sizes, evidence)
+    return _Estimate(mean, cov, sizes, evidence)
 
 
 def _middles(at_edges) -> np.ndarray:
     return 0.5 * (at_edges[1:] + at_edges[:-1])
 
 
-def _leak(steps: Steps, known, scale) -> np.ndarray:
+def _process_noise(steps: Steps, known, scale) -> np.ndarray:
     """Return variances that keep the covariances of the states regular, and change nothing else."""
     n = len(steps.free)
     place = known.noise if steps.simulator.sensed.columns[0] == POSITION else known.noise * known.swing
@@ -155,7 +157,7 @@ def _scaled(lin: Linearized, scale) -> Linearized:
 class _Model:
     """A linear Gaussian state-space model of a record: its smoother and its likelihood."""
 
-    def __init__(self, lin: Linearized, steps: Steps, leak, mean0, cov0, known, smooth):
+    def __init__(self, lin: Linearized, steps: Steps, process_noise, mean0, cov0, known, smooth):
         self.lin, self.known, self.smooth = lin, known, smooth
         self.mean0, self.cov0 = mean0, cov0
         self.dt = np.diff(steps.times)
@@ -166,18 +168,18 @@ class _Model:
         self.q = np.zeros((count, n, n))
         self.q[:, :-1, :-1] = lin.q
         inner = np.arange(n - 1)
-        self.q[:, inner, inner] += leak
+        self.q[:, inner, inner] += process_noise
         at = steps.edges[:-1, None] + np.arange(lin.e.shape[1] // len(steps.values))
-        self.has = np.hstack([at < steps.edges[1:, None]] * len(steps.values))
+        self.present = np.hstack([at < steps.edges[1:, None]] * len(steps.values))
         y = np.hstack([y[np.minimum(at, len(y) - 1)] for y in steps.values])
-        self.off = np.where(self.has, y - lin.e, 0.0)
-        self.c = np.where(self.has[:, :, None], lin.c, 0.0)
-        self.r = np.where(self.has, lin.r, 0.0)
+        self.off = np.where(self.present, y - lin.e, 0.0)
+        self.c = np.where(self.present[:, :, None], lin.c, 0.0)
+        self.r = np.where(self.present, lin.r, 0.0)
 
     def smoothed(self, sizes, back=True):
         """Return means, covariances and evidence with log size [force], log time [s], log noise."""
         size, memory, noise = np.exp(np.clip(sizes, -SMOOTHER_RANGE, SMOOTHER_RANGE))
-        weight = np.where(self.has, 1.0 / (noise**2 + self.r), 0.0)
+        weight = np.where(self.present, 1.0 / (noise**2 + self.r), 0.0)
         n = self.b.shape[1]
         info, info_vector = np.zeros((len(self.b) + 1, n, n)), np.zeros((len(self.b) + 1, n))
         weighted = self.c * weight[:, :, None]
@@ -200,10 +202,10 @@ class _Model:
         b = np.pad(self.b, ((0, 0), (0, len(mean0) - n)))
         mean, cov, evidence = smoothed(a, b, q, info, info_vector, mean0, cov0, back)
         mean, cov = mean[:, :n], cov[:, :n, :n]
-        evidence += 0.5 * float(np.sum(np.log(weight[self.has])) - np.sum(weight * self.off**2))
+        evidence += 0.5 * float(np.sum(np.log(weight[self.present])) - np.sum(weight * self.off**2))
         return mean, cov, evidence
 
-    def likeliest(self, sizes, width):
+    def most_probable(self, sizes, width):
         """Return the sizes of most evidence, sought about those given."""
         corners = np.vstack([sizes, sizes + width * np.eye(len(sizes))])
         apart, gained = SMOOTHER_SPREADS

@@ -53,7 +53,7 @@ class Linearized:
 
 
 @dataclass(frozen=True)
-class Begun:
+class StateErrors:
     """Standard deviations of position and velocity where steps begin, (N + 1,) each."""
 
     x_error: np.ndarray
@@ -64,7 +64,7 @@ class Begun:
 
 
 class Steps:
-    """A record cut into short steps, each begun from any state.
+    """A record cut into short steps, each from any state.
 
     The vector s holds the states of the block that are not known from the input alone (those of lags are),
     then the disturbance [N].
@@ -106,7 +106,7 @@ class Steps:
 
         A velocity is that of the instants at which a late sensor saw the place.
         """
-        t, held, late, found = self.record.t, self.simulator.sensed, self.late, []
+        t, held, late, outputs = self.record.t, self.simulator.sensed, self.late, []
         for column, y, weight in zip(held.columns, held.values, held.weights, strict=True):
             y = np.array(y, float)
             for primitive, later in self.part.output if column == POSITION else ():
@@ -114,8 +114,8 @@ class Steps:
                     y -= primitive.offset + primitive.rate * (t - later)
             if column != POSITION and late:
                 y = np.interp(t - late, t, y)
-            found.append(weight * y)
-        return found
+            outputs.append(weight * y)
+        return outputs
 
     @property
     def late(self) -> float:
@@ -140,19 +140,19 @@ class Steps:
         one = np.ones(len(states))
         slow = known.noise / math.sqrt(2 * known.half + 1)
         if self.simulator.sensed.columns[0] == POSITION:
-            begun = Begun(slow * one, slow / (known.half * known.dt) * one)
+            errors = StateErrors(slow * one, slow / (known.half * known.dt) * one)
         else:
-            begun = Begun(UNPLACED * known.position * one, slow * one)
+            errors = StateErrors(UNPLACED * known.position * one, slow * one)
         names = initial_states.names(self.core)
-        reach = initial_states.reach(names, self.core, known, begun)
+        reach = initial_states.reach(names, self.core, known, errors)
         square = np.zeros_like(states)
-        for name, far in zip(names, reach.T, strict=True):
-            found = []
+        for name, offset in zip(names, reach.T, strict=True):
+            changes = []
             for sign in (-1.0, 1.0):
                 moved = states.copy()
-                initial_states.fill(moved, self.core, {name: sign * far}, usual, known.speed)
-                found.append(np.abs(moved - states))
-            square += np.maximum(*found) ** 2
+                initial_states.fill(moved, self.core, {name: sign * offset}, usual, known.speed)
+                changes.append(np.abs(moved - states))
+            square += np.maximum(*changes) ** 2
         # states that no correction moves: those of laws that begin at rest
         square[:, np.max(square, axis=0) == 0] = known.force**2
         return np.sqrt(square)
@@ -216,7 +216,7 @@ class Steps:
         runs = len(step)
         x0 = np.zeros((runs, part.engine.nstates))
         x0[:, self.free] = s[:, :-1]
-        self._admit(x0)
+        self._constrain(x0)
         begin, end = self.edges[step], self.edges[step + 1]
         for state, samples in part.lags:
             x0[:, state] = samples[begin]
@@ -242,7 +242,7 @@ class Steps:
                 table[has, i] = weight * result.outputs[first[has] + i, column]
         return result.x[:, self.free], np.hstack(list(outputs))
 
-    def _admit(self, x):
+    def _constrain(self, x):
         """Move states outside a gap or a stop to their border."""
         core = self.core
         if core.joint == IMPACT:

@@ -11,11 +11,12 @@ from scipy.optimize import least_squares
 
 from ..prediction.values import with_values
 from ..shooting.scales import Scales
+from ..shooting.thresholds import NATURAL
 from ..shooting.variables import Variable
 from .errors import rms
 from .points import Points
 from .simulated import relative_error, simulate_table
-from .thresholds import FIT_BUDGET, FIT_STEPS, FIT_TOLERANCE, TABLE_JUMP, TABLE_NUDGE, TABLE_UNIT
+from .thresholds import FIT_BUDGET, FIT_TOLERANCE, TABLE_JUMP, TABLE_NUDGE
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ def fit_table(
     names,
     scales: Scales,
     *,
-    iterations=FIT_STEPS,
+    iterations: int,
     tolerance=FIT_TOLERANCE,
     budget=FIT_BUDGET,
     work=None,
@@ -90,7 +91,7 @@ def fit_table(
         Bounds on the work of one point, `WORK_LOW`, `WORK_MEDIUM` or `WORK_HIGH` (the default).
     """
     table = block.parameters
-    sizes = {k: TABLE_UNIT * scales.of(table[k].line_unit) for k in names}
+    sizes = {k: NATURAL * scales.of(table[k].line_unit) for k in names}
     job = _Job(block, points, [Variable(k, table[k], s, _side(block, k)) for k, s in sizes.items()], work)
     start = np.array([v.q(table[v.name].value) for v in job.variables])
     converged = len(start) == 0
@@ -165,7 +166,7 @@ def slopes_of(block, points: Points, names, scales: Scales, work=None) -> np.nda
     job = _Job(
         block,
         points,
-        [Variable(k, table[k], TABLE_UNIT * scales.of(table[k].line_unit)) for k in names],
+        [Variable(k, table[k], NATURAL * scales.of(table[k].line_unit)) for k in names],
         work,
     )
     z = np.array([v.q(table[v.name].value) for v in job.variables])

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...simulate.imposed import harmonics, imposed_forces, sine_path
 from ...simulate.imposed_response import imposable
+from ..prediction.thresholds import HIDDEN_RTOL
 from ..prediction.values import with_values
 from ..shooting.scales import Scales
 from ..thresholds import NEARLY_NOTHING
@@ -21,13 +22,12 @@ from .points import Points
 from .thresholds import (
     BALANCE_GAIN,
     BALANCE_LOWEST,
-    BALANCE_NUDGE,
     BALANCE_PERIODS,
     BALANCE_RANK,
     BALANCE_ROUNDS,
-    BALANCE_RTOL,
     BALANCE_SAMPLES,
     GROSS_BALANCE,
+    TABLE_NUDGE,
 )
 
 
@@ -65,7 +65,7 @@ class ForceBalance:
         """Return first harmonics of the forces over A, (blocks, points)."""
         cores = [b.core for b in blocks]
         z0 = np.zeros((len(blocks), cores[0].nstates - 2))
-        forces = [imposed_forces(cores, path, z0, rtol=BALANCE_RTOL)[0][:, self._last] for path in self.paths]
+        forces = [imposed_forces(cores, path, z0, rtol=HIDDEN_RTOL)[0][:, self._last] for path in self.paths]
         return harmonics(np.stack(forces, axis=1), self._angle, 1)[..., 1] / self.amplitude
 
     def error(self, blocks: Sequence) -> np.ndarray:
@@ -92,7 +92,7 @@ class ForceBalance:
         table, moved, steps = block.parameters, [], []
         for name in names:
             p = table[name]
-            step = BALANCE_NUDGE * (abs(p.value) or scales.of(p.line_unit))
+            step = TABLE_NUDGE * (abs(p.value) or scales.of(p.line_unit))
             if p.value + step > p.upper:
                 step = -step
             moved.append(with_values(block, {name: p.value + step}))

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...numerals import percent
-from ..course import Course
 from ..estimation.common_friction import inertia
+from ..monitor import Monitor
 from ..results.explain import places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
+from ..selection.thresholds import LEFT
 from ..starting.extend import applicable
 from ..thresholds import DISTINGUISHED
 from .candidate import fit_either, try_effect
@@ -40,7 +41,6 @@ from .thresholds import (
     TABLE_ITERATIONS,
     TABLE_STEPS,
     TOP_FREQUENCIES,
-    UNEXPLAINED,
     WORK_MEDIUM,
 )
 from .uncertainty import uncertainty
@@ -143,11 +143,11 @@ class TableSearch(Search):
 
     # --- every effect ---------------------------------------------------------------------------------
 
-    def candidates(self, classes, executor=None, course=None):
+    def candidates(self, classes, executor=None, monitor=None):
         """Return every effect that can be added, fitted roughly to some points, the best first."""
         if not classes:
             return self, []
-        course = course or Course()
+        monitor = monitor or Monitor()
         size = np.abs(self.inside.weight * self.base.error[self.train])
         few, fewer = self.inside.selected(POINTS, size), self.inside.selected(POINTS_COSTLY, size)
         block, slopes = self.base.block, {}
@@ -160,18 +160,18 @@ class TableSearch(Search):
                 jobs.append((c, block, some, self.free, self.scales, slopes[len(some)]))
         run = map if executor is None else executor.map
         found = []
-        course.stage(f"{len(jobs)} effects screened on some of the points")
+        monitor.stage(f"{len(jobs)} effects screened on some of the points")
         for r in run(try_effect, jobs):
-            course.done()
+            monitor.done()
             if r is not None:
                 found.append(self._trial(*r, work=WORK_MEDIUM))
-                course.known((self, self.ranked(self.base, found)))
+                monitor.known((self, self.ranked(self.base, found)))
         ranked = self.ranked(self.base, found)
         return self.after(screened=ranked), ranked
 
-    def confirm(self, found, course=None):
+    def confirm(self, found, monitor=None):
         """Fit the best to all points, and the baseline from what they say of it: it may have been stuck."""
-        (course or Course()).stage("the best fitted to all points")
+        (monitor or Monitor()).stage("the best fitted to all points")
         base = self.base
         best = [self._confirmed(t) for t in found[:CONFIRMED_ON_TABLE] if t.evidence > GIVE_UP_ON_TABLE]
         for tried in best[:2]:
@@ -267,9 +267,7 @@ class TableSearch(Search):
         noise, structure = self._split(best)
         there = self._split(self.base)[1]
         shown = best if significant else self.base
-        unexplained = (
-            structure > 2.0 * noise and structure > UNEXPLAINED * there and not self._scattered(shown)
-        )
+        unexplained = structure > 2.0 * noise and structure > LEFT * there and not self._scattered(shown)
         return Remainder(noise, structure, unexplained)
 
     def _split(self, t) -> tuple[float, float]:

@@ -32,10 +32,8 @@ from .thresholds import (
     GIVE_UP_START,
     START_COMMON,
     START_SAME,
-    STARTS_KEPT,
     TABLE_SIZES,
     UNKNOWN_SIZES,
-    WORK_MEDIUM,
 )
 
 
@@ -157,8 +155,8 @@ def best_starts(
     slopes,
     free: Sequence[str],
     scales: Scales,
-    keep: int = STARTS_KEPT,
-    work=WORK_MEDIUM,
+    keep: int,
+    work,
 ) -> tuple[list, bool]:
     """Return the blocks grown by the most promising starts, best first, and whether any promises anything.
 

@@ -17,7 +17,6 @@ from .symmetry import shift_directions, transverse
 from .thresholds import (
     ACCEPTED,
     CLOSED,
-    COURSE_RTOL,
     FREE_POINTS,
     MOST_ROUNDS,
     NEWTON_LONGEST,
@@ -31,6 +30,7 @@ from .thresholds import (
     STALLS,
     STEPS_A_PERIOD,
     STILL,
+    TRAJECTORY_RTOL,
 )
 
 
@@ -146,7 +146,7 @@ class Closing:
         if not traced.status.ok or not traced.segments:
             raise NoClosure(_not_traced(traced))
         times = np.linspace(0, period, FREE_POINTS)[1:]
-        run = self.engine.run(self.engine.start(x0), period, times=times, rtol=COURSE_RTOL, log=1)
+        run = self.engine.run(self.engine.start(x0), period, times=times, rtol=TRAJECTORY_RTOL, log=1)
         largest = np.max(np.abs([s.start.x for s in traced.segments] + [traced.end.x]), axis=0)
         largest = np.maximum(largest, np.nanmax(np.abs(run.states), axis=0))
         if stay:

@@ -21,6 +21,7 @@ from ...simulate.program import layout
 from ...status import Status
 from ..thresholds import NOTHING
 from .thresholds import (
+    COUPLED,
     EVENT_NUDGE,
     FLOW_NUDGE,
     PERIOD_EVENTS,
@@ -28,7 +29,6 @@ from .thresholds import (
     PERIOD_RTOL,
     PERIOD_STEPS,
     SLOPE_NUDGE,
-    TOLD,
 )
 
 
@@ -137,8 +137,8 @@ class Tracer:
             x = state.x.copy()
             x[j] += SLOPE_NUDGE * size[j]
             slope[:, j] = np.abs(self.rate(state.time, x, state.mode) - here) / SLOPE_NUDGE
-        told = TOLD * length * np.where(np.isfinite(slope), slope, 0.0).sum(axis=1)
-        size = np.maximum(size, np.maximum(told, TOLD * length * np.abs(here)))
+        coupled = COUPLED * length * np.where(np.isfinite(slope), slope, 0.0).sum(axis=1)
+        size = np.maximum(size, np.maximum(coupled, COUPLED * length * np.abs(here)))
         size[size == 0.0] = 1.0  # a state that is zero throughout may be measured by anything
         return size
 

@@ -1,4 +1,4 @@
-"""An exact limit cycle as a value, and the answer where none was found."""
+"""An exact limit cycle as a value, and the result where none was found."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class Try(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class NoOrbit:
-    """The answer of a search that found no periodic orbit; false where a truth value is asked.
+    """The result of a search that found no periodic orbit; false as a truth value.
 
     Attributes
     ----------
@@ -124,8 +124,8 @@ class NoOrbit:
 
     Examples
     --------
-    >>> answer = cdf.find_limit_cycle(cdf.closed_loop(cdf.pid(2000, 0, 130), cdf.friction_mass(9, 5)))
-    >>> bool(answer), {outcome for start, outcome in answer.tried}
+    >>> result = cdf.find_limit_cycle(cdf.closed_loop(cdf.pid(2000, 0, 130), cdf.friction_mass(9, 5)))
+    >>> bool(result), {outcome for start, outcome in result.tried}
     (False, {'comes to rest'})
     """
 

@@ -18,12 +18,11 @@ from ..thresholds import NOTHING
 from .starts import Starts
 from .thresholds import (
     BEYOND,
-    COURSE_RTOL,
+    CROSSINGS_LEAST,
     DEAD,
+    DIVERGED_SIZE,
     EVEN,
     FAINT,
-    FEW,
-    GONE,
     INTERVAL_SAMPLES,
     LONGEST_INTERVAL,
     LOOK,
@@ -44,6 +43,7 @@ from .thresholds import (
     SUSTAINED_DECAY,
     SUSTAINED_GROWTH,
     TENFOLD,
+    TRAJECTORY_RTOL,
     WITHIN,
     WORK,
 )
@@ -60,7 +60,7 @@ class Crossing(NamedTuple):
 
 
 @dataclass
-class Course:
+class Trajectory:
     """What became of one start.
 
     Attributes
@@ -80,8 +80,8 @@ class Course:
     end: np.ndarray
 
 
-class _Followed(NamedTuple):
-    """A piece of a course: its end, its work, how it ended, the crossings in it."""
+class _Interval(NamedTuple):
+    """Up to the next crossing, or some samples: the end, the steps, how it ended, the crossings in it."""
 
     time: float
     x: np.ndarray
@@ -117,7 +117,7 @@ class PoincareSearch:
         ints = engine.program.ints
         self._signal = int(ints[ints[ints[H_OUT] + self.row] + 1])
         self.starts = Starts(loop, engine)
-        self.longest = LONGEST_INTERVAL * np.pi / self.starts.pace  # ten periods at the loop's own frequency
+        self.longest = LONGEST_INTERVAL * np.pi / self.starts.omega  # ten periods at the loop's own frequency
 
     @property
     def units(self) -> np.ndarray:
@@ -155,7 +155,7 @@ class PoincareSearch:
         longest: float | None = None,
         until_repeated: bool = True,
         decided: Callable[[list[Crossing]], str] | None = None,
-    ) -> Course:
+    ) -> Trajectory:
         """Crossings from a start on, until they repeat, the loop rests, or the bound on work is hit.
 
         Parameters
@@ -173,14 +173,14 @@ class PoincareSearch:
 
         Returns
         -------
-        Course
+        Trajectory
             Without crossings if all work is spent within a few periods.
         """
         state = start if isinstance(start, State) else self.start(start)
         crossings: list[Crossing] = []
         quiet, work, largest, highest = 0, 0, self.size(state.x), 0.0
         limit = np.inf if longest is None else longest
-        bound = GONE * max(1.0, largest)
+        bound = DIVERGED_SIZE * max(1.0, largest)
         intervals = self._by_samples(state, limit) if self.held else self._by_crossing(state, limit)
         fate, stopped, time, end = "", False, state.time, state.x
         while len(crossings) < count and time < limit and quiet <= PATIENCE and work <= WORK:
@@ -189,7 +189,7 @@ class PoincareSearch:
                 break
             time, end, work = run.time, run.x, work + run.steps
             if run.status is Status.DIVERGED or not self.size(end) < bound:
-                return Course(crossings, DIVERGES, np.inf, end)
+                return Trajectory(crossings, DIVERGES, np.inf, end)
             if not run.status.ok:
                 stopped = True  # by its bound on work, or a motion that no step resolves: no fate
                 break
@@ -206,7 +206,7 @@ class PoincareSearch:
                 fate = RESTS
                 break
             if found and crossings[-1].peak > BEYOND and _explodes(crossings):
-                return Course(crossings, DIVERGES, np.inf, end)
+                return Trajectory(crossings, DIVERGES, np.inf, end)
             if found and (_creeps(crossings) or self._fades(crossings)):
                 fate = RESTS
                 break
@@ -214,15 +214,15 @@ class PoincareSearch:
                 fate = decided(crossings)
                 if fate:
                     break
-            if until_repeated and len(crossings) > FEW and self.repeats(crossings):
+            if until_repeated and len(crossings) > CROSSINGS_LEAST and self.repeats(crossings):
                 fate = CYCLES if crossings[-1].peak > FAINT * max(c.peak for c in crossings) else RESTS
                 break
         growth = _growth(crossings)
         if not fate:
             fate = RESTS if quiet > QUIET else UNDECIDED if stopped else _tendency(crossings)
-        if (stopped or work > WORK) and len(crossings) < FEW:
+        if (stopped or work > WORK) and len(crossings) < CROSSINGS_LEAST:
             crossings = []  # it creeps or chatters, thousands of steps a crossing: no orbit to refine
-        return Course(crossings, fate, growth, end)
+        return Trajectory(crossings, fate, growth, end)
 
     def start(self, x0) -> State:
         """Return a fresh state; what the engine does not move (lags that stand for delays elsewhere) is 0."""
@@ -252,9 +252,9 @@ class PoincareSearch:
 
     def _by_crossing(self, state, limit):
         # ahead in bounded intervals: a loop at rest never crosses again
-        for s in intervals(self.engine, state, self._signal, self.row, self.longest, limit, COURSE_RTOL):
+        for s in intervals(self.engine, state, self._signal, self.row, self.longest, limit, TRAJECTORY_RTOL):
             found = [Crossing(s.time, s.x, s.peak / self._unit)] if s.crossed else []
-            yield _Followed(s.time, s.x, s.steps, s.status, found)
+            yield _Interval(s.time, s.x, s.steps, s.status, found)
 
     def _by_samples(self, state, limit):
         """Crossings between the samples of a held signal, looked at between the ticks."""
@@ -265,7 +265,7 @@ class PoincareSearch:
             times = np.maximum((first + 0.5 + np.arange(INTERVAL_SAMPLES)) * dt, state.time)
             times = times[times <= max(limit, times[1])]
             run = self.engine.run(
-                state, times[-1], times=times, rtol=COURSE_RTOL, log=1, max_steps=SAMPLED_WORK
+                state, times[-1], times=times, rtol=TRAJECTORY_RTOL, log=1, max_steps=SAMPLED_WORK
             )
             y = run.outputs[:, self.row]
             ups = upward_crossings(y)
@@ -277,7 +277,7 @@ class PoincareSearch:
                     Crossing(float(t), np.array(x), float(np.max(between, initial=0.0)) / self._unit)
                 )
             state = run.state
-            yield _Followed(state.time, state.x, run.steps, run.status, found)
+            yield _Interval(state.time, state.x, run.steps, run.status, found)
 
 
 def upward_crossings(y) -> np.ndarray:
@@ -316,7 +316,7 @@ def _endless(values, factor: float) -> int:
 
 def _explodes(crossings) -> bool:
     """Whether the oscillation grows at a steady ratio and without bound."""
-    return _endless([c.peak for c in crossings[-RECENT:]], GONE) > 0
+    return _endless([c.peak for c in crossings[-RECENT:]], DIVERGED_SIZE) > 0
 
 
 def _creeps(crossings) -> bool:

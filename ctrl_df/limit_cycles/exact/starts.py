@@ -20,7 +20,7 @@ from .thresholds import (
     JUMPED,
     POLE_AT_ZERO,
     REAL_ROOT,
-    SAMPLED_PACE,
+    SAMPLED_OMEGA,
     SAMPLED_POINTS,
     SAMPLED_SLOWEST,
 )
@@ -40,7 +40,7 @@ class Starts:
         What a size is measured in: ``m`` of displacement, ``at the block's input``, or ``of every state``.
     scale : float
         The size at which the block's nonlinearity matters.
-    pace : float
+    omega : float
         A frequency at which the loop moves [rad/s].
     straight : float
         Input of an element or a law up to which it is a straight line (a law within a hundredth); 0 where
@@ -54,14 +54,14 @@ class Starts:
         self.core: Any = getattr(self.block, "core", None)
         self.straight = 0.0
         if self.core is not None:
-            self.pace = corner_frequency(self.parts)
+            self.omega = corner_frequency(self.parts)
             self.scale, self.unit = self._length_scale(), self.block.coordinates.unit
         elif self.parts is not None:
-            self.pace = _pole_frequency(self._controller())
+            self.omega = _pole_frequency(self._controller())
             self.scale, self.straight = self._corner()
             self.unit = "at the block's input"
         else:
-            self.pace, self.scale, self.unit = 1.0, 1.0, "of every state"
+            self.omega, self.scale, self.unit = 1.0, 1.0, "of every state"
 
     def all(self, factors=FACTORS) -> list[tuple[float, np.ndarray]]:
         """(size, state) of every start, in the order in which they are tried; `factors` are of the scale."""
@@ -72,7 +72,7 @@ class Starts:
         if self.core is not None:
             return self._displaced(size)
         if self.parts is not None:
-            return self._swung(size)
+            return self._oscillating(size)
         return size * np.ones(self.engine.nstates)
 
     def _displaced(self, size):
@@ -83,27 +83,27 @@ class Starts:
             x[offset + 2] = size + 0.5 * core.gap
         if self.parts.block.output_labels.index(self.loop.output_labels[0]) % 2:
             # nothing drives a loop closed on the velocity back to a place
-            x[offset + 1 : offset + 2 * core.bodies : 2] = size * self.pace
+            x[offset + 1 : offset + 2 * core.bodies : 2] = size * self.omega
         if core.stop is not None:
             low, high = core.stop.span
             places = slice(offset, offset + 2 * core.bodies, 2)
             x[places] = np.clip(x[places], INSIDE_STOPS * low, INSIDE_STOPS * high)
         return x
 
-    def _swung(self, size):
+    def _oscillating(self, size):
         """States of the linear part as a harmonic output of the block leaves them, its input that large."""
         x = np.zeros(self.engine.nstates)
-        states, output = self._answer()
+        states, output = self._harmonic_response()
         if not isinstance(self.block, Element):
             x[self.loop.syslist[0].nstates or 0 :] = size  # nothing is known of the states of a user's system
         if output != 0:
             x[: len(states)] = np.real(size * states / output)
         return x
 
-    def _answer(self) -> tuple[np.ndarray, complex]:
-        """States and output of the linear part under a harmonic input of size one at the loop's pace."""
+    def _harmonic_response(self) -> tuple[np.ndarray, complex]:
+        """States and output of the linear part under a harmonic input of size one at the loop's frequency."""
         a, b, c, dt = self._controller()
-        z = np.exp(1j * self.pace * dt) if dt else 1j * self.pace
+        z = np.exp(1j * self.omega * dt) if dt else 1j * self.omega
         states = np.linalg.solve(z * np.eye(len(a)) - a, b[:, :1]).ravel()
         return states, complex((c[:1] @ states)[0])
 
@@ -140,8 +140,8 @@ class Starts:
         return bend or 1.0, bend or 0.0
 
     def _gain(self) -> float:
-        """Gain of the linear part at the loop's pace."""
-        return abs(self._answer()[1])
+        """Gain of the linear part at the loop's frequency."""
+        return abs(self._harmonic_response()[1])
 
     def _law(self, u) -> float:
         return float(
@@ -151,7 +151,7 @@ class Starts:
     def _length_scale(self) -> float:
         """Displacement at which the block's nonlinearity matters [m]."""
         core = self.core
-        stiffness = sum(core.masses) * self.pace**2
+        stiffness = sum(core.masses) * self.omega**2
         scales = [core.gap, sum(level(chain, 0.0, 1.0, 0.0) for chain in core.friction) / stiffness]
         for element, _ in core.input_channel:
             scales += [abs(c) / stiffness for c in getattr(element, "corners", ())]
@@ -173,10 +173,10 @@ class Starts:
             dx = np.asarray(self.block.updfcn(0.0, x, np.zeros(1), self.block.params), float)
             return mass * dx[2 * self.core.driven + 1]
 
-        stiffness = mass * self.pace**2
+        stiffness = mass * self.omega**2
         bends = [_bend(lambda x: stiffness * x + force(x, 0.0))]
-        slow = _bend(lambda v: stiffness / self.pace * v + force(0.0, v))
-        bends.append(None if slow is None else slow / self.pace)
+        slow = _bend(lambda v: stiffness / self.omega * v + force(0.0, v))
+        bends.append(None if slow is None else slow / self.omega)
         known = [b for b in bends if b]
         return min(known) if known else None
 
@@ -221,7 +221,7 @@ def _pole_frequency(controller) -> float:
         poles = np.log(poles[np.abs(poles) > ROUNDED]) / dt
     sizes = np.abs(poles)
     sizes = sizes[sizes > POLE_AT_ZERO * sizes.max(initial=0.0)]
-    return float(np.exp(np.mean(np.log(sizes)))) if sizes.size else (1.0 if not dt else SAMPLED_PACE / dt)
+    return float(np.exp(np.mean(np.log(sizes)))) if sizes.size else (1.0 if not dt else SAMPLED_OMEGA / dt)
 
 
 def corner_frequency(parts) -> float:
@@ -250,5 +250,5 @@ def corner_frequency(parts) -> float:
 def _power(p):
     """Coefficients of |p(jw)|^2 as a polynomial of w."""
     n = len(p) - 1
-    turned = p * (1j ** np.arange(n, -1, -1))
-    return np.real(np.polymul(turned, np.conj(turned)))
+    rotated = p * (1j ** np.arange(n, -1, -1))
+    return np.real(np.polymul(rotated, np.conj(rotated)))

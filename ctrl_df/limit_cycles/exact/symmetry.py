@@ -35,10 +35,10 @@ def shift_directions(tracer: Tracer, traced: PeriodTrace, size) -> np.ndarray:
     if not points:
         return np.zeros((tracer.n, 0))
 
-    def answer(point, x):
+    def rates_at(point, x):
         return np.concatenate(tracer.rate_and_margins(point.time, x, point.mode, traced.reach))
 
-    here = [answer(p, p.x) for p in points]
+    here = [rates_at(p, p.x) for p in points]
     scale = np.max([np.where(np.isfinite(a), np.abs(a), 0.0) for a in here], axis=0)
     # rates may all vanish where segments begin (a reversal): no smaller than the size over a period
     scale[: tracer.n] = np.maximum(scale[: tracer.n], size / sum(s.length for s in traced.segments))
@@ -49,12 +49,12 @@ def shift_directions(tracer: Tracer, traced: PeriodTrace, size) -> np.ndarray:
         for j in range(tracer.n):
             step = np.zeros(tracer.n)
             step[j] = SHIFT_NUDGE * size[j]
-            columns.append(_change(answer(p, p.x + step), answer(p, p.x - step)) / scale)
+            columns.append(_change(rates_at(p, p.x + step), rates_at(p, p.x - step)) / scale)
         slopes.append(np.array(columns).T / (2 * SHIFT_NUDGE))
     _, values, rows = np.linalg.svd(np.vstack(slopes), full_matrices=True)
     values = np.append(values, np.zeros(tracer.n - len(values)))
     candidates = rows[values <= NULL * max(values[0], NOTHING)]
-    kept = [d for d in candidates if _unnoticed(answer, points, here, scale, 0.5 * d * size)]
+    kept = [d for d in candidates if _invariant(rates_at, points, here, scale, 0.5 * d * size)]
     return np.array(kept).T if kept else np.zeros((tracer.n, 0))
 
 
@@ -81,9 +81,9 @@ def _change(a, b) -> np.ndarray:
         return np.where(np.isfinite(a) & np.isfinite(b), a - b, 0.0)
 
 
-def _unnoticed(answer, points, here, scale, shift) -> bool:
+def _invariant(rates_at, points, here, scale, shift) -> bool:
     for p, before in zip(points, here, strict=True):
         for moved in (p.x + shift, p.x - shift):
-            if np.max(np.abs(_change(answer(p, moved), before)) / scale) > SHIFT_SAME:
+            if np.max(np.abs(_change(rates_at(p, moved), before)) / scale) > SHIFT_SAME:
                 return False
     return True

@@ -21,8 +21,9 @@ CLOSED, ACCEPTED = 3e-10, 1e-7
 """Mismatch after a period, relative to the size of each state: what runs at `PERIOD_RTOL` allow, and where
 events limit what can be reached."""
 
-PERIOD_RTOL, COURSE_RTOL, LOOK_RTOL = 1e-11, 1e-8, 1e-6
-"""Tolerance of periods that are differentiated; of courses that are followed; of a first look at sizes."""
+PERIOD_RTOL, TRAJECTORY_RTOL, LOOK_RTOL = 1e-11, 1e-8, 1e-6
+"""Tolerance of periods that are differentiated; of trajectories that are followed; of a first look at
+sizes."""
 
 NEWTON_LONGEST, PERIOD_CHANGE = 0.3, 4.0
 """Longest step, in sizes of the orbit; change of the period on the way, as a factor."""
@@ -60,7 +61,7 @@ PERIOD_EVENTS, PERIOD_STEPS = 5000, 200_000
 PERIOD_REACH = 1e-6
 """Of a period: the time over which rates of inputs are taken."""
 
-TOLD = 1e-7
+COUPLED = 1e-7
 """Of what the other states move a state by in a period: a size below that is rounding."""
 
 SLOPE_NUDGE, FLOW_NUDGE, EVENT_NUDGE = 1e-4, 1e-5, 1e-6
@@ -119,20 +120,20 @@ POLE_AT_ZERO, REAL_ROOT = 1e-9, 1e-6
 """Pole frequency, over the largest, of an integrator; imaginary part of a real root: the root of eps,
 thrice."""
 
-SAMPLED_SLOWEST, SAMPLED_POINTS, SAMPLED_PACE = 1e-6, 600, 0.1
-"""Of a sampled controller: frequencies looked at, over the Nyquist frequency, and how many; the pace of one
-without poles, over a sample."""
+SAMPLED_SLOWEST, SAMPLED_POINTS, SAMPLED_OMEGA = 1e-6, 600, 0.1
+"""Of a sampled controller: frequencies looked at, over the Nyquist frequency, and how many; the frequency of
+one without poles, over a sample."""
 
-# --- courses ----------------------------------------------------------------------------------------
+# --- trajectories ----------------------------------------------------------------------------------------
 
 WORK, SAMPLED_WORK, LOOK_WORK = 300_000, 400_000, 50_000
-"""Integration steps of one course, of one interval between samples, of a first look."""
+"""Integration steps of one trajectory, of one interval between samples, of a first look."""
 
-FEW = 12
+CROSSINGS_LEAST = 12
 """Crossings within that work, below which it is no use."""
 
 CROSSINGS, CROSSINGS_AVERAGED, CROSSINGS_VERIFIED = 1000, 40, 200
-"""Of one course; that an average takes; of the simulation beside a verified orbit."""
+"""Of one trajectory; that an average takes; of the simulation beside a verified orbit."""
 
 LONGEST_INTERVAL, LOOK, LOOK_POINTS = 20, 0.1, 129
 """Half periods, at the loop's own frequency, of the longest interval without a crossing; share of it that
@@ -173,27 +174,27 @@ RECENT, RECENT_CLOSED = 64, 12
 BEYOND = 10.0
 """Times the largest start's first peak: growth at a steady ratio from there has no bound."""
 
-GONE = 1e4
+DIVERGED_SIZE = 1e4
 """Times what the largest start sets in motion: a loop beyond it has run away."""
 
 STEADY, SUSTAINED_GROWTH, SUSTAINED_DECAY = 1.25, 0.5, 0.9
-"""Change of the peaks from the third to the last quarter of a course below which they keep their size, and
-the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
+"""Change of the peaks from the third to the last quarter of a trajectory below which they keep their size,
+and the share of it (logarithmic) of the quarter before: a decay is geometric, growth may be a power (0.66 if
 quadratic)."""
 
-HALVINGS, ASKED, WIDTH = 40, (6, 12, 18, 26, 40), 1e-3
+HALVINGS, CLOSED_AFTER, WIDTH = 40, (6, 12, 18, 26, 40), 1e-3
 """Of the interval between two starts of different fate; halvings after which the motion on the border is
 tried for an orbit; relative width of a border whose orbit is known."""
 
 LINGERING = 6
-"""Crossings, up to the one after the slowest, from which the orbit that a course lingers near is closed. Half
-and twice as many change nothing in seven loops verified."""
+"""Crossings, up to the one after the slowest, from which the orbit that a trajectory lingers near is closed.
+Half and twice as many change nothing in seven loops verified."""
 
-LINGERS, WOUND = 0.3, 1e-9
-"""Change from crossing to crossing of a course that lingers; factor of growth that is at least more than
+LINGERS, WIND_UP_LEAST = 0.3, 1e-9
+"""Change from crossing to crossing of a trajectory that lingers; factor of growth that is at least more than
 one."""
 
-THERE, BESIDE, ON, APPROACHING = 1e-3, 0.03, 1e-5, 3
+REACHED, BESIDE, ON, APPROACHING = 1e-3, 0.03, 1e-5, 3
 """Of an orbit's size: a crossing so near a stable one, and coming nearer, ends on it; the same for one that
 lingers beside an unstable one; relative difference of the time between crossings from the period within which
 it is that near; crossings in a row that come nearer."""

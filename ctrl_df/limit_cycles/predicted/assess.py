@@ -9,7 +9,6 @@ import numpy as np
 
 from ...df.family import Family
 from ..thresholds import ROUNDED
-from .answer import jumps, responder
 from .bound import mees_bergen
 from .branches import BranchCrossing
 from .crossings import Crossing, Scan, linear_zeros
@@ -28,6 +27,7 @@ from .thresholds import (
     SPREADS,
     VAGUE,
 )
+from .waveform_response import jumps, response_of
 
 
 class Assessor:
@@ -38,7 +38,7 @@ class Assessor:
         self.log_a, self.log_w = grid
         self.family = family
         self.orders = orders
-        self.answer = responder(F, method)
+        self.response = response_of(F, method)
         self.branched: tuple[BranchCrossing, ...] = tuple(branched)
         named = [b.crossing for b in self.branched if b.named]
         self.named = [*self.scan.crossings, *named]  # on the motion that the describing function names
@@ -125,7 +125,7 @@ class Assessor:
                 (1, f"H is not measured at {beyond} and above: its last value stood in for the harmonics")
             )
         sense = sensitivity(crossing.jacobian)
-        # only the motion that the method names can be asked how it answers returned harmonics
+        # only the motion that the method names can be asked for its response to returned harmonics
         spread, path, remark = self._spread(crossing, distortion, sense, regime, motion is None)
         spread = tuple(one + s * self._late(a, w) for one, s in zip(spread, sense, strict=True))
         notes += remark
@@ -183,9 +183,9 @@ class Assessor:
         c1, c2 = DYNAMIC_ERROR if self.method.dynamic else MEMORYLESS_ERROR
         estimate = c1 * distortion + c2 * distortion**2  # relative error of N
         spread = tuple(s * estimate + FLOOR for s in sense)
-        if self.answer is None or not named or regime.startswith(("aperiodic", "subharmonic")):
+        if self.response is None or not named or regime.startswith(("aperiodic", "subharmonic")):
             return spread, None, []
-        steady_state, count = self.answer
+        steady_state, count = self.response
         path = follow_path(steady_state, count, self.linear, a, w)
         if path.end is End.MERGED:
             other = "{:.4g} @ {:.4g} rad/s".format(*path.solution)

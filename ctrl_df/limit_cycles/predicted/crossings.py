@@ -67,7 +67,7 @@ def find_crossings(D: Callable, log_a, log_w, values, refine=True) -> Scan:
     Parameters
     ----------
     D : callable
-        ``D(ln a, ln omega)`` for two equally long 1-D arrays; NaN where there is no periodic answer.
+        ``D(ln a, ln omega)`` for two equally long 1-D arrays; NaN where there is no periodic response.
     log_a, log_w : ndarray, shapes (na,), (nw,)
         Grid, ascending.
     values : ndarray, shape (na, nw)
@@ -172,7 +172,7 @@ def _least(size, most):
 
 
 def _may_hold_zero(values):
-    """Cells whose corners leave room for a zero; corners without an answer widen the room."""
+    """Cells whose corners leave room for a zero; corners without a response widen the room."""
     rows = max(1, CELLS_AT_ONCE // values.shape[1])
     blocks = (values[i : i + rows + 1] for i in range(0, values.shape[0] - 1, rows))
     return np.concatenate([_block_may_hold_zero(block) for block in blocks])

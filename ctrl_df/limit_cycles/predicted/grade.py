@@ -66,7 +66,7 @@ class LimitCycle:
     regime : str
         What the block does there.
     path : Path or None
-        The way from this solution to the cycle with all its harmonics, where the block's answer to them is
+        The way from this solution to the cycle with all its harmonics, where the block's response to them is
         known.
     corrected : tuple of float or None
         (amplitude, omega) with the fed-back harmonics taken into account, where that path leads so far.

@@ -49,7 +49,7 @@ class End(Enum):
     REACHED = "all harmonics are fed back"
     MERGED = "the prediction merges with another one before all harmonics are fed back"
     LEFT = "with its harmonics the cycle moves out of reach"
-    UNANSWERED = "the block has no periodic answer to the waveform"
+    UNANSWERED = "the block has no periodic response to the waveform"
     STOPPED = "the curve could not be followed"
 
 
@@ -66,7 +66,7 @@ class Path:
         At the end [rad/s].
     waveform : ndarray of complex
         Fourier coefficients k = 0, 1, ... of the block's input at the end, phase of the fundamental 0.
-    answer : ndarray of complex
+    response : ndarray of complex
         Those of the block's output.
     folds : int
         Times the curve turned back.
@@ -78,7 +78,7 @@ class Path:
     share: float
     omega: float
     waveform: np.ndarray
-    answer: np.ndarray
+    response: np.ndarray
     folds: int = 0
     motion: ForcedState | None = None
 
@@ -94,7 +94,7 @@ def follow_path(steady_state: Callable, harmonics: int, linear, amplitude, omega
     Parameters
     ----------
     steady_state : callable
-        As `ctrl_df.limit_cycles.predicted.answer.responder` returns it.
+        As `ctrl_df.limit_cycles.predicted.waveform_response.response_of` returns it.
     harmonics : int
         Highest harmonic kept.
     linear : LinearPart
@@ -133,7 +133,7 @@ class _Curve:
         self.static_gain = 0.0 if np.isnan(gain) else gain
 
     def _begin(self, amplitude, omega):
-        """Return the harmonics kept, odd ones where the block answers these oddly, and the first motion."""
+        """Return the harmonics kept, odd ones where the response to these is odd, and the first motion."""
         U = np.zeros(self.harmonics + 1, complex)
         U[1] = amplitude
         H = self.linear.clamped(np.array([omega]))[0][0]
@@ -159,9 +159,9 @@ class _Curve:
         return U, a, float(np.exp(z[1]))
 
     def defect(self, z, motion):
-        """Return what is missing to the balance of each harmonic, the block's answer, and its motion.
+        """Return what is missing to the balance of each harmonic, the block's response, and its motion.
 
-        It is sought from a `motion` nearby. None twice, and that motion, where the block does not answer.
+        It is sought from a `motion` nearby. None twice, and that motion, where there is no periodic response.
         """
         U, a, omega = self.waveform(z)
         Y, motion = self.steady_state(U, omega, motion)
@@ -184,7 +184,7 @@ class _Curve:
         return np.concatenate([[first.real, first.imag], r.real, r.imag[self.kept != 0]])
 
     def jacobian(self, z, r, motion):
-        """Return the derivatives of the defect by all unknowns; None where the block does not answer."""
+        """Return the derivatives of the defect by all unknowns; None where there is no response."""
         columns = []
         for i in range(z.size):
             moved = z.copy()

@@ -140,7 +140,7 @@ PATH_REACH = np.log([30.0, 10.0])
 """In amplitude and frequency, beyond which a curve is given up."""
 
 ODD = 1e-7
-"""Even harmonics and mean of the answer to an odd waveform, below which a block is odd."""
+"""Even harmonics and mean of the response to an odd waveform, below which a block is odd."""
 
 # --- grades and bands -------------------------------------------------------------------------------
 
@@ -150,8 +150,8 @@ harmonics, which fall slowly, fewer are kept (worst of ``trust``: 3.1 for a gap)
 
 MEMORYLESS_ERROR, DYNAMIC_ERROR = (1.5, 0.0), (0.01, 0.4)
 """Relative error of N from returned harmonics d where they cannot be carried, c1 d + c2 d^2. A jump or a
-corner answers its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py: 0.003
-at 0.10, 0.007 at 0.20, 0.21 at 0.79)."""
+corner responds to its harmonics at once; a mass hardly (friction and backlash loops of tests/problems.py:
+0.003 at 0.10, 0.007 at 0.20, 0.21 at 0.79)."""
 
 FLOOR, BAND_MOST = 1e-3, 50.0
 """Least half width of a band; largest, whose exponential is still a number."""

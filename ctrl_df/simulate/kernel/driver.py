@@ -216,7 +216,7 @@ def advance(
             if gliding and skip > 0:
                 skip -= 1
             elif gliding:
-                begun = t
+                started = t
                 gone = call_native(
                     paced[0],
                     (
@@ -229,7 +229,7 @@ def advance(
                     clock[9] += gone
                     skip = wait = 0
                     if affine:
-                        h = max(h, t - begun)
+                        h = max(h, t - started)
                     known, jumped = False, led[4] == 1.0 or held
                     continue
                 if curved:
@@ -261,7 +261,7 @@ def advance(
             jumped = False
             if at >= 0 and value < 0.0:
                 if at == ng - 1 and not armed:
-                    blocked = at  # begun beyond the section
+                    blocked = at  # started beyond the section
                     continue
                 theta = 0.0
             else:

@@ -288,7 +288,7 @@ def _march(
     )  # fmt: skip
     owner, first, column = tracks.owner[place], tracks.first[place], tracks.column[place]
     values, length = tracks.value[place], tracks.length[which]
-    at, begun, ramped = n + 2 * nr, segment, drive.linear == 1
+    at, first_segment, ramped = n + 2 * nr, segment, drive.linear == 1
     constant = drive.harmonics.shape[1] > 0
     while segment + 2 < time.shape[0]:
         t1 = time[segment + 2]
@@ -325,7 +325,7 @@ def _march(
             index += 1
         segment += 1
         t = t1
-    return segment - begun, index
+    return segment - first_segment, index
 
 
 @part(inline=True)

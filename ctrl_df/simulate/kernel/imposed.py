@@ -1,6 +1,6 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""Effects under an imposed motion: the force they answer with, their hidden states integrated along it.
+"""Effects under an imposed motion: the force they take, their hidden states integrated along it.
 
 The motion is a cubic between nodes and never turns within a piece: its reversals are nodes. The laws are
 therefore as smooth there as they are written. Hidden states go by Rodas3, an L-stable Rosenbrock method of
@@ -128,7 +128,7 @@ def _factor(m, order):
 
 @part
 def _solve(m, order, b):
-    """Solve with the factors of `_factor`; the answer takes the place of b."""
+    """Solve with the factors of `_factor`; the solution takes the place of b."""
     n = m.shape[0]
     for k in range(n):
         there = b[order[k]]
@@ -228,7 +228,7 @@ def _across(laws, motion, node, z, largest, rtol, pace, work):
 
 
 @njit(error_model="numpy", nogil=True)
-def answer(
+def force_along(
     table, par, mass, span, asked, presliding, motion, samples, z0, rtol, stop, work, out, open_at, back, kept
 ):
     """Write the force of every row of parameters at the samples of one motion; whether all came to an end.
@@ -257,7 +257,7 @@ def answer(
     stop : (1,) int array
         Set by another thread to end it.
     work : Work
-        Of `room`.
+        Of `work_arrays`.
     out : (rows, n) array
         [N], NaN from where a row runs away.
     open_at : (n,) int array
@@ -298,8 +298,8 @@ def answer(
     return True
 
 
-def room(states: int) -> Work:
-    """Return the arrays that `answer` works in."""
+def work_arrays(states: int) -> Work:
+    """Return the arrays that `force_along` works in."""
     one, square = np.empty(states), np.empty((states, states))
     return Work(
         *(one.copy() for _ in range(7)), np.empty((4, states)), square, square.copy(),

@@ -23,7 +23,7 @@ from . import driver
 from .pace import keep_pace
 from .space import Space, space_at
 
-NOT_BEGUN, UNFINISHED = -1, -2
+NOT_STARTED, UNFINISHED = -1, -2
 """Before a run has ended: reasons beside those of `ctrl_df.simulate.kernel.driver`."""
 
 
@@ -65,7 +65,7 @@ class Rows(NamedTuple):
     events: np.ndarray  # (n,)
 
 
-class Desk(NamedTuple):
+class Context(NamedTuple):
     """What one thread works with: the engine's address and program, scratch, its log of events."""
 
     run: int
@@ -97,7 +97,9 @@ class How(NamedTuple):
     height: float
 
 
-def make_desk(engine, space: Space, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray) -> Desk:
+def make_context(
+    engine, space: Space, states: np.ndarray, keep: bool, logged: bool, stop: np.ndarray
+) -> Context:
     """Return what a thread needs for the runs of one program in a space; `logged`: keep their events."""
     program = engine.program
     n, ng = engine.nstates, int(program.ints[H_NG]) + 1
@@ -106,7 +108,7 @@ def make_desk(engine, space: Space, states: np.ndarray, keep: bool, logged: bool
     log_t, log_n, log_k, log_row = (np.zeros(room, kind) for kind in (float, np.int64, np.int64, np.int64))
     scale, before = np.zeros((4, ng)), np.zeros(n)
     spectrum = np.zeros((engine.noutputs, 0), complex)
-    return Desk(
+    return Context(
         driver.address(), program.nodes, program.ints, space.at, space.words, scale, before, spectrum, states,
         int(keep),
         log_t, log_n, log_k, log_row, np.array([0, -1]), steps_at_once(STEPS_AT_ONCE, n), stop,
@@ -114,75 +116,76 @@ def make_desk(engine, space: Space, states: np.ndarray, keep: bool, logged: bool
 
 
 @njit(error_model="numpy", nogil=True)
-def run_rows(desk, rows, drives, par, how, todo, begin):
+def run_rows(context, rows, drives, par, how, todo, begin):
     """Run the rows ``todo[begin:]`` one after another; return how many of `todo` are done.
 
     `par` (k, npar) are the packed parameters that ``rows.par`` refers to. Fewer than all are done where the
-    log of events is full (take it, set ``desk.tally[0]`` to zero, and go on from the number returned, at the
-    same desk) or where ``desk.stop`` asks to leave.
+    log of events is full (take it, set ``context.tally[0]`` to zero, and go on from the number returned, in
+    the same context) or where ``context.stop`` asks to leave.
     """
-    desk, rows, drives, par, todo = lean(desk), lean(rows), lean(drives), lean(par), lean(todo)
+    context, rows, drives, par, todo = lean(context), lean(rows), lean(drives), lean(par), lean(todo)
     for i in range(begin, todo.shape[0]):
         row = todo[i]
-        if desk.stop[0] != 0 or not _one(desk, rows, drives, par, how, row):
+        if context.stop[0] != 0 or not _one(context, rows, drives, par, how, row):
             return i
     return todo.shape[0]
 
 
 @part
-def _one(desk, rows, drives, par, how, row):
+def _one(context, rows, drives, par, how, row):
     """Run one row to its end; False where it has to stop before."""
-    space = space_at(desk.space)
+    space = space_at(context.space)
     memo = space.memo
     clock, first = rows.clock[row], rows.first[row]
     times = cut(rows.times, first, rows.count[row])
     outputs = cut(rows.outputs, rows.at[row], times.shape[0])
-    at = rows.at[row] if desk.keep else 0
+    at = rows.at[row] if context.keep else 0
     mode = cut(rows.mode, rows.modes[row], rows.modes[row + 1] - rows.modes[row])
-    states = cut(desk.states, at, times.shape[0])
+    states = cut(context.states, at, times.shape[0])
     which = rows.drive[row]
     time = drives.time[min(which, drives.time.shape[0] - 1)]
     drive = Drive(time, drives.samples[which], drives.linear, drives.harmonics[which], drives.omega[which], 0)
-    prog = Program(desk.nodes, desk.ints, par[rows.par[row]])
+    prog = Program(context.nodes, context.ints, par[rows.par[row]])
     fresh = 0
-    if rows.reason[row] == NOT_BEGUN:
+    if rows.reason[row] == NOT_STARTED:
         fresh = 1
-        if desk.tally[1] != rows.par[row]:
+        if context.tally[1] != rows.par[row]:
             # maps of modes that were learnt with other parameters
             space.store.order[0] = 0
-            desk.tally[1] = rows.par[row]
-        for i in range(desk.scale.shape[0]):
-            for j in range(desk.scale.shape[1]):
-                desk.scale[i, j] = 0.0
+            context.tally[1] = rows.par[row]
+        for i in range(context.scale.shape[0]):
+            for j in range(context.scale.shape[1]):
+                context.scale[i, j] = 0.0
         memo[2] = 0.0
         clock[6] = _segment(time, clock[0])
     while True:
         # every part of a run is as long as it would be among other runs: so are its numbers
-        logged = min(EVENTS, desk.log_t.shape[0])
-        used = desk.tally[0]
-        if desk.stop[0] != 0 or used + logged > desk.log_t.shape[0]:
+        logged = min(EVENTS, context.log_t.shape[0])
+        used = context.tally[0]
+        if context.stop[0] != 0 or used + logged > context.log_t.shape[0]:
             if fresh == 0:
                 rows.reason[row] = UNFINISHED
             return False
         until = rows.end[row]
         if times.shape[0] - int(clock[1]) > MOST_OUTPUTS:
             until = min(until, times[int(clock[1]) + MOST_OUTPUTS])
-        budget = min(rows.max_steps[row] - int(clock[3]), desk.chunk)
+        budget = min(rows.max_steps[row] - int(clock[3]), context.chunk)
         reason = call_native(
-            desk.run,
+            context.run,
             (
                 prog, drive, clock, rows.x[row], mode, until, times, states, outputs, how.order,
                 how.rtol, how.atol, how.max_step, True, False, -1, 0.0, -1, how.height, budget,
-                cut(desk.log_t, used, logged), cut(desk.log_n, used, logged), cut(desk.log_k, used, logged),
-                desk.before, desk.scale, fresh, desk.space, desk.spectrum,
+                cut(context.log_t, used, logged), cut(context.log_n, used, logged),
+                cut(context.log_k, used, logged),
+                context.before, context.scale, fresh, context.space, context.spectrum,
                 0.0,
             ),
         )  # fmt: skip
         fresh = 0
         if logged > 1:
             for j in range(used, used + min(int(clock[5]), logged)):
-                desk.log_row[j] = row
-                desk.tally[0] = j + 1
+                context.log_row[j] = row
+                context.tally[0] = j + 1
         goes_on = (
             reason == driver.FULL
             or (reason == driver.STEPS and clock[3] < rows.max_steps[row])
@@ -196,7 +199,7 @@ def _one(desk, rows, drives, par, how, row):
         reason = driver.NAN
     clock[1] = right
     _blank(outputs, right)
-    if desk.keep:
+    if context.keep:
         _blank(states, right)
     rows.events[row] = int(clock[4])
     rows.reason[row] = reason

@@ -66,8 +66,8 @@ class Space(NamedTuple):
 
 
 @contextmanager
-def lent_space(prog) -> Iterator[Space]:
-    """Lend a space to a thread that begins every run in it afresh; it is kept for programs alike."""
+def pooled_space(prog) -> Iterator[Space]:
+    """Take a space from the pool for programs alike: for a thread that begins every run in it afresh."""
     kind = prog.nodes.tobytes(), prog.ints.tobytes()
     try:
         space = _idle[kind].pop()

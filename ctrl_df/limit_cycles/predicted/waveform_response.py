@@ -16,7 +16,7 @@ from ...df.methods import ElementIntegrals, Method
 from .thresholds import CHORD_POINTS, DYNAMIC_HARMONICS, STATIC_HARMONICS, WAVE_FLAT, WAVE_JUMP, WAVE_SAMPLES
 
 
-def responder(F, method: Method) -> tuple[Response, int] | None:
+def response_of(F, method: Method) -> tuple[Response, int] | None:
     """Return the block's steady-state response to waveforms, and the harmonics to keep; None: not known."""
     if isinstance(method, ElementIntegrals):
         cells = _element_cells(method.block)
@@ -53,7 +53,7 @@ class Response(Protocol):
 class SampledResponse:
     """Response of a law on waveforms; `cells` maps samples of the input to means of the output between them.
 
-    Means, not samples: a jump then moves the answer smoothly with its place instead of from sample to sample.
+    Means, not samples: the response then changes smoothly with the place of a jump.
     """
 
     cells: Callable

@@ -1,7 +1,7 @@
-"""The course of a long computation: what is known so far, to whom it is reported, how long it may last.
+"""Monitor of a long computation: results so far, who receives them, how long it may last.
 
 Work is done in units, between which it may end: where the time given is over, or at Ctrl-C, it is left where
-it stands, and what was known last is the answer.
+it stands, and the last result counts.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ..simulate import parallel
 from .thresholds import PROGRESS_EVERY, PROGRESS_POLL
 
 COMPLETE, UNDER_WAY, BUDGET_SPENT, INTERRUPTED = "complete", "under way", "budget spent", "interrupted"
-"""How far an answer has come."""
+"""Status of a result."""
 
 _log = logging.getLogger("ctrl_df")
 _log.addHandler(logging.NullHandler())
 
 
-class Course:
-    """How far a computation has come.
+class Monitor:
+    """Progress, results and time of a long computation.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ class Course:
         Whether to tell on stderr what is being done (None: where that is a terminal), or what takes a line
         of text instead.
     callback : callable or None
-        Takes every answer as it stands; what it returns is ignored, what it raises ends the computation.
+        Takes every result as it stands; what it returns is ignored, what it raises ends the computation.
     budget : float or None
-        Seconds from now on; the first answer is waited for in any case.
+        Seconds from now on; the first result is waited for in any case.
 
     Raises
     ------
@@ -49,20 +49,20 @@ class Course:
     def __init__(self, owner: str = "", progress: Any = None, callback: Any = None, budget: Any = None):
         for name, given, others in (
             ("progress", progress, "True, False, None or a function of a line of text"),
-            ("callback", callback, "None or a function of the answer so far"),
+            ("callback", callback, "None or a function of the result so far"),
         ):
             truth = name == "progress" and isinstance(given, bool)
             if not (given is None or truth or callable(given)):
                 raise TypeError(f"{owner} needs {name} as {others}; got {shown(given)}.")
-        self.owner, self.began = owner, time.perf_counter()
+        self.owner, self.started = owner, time.perf_counter()
         self._latest: Callable[[], Any] | None = None
         self._callback, self._progress = callback, progress
         self._until = math.inf
         if budget is not None:
             seconds = positive(owner, "budget", budget, "s", remedy=CHECK_VALUE)
-            self._until = self.began + seconds
+            self._until = self.started + seconds
         self._jobs, self._stage, self._bar = 0, "", None
-        self._reported = self.began
+        self._reported = self.started
 
     # --- what happens on the way ----------------------------------------------------------------------
 
@@ -76,7 +76,7 @@ class Course:
 
     def _tell(self, text: str) -> None:
         """Log a line, and hand it to who takes lines."""
-        line = f"{self.owner}: {time.perf_counter() - self.began:.1f} s, {text}"
+        line = f"{self.owner}: {time.perf_counter() - self.started:.1f} s, {text}"
         self._reported = time.perf_counter()
         _log.info(line)
         if callable(self._progress):
@@ -86,23 +86,23 @@ class Course:
         """Log what only a developer wants to know."""
         _log.debug("%s: " + text, self.owner, *values)
 
-    def known(self, answer: Any) -> None:
-        """Keep an answer as it stands, and let it be heard of."""
-        self._keep(lambda: answer)
+    def known(self, result: Any) -> None:
+        """Keep a result as it stands, and pass it on."""
+        self._keep(lambda: result)
 
-    def _keep(self, answer: Callable[[], Any]) -> None:
-        """Keep an answer that is made where it is heard of, or where it is the last one known."""
-        self._latest = answer
+    def _keep(self, make: Callable[[], Any]) -> None:
+        """Keep a result that is made where it is passed on, or where it is the last one known."""
+        self._latest = make
         if self._callback is not None or _log.isEnabledFor(logging.DEBUG):
-            made = answer()
+            made = make()
             self._latest = lambda: made
             _log.debug("%s: known so far\n%s", self.owner, made)
             if self._callback is not None:
                 self._callback(made)
         parallel.check()
 
-    def within(self, whole: Callable[[Any], Any]) -> Course:
-        """Return the course of a part: its answers count as what `whole` makes of them."""
+    def within(self, whole: Callable[[Any], Any]) -> Monitor:
+        """Return the monitor of a part: its results count as what `whole` makes of them."""
         return _Part(self, whole)
 
     # --- parallel.Watch -----------------------------------------------------------------------------------
@@ -130,7 +130,7 @@ class Course:
     # --- from begin to end ----------------------------------------------------------------------------
 
     def run(self, work: Callable[[], Any]) -> Any:
-        """Return what `work` comes to, or the last answer known where it is ended before.
+        """Return what `work` comes to, or the last result known where it is ended before.
 
         Raises
         ------
@@ -152,19 +152,19 @@ class Course:
 
     @property
     def seconds(self) -> float:
-        """Seconds since it began."""
-        return time.perf_counter() - self.began
+        """Seconds since it started."""
+        return time.perf_counter() - self.started
 
     def _shown(self):
         return _Bar(self, self._progress)
 
 
-class _Part(Course):
-    """The course of a part of something larger."""
+class _Part(Monitor):
+    """The monitor of a part of something larger."""
 
-    def __init__(self, outer: Course, whole: Callable[[Any], Any]):
+    def __init__(self, outer: Monitor, whole: Callable[[Any], Any]):
         self.outer, self.whole = outer, whole
-        self.owner, self.began = outer.owner, time.perf_counter()
+        self.owner, self.started = outer.owner, time.perf_counter()
 
     def stage(self, text):
         self.outer.stage(text)
@@ -172,11 +172,11 @@ class _Part(Course):
     def detail(self, text, *values):
         self.outer.detail(text, *values)
 
-    def known(self, answer):
-        self._keep(lambda: answer)
+    def known(self, result):
+        self._keep(lambda: result)
 
-    def _keep(self, answer):
-        self.outer._keep(lambda: self.whole(answer()))
+    def _keep(self, make):
+        self.outer._keep(lambda: self.whole(make()))
 
     def left(self):
         return self.outer.left()
@@ -189,17 +189,17 @@ class _Part(Course):
 
 
 class _Bar:
-    """A bar on stderr while a course is run."""
+    """A bar on stderr while a monitor is run."""
 
-    def __init__(self, course: Course, progress):
-        self.course, self.progress = course, progress
+    def __init__(self, monitor: Monitor, progress):
+        self.monitor, self.progress = monitor, progress
 
     def __enter__(self):
         if not callable(self.progress):
-            self.course._bar = progress_bar(None, self.progress, self.course.owner, "job")
+            self.monitor._bar = progress_bar(None, self.progress, self.monitor.owner, "job")
         return self
 
     def __exit__(self, *_):
-        if self.course._bar is not None:
-            self.course._bar.close()
-            self.course._bar = None
+        if self.monitor._bar is not None:
+            self.monitor._bar.close()
+            self.monitor._bar = None

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..thresholds import NOTHING
-from .known import KnownOrbits
+from .known_orbits import KnownOrbits
 from .orbit import Orbit
-from .poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, Course, PoincareSearch
-from .thresholds import ASKED, CROSSINGS, FACTORS, HALVINGS, LINGERING, LINGERS, WIDTH, WOUND
+from .poincare import CYCLES, DIVERGES, RESTS, UNDECIDED, PoincareSearch, Trajectory
+from .thresholds import CLOSED_AFTER, CROSSINGS, FACTORS, HALVINGS, LINGERING, LINGERS, WIDTH, WIND_UP_LEAST
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Start:
     orbit : Orbit or None
         The one it cycles on.
     growth : float
-        Ratio of the amplitudes in the last quarter of the course to those in the quarter before.
+        Ratio of the amplitudes in the last quarter of the trajectory to those in the quarter before.
     wind_up : float
         Factor by which the controller's integral outgrew the block's output, where it did; else 1.
     """
@@ -145,7 +145,7 @@ class Explorer:
     ----------
     search : PoincareSearch
     close : callable
-        ``close(x0, course, complete) -> Orbit or None``: the orbit that a course comes near.
+        ``close(x0, trajectory, complete) -> Orbit or None``: the orbit that a trajectory comes near.
     """
 
     def __init__(self, search: PoincareSearch, close: Callable):
@@ -156,44 +156,46 @@ class Explorer:
 
         `factors` are the sizes of the starts, in units of that at which the block's nonlinearity matters.
 
-        Starts whose course ends on an orbit of `known` are not followed to its end, nor closed again.
+        Starts whose trajectory ends on an orbit of `known` are not followed to its end, nor closed again.
         """
         starts, met = self.search.starts, []
         known = KnownOrbits(self.search, []) if known is None else known
         rows = []
         for size, x0 in starts.all(factors):
-            course = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
-            orbit = known.reached(course) or known.kept(self.close(x0, course, True))
-            rows.append(self._row(size, course, orbit, x0))
-            _once(met, orbit)
+            trajectory = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
+            orbit = known.reached(trajectory) or known.kept(self.close(x0, trajectory, True))
+            rows.append(self._row(size, trajectory, orbit, x0))
+            _append_new(met, orbit)
         rows.sort(key=lambda row: row.size)
         borders = []
         if edges:
             for low, high in zip(rows[:-1], rows[1:], strict=True):
                 if low.fate != high.fate and UNDECIDED not in (low.fate, high.fate):
                     borders.append(self._border(low, high, longest, known))
-                    _once(met, borders[-1].orbit)
+                    _append_new(met, borders[-1].orbit)
         return Fate(tuple(rows), tuple(borders), starts.unit, met)
 
-    def _row(self, size, course, orbit, x0) -> Start:
-        fate = course.fate
+    def _row(self, size, trajectory, orbit, x0) -> Start:
+        fate = trajectory.fate
         if orbit is not None and orbit.stable is not False and fate == UNDECIDED:
             fate = CYCLES
         elif fate == CYCLES and orbit is None:
             fate = UNDECIDED
         on = orbit if fate == CYCLES else None
-        return Start(size, fate, on, course.growth, self._wound(course, x0) if fate == DIVERGES else 1.0)
+        return Start(
+            size, fate, on, trajectory.growth, self._wind_up(trajectory, x0) if fate == DIVERGES else 1.0
+        )
 
-    def _wound(self, course, x0) -> float:
+    def _wind_up(self, trajectory, x0) -> float:
         """Factor by which controller states outgrew the block's during a divergence; 1 where they did not."""
         nc = self.search.loop.syslist[0].nstates or 0 if self.search.parts is not None else 0
         core = self.search.starts.core
-        if not nc or core is None or not course.crossings:
+        if not nc or core is None or not trajectory.crossings:
             return 1.0
         if not any(getattr(e, "corners", ()) for e, _ in core.input_channel):
             return 1.0
-        gains = np.abs(course.end) / self.search.units
-        return float(max(gains[:nc].max() / max(gains[nc:].max(), NOTHING), 1.0 + WOUND))
+        gains = np.abs(trajectory.end) / self.search.units
+        return float(max(gains[:nc].max() / max(gains[nc:].max(), NOTHING), 1.0 + WIND_UP_LEAST))
 
     def _border(self, low: Start, high: Start, longest, known) -> Border:
         below, above, fates, orbit = low.size, high.size, (low.fate, high.fate), None
@@ -204,20 +206,20 @@ class Explorer:
             if not below < middle < above:
                 break
             x0 = self.search.starts.state(middle)
-            course = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
-            if course.fate == fates[0]:
+            trajectory = self.search.iterate(x0, CROSSINGS, longest, decided=known.ending)
+            if trajectory.fate == fates[0]:
                 below = middle
-            elif course.fate == fates[1]:
+            elif trajectory.fate == fates[1]:
                 above = middle
             else:
                 break
-            if orbit is None and count in ASKED:
-                orbit = self._slowest(x0, course, known)
+            if orbit is None and count in CLOSED_AFTER:
+                orbit = self._slowest(x0, trajectory, known)
         return Border(below, above, fates, orbit)
 
-    def _slowest(self, x0, course: Course, known) -> Orbit | None:
-        """Unstable orbit near which a course lingers: its crossings change least there."""
-        crossings = course.crossings
+    def _slowest(self, x0, trajectory: Trajectory, known) -> Orbit | None:
+        """Unstable orbit near which a trajectory lingers: its crossings change least there."""
+        crossings = trajectory.crossings
         if len(crossings) < 4:
             return None
         change = [
@@ -230,11 +232,11 @@ class Explorer:
             return orbit
         near = crossings[max(k + 2 - LINGERING, 0) : k + 2]
         padded = [near[0]] * (LINGERING - len(near)) + near
-        orbit = self.close(x0, Course(padded, UNDECIDED, 1.0, course.end), False)
+        orbit = self.close(x0, Trajectory(padded, UNDECIDED, 1.0, trajectory.end), False)
         return known.kept(orbit) if orbit is not None and orbit.stable is False else None
 
 
-def _once(orbits, orbit):
+def _append_new(orbits, orbit):
     """Append an orbit to those met, unless it is among them."""
     if orbit is not None and not any(orbit is other for other in orbits):
         orbits.append(orbit)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .orbit import Orbit
-from .poincare import CYCLES, Course, Crossing, PoincareSearch, upward_crossings
-from .thresholds import APPROACHING, BESIDE, ON, ORBIT_SIZE, SAME_ORBIT, SAME_ROUGHLY, THERE
+from .poincare import CYCLES, Crossing, PoincareSearch, Trajectory, upward_crossings
+from .thresholds import APPROACHING, BESIDE, ON, ORBIT_SIZE, REACHED, SAME_ORBIT, SAME_ROUGHLY
 
 
 class KnownOrbits:
@@ -23,7 +23,7 @@ class KnownOrbits:
     def __init__(self, search: PoincareSearch, orbits: list[Orbit]):
         self.search, self.orbits = search, orbits
         # a crossing tells nothing where the state is a history, or crossings are looked for among samples
-        self._telling = not search.tight and not getattr(search.parts, "dt", 0)
+        self._comparable = not search.tight and not getattr(search.parts, "dt", 0)
         self._crossings: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def kept(self, orbit: Orbit | None) -> Orbit | None:
@@ -43,7 +43,7 @@ class KnownOrbits:
         for orbit in self.orbits:
             if orbit.stable:
                 apart = [self._distance(orbit, crossing) for crossing in crossings[-APPROACHING:]]
-                if apart[-1] < THERE and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
+                if apart[-1] < REACHED and all(b < a for a, b in zip(apart[:-1], apart[1:], strict=True)):
                     return orbit
         return None
 
@@ -57,8 +57,8 @@ class KnownOrbits:
             count = len(self._of(orbit)[0])
             if not count or len(crossings) <= count:
                 continue
-            spent = crossings[-1].time - crossings[-1 - count].time
-            if abs(spent / orbit.period - 1) < ON and self._distance(orbit, crossings[-1]) < THERE:
+            elapsed = crossings[-1].time - crossings[-1 - count].time
+            if abs(elapsed / orbit.period - 1) < ON and self._distance(orbit, crossings[-1]) < REACHED:
                 return orbit
         return None
 
@@ -73,16 +73,16 @@ class KnownOrbits:
         """Fate of crossings that end on a known orbit, empty for others; `decided` of a search asks it."""
         return CYCLES if self.approached(crossings) is not None else ""
 
-    def reached(self, course: Course) -> Orbit | None:
-        """Return the known orbit that a course has ended on; None for any other."""
-        if course.fate != CYCLES:
+    def reached(self, trajectory: Trajectory) -> Orbit | None:
+        """Return the known orbit that a trajectory has ended on; None for any other."""
+        if trajectory.fate != CYCLES:
             return None
-        return self.approached(course.crossings) or self.repeated(course.crossings)
+        return self.approached(trajectory.crossings) or self.repeated(trajectory.crossings)
 
     def _distance(self, orbit: Orbit, crossing: Crossing) -> float:
         """Largest difference of a state from those of the orbit at its nearest crossing, in its sizes."""
         states, size = self._of(orbit)
-        if not len(states) or not self._telling:
+        if not len(states) or not self._comparable:
             return np.inf
         return float(np.max(np.abs(states - crossing.state) / size, axis=1).min())
 
