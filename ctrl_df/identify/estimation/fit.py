@@ -34,11 +34,10 @@ from .thresholds import (
     EFFORT_SHORT,
     FIRST_PERIODS,
     FIRST_STROKES,
-    FREE_UP_TO,
     ITERATIONS,
     RESTARTS_KEPT,
+    SEVERAL,
     STAGE_FACTOR,
-    STAGE_LEAST,
     STAGES,
     TOLERANCE,
     UNCOUNTED,
@@ -246,7 +245,7 @@ def segment_lengths(model, records: Sequence[Measurement], mode="auto", window=N
         usual = float(window) if window is not None else usual_segment(record)
         free = mode == "free" or simulator.closed
         if mode == "auto" and window is None:
-            free = free or simulator.restoring or record.duration < FREE_UP_TO * usual
+            free = free or simulator.restoring or record.duration < SEVERAL * usual
         lengths.append(None if free else usual)
     return lengths
 
@@ -428,7 +427,7 @@ def _short_segments(simulator, records, lengths) -> list[list[float | None]]:
     stages: list[list[float | None]] = []
     factor = 1.0
     while (
-        any(STAGE_LEAST * factor * f < span for f, span in zip(first, spans, strict=True))
+        any(SEVERAL * factor * f < span for f, span in zip(first, spans, strict=True))
         and len(stages) < STAGES
     ):
         stages.append([min(factor * f, span) for f, span in zip(first, spans, strict=True)])

@@ -18,7 +18,7 @@ PARAMETER_RANGE = 12.0
 
 SEGMENT_MOTIONS, SEGMENT_USUAL, SEGMENTS = 2.5, 60, (4, 40)
 """The longest segments of a diagnosis: to-and-fro motions in each, samples at least; how many of a record, at
-least and at most."""
+least and at most, as each has initial states of its own. Half and twice were not tried."""
 
 SHORTEST = 16
 """How many times as many the shortest segments of a diagnosis are as the longest: of two to-and-fro motions
@@ -31,7 +31,8 @@ SHORT = 4 * SHORTEST
 """How many times as many they are for the parameters of a machine with disturbance forces."""
 
 FILTERED = 40
-"""Values of the force that the shortest segments show where disturbance forces outweigh the noise."""
+"""Values of the force that the shortest segments show where disturbance forces outweigh the noise: 240 of a
+to-and-fro motion, of which such a segment is a sixth. Half and twice were not tried."""
 
 HOLDOUT_PARTS = 9
 """Parts of a record of which every third is held out where no record is: three, at the end of each third of
@@ -54,7 +55,8 @@ ANGLES = 6
 """Angles of a full turn from which that of a record is sought: a sine's minimum reaches half a turn."""
 
 EFFORT_OWN = 5
-"""Steps of a fit of what a record has for itself, all else being known."""
+"""Steps of a fit of what a record has for itself, all else being known: one or two parameters near their
+values."""
 
 # --- descents ---------------------------------------------------------------------------------------
 
@@ -145,22 +147,25 @@ out a rival."""
 UNCOUNTED = 100000
 """Simulations allowed to fits that their steps bound."""
 
-FREE_UP_TO = 1.5
-"""Usual segments up to which a record is left whole."""
+SEVERAL = 1.5
+"""Length of a record, or of the segments of the last stage of a fit, over that of segments, from which it is
+divided by them: less is rounded to one."""
+
 
 FIRST_STROKES, FIRST_PERIODS, STAGES, STAGE_FACTOR = 0.5, 4, 4, 4
-"""Segments of the first stage of a fit: strokes; periods of an elastic joint. Stages before the last at most,
-and how much longer each is."""
+"""Segments of the first stage of a fit: to-and-fro motions, so that one is a stroke; periods of an elastic
+joint. Stages before the last at most, and how much longer each is. Half and twice change nothing for a joint,
+but for twice the periods: 0.8 % more error."""
 
-STAGE_LEAST = 1.5
-"""Length of the last stage over that of one before, at least."""
 
 LEVELS_BETWEEN = 7
-"""Static levels tried over an open range: neighbours differ by less than one sample lets see."""
+"""Static levels tried over an open range, and again between the best one's neighbours, which are then an
+eighteenth of the range apart. That is less than one sample lets see."""
 
 STROKE_SAMPLES = 60
 """Samples of a to-and-fro motion that decimation leaves at least: a sine is then interpolated linearly to (2
 pi / 60)^2 / 8, 0.14 %."""
 
 POLISH = 6
-"""Steps at the full rate of a fit over whole records."""
+"""Steps at the full rate of a fit over whole records. They begin at the minimum over every fourth sample.
+Half and twice were not tried."""

@@ -1,7 +1,8 @@
-"""Numbers of the ladder that were chosen, each with its reason."""
+"""Numbers of the ladder that were chosen, each with its reason or what half and twice of it change."""
 
 RIVALS = 2
-"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end."""
+"""Candidates that are fitted in the place of an effect of a ladder: beside a later one, and at its end.
+Half and twice were not tried."""
 
 BRANCHES = 3
 """Rivals of steps from which a ladder begins again, and ends no better, where it ended with something
@@ -9,5 +10,6 @@ unexplained: of two effects hidden one that stands in for both ranks first, and 
 (rigs)."""
 
 STEPS_NEIGHBOUR, STEPS_SAME, STEPS_COMPARED = 8, 4, 6
-"""Steps of a fit: of a model that differs by one effect; of one fitted before, over other data; of two models
-that are compared."""
+"""Steps of a fit: of a model that differs by one effect, as many as the baseline takes (`BASE_STEPS`); of one
+fitted before, over other data; of two models that are compared, as many as an effect is tried with
+(`EFFORT_TRIED`). Half and twice were not tried."""

@@ -5,26 +5,31 @@ from __future__ import annotations
 import numpy as np
 
 SPECTRUM_SAMPLES = 25_000
-"""Samples of a record beyond which ripples are sought in means over several."""
+"""Samples of a record beyond which ripples are sought in means over several: bounds the time of a scan, in
+which every one of up to 1,300 wavelengths costs a Fourier transform."""
 
 JOINTS_TRIED = 4
-"""Joints of a share of load from which those that begin are chosen."""
+"""Joints of a share of load from which those that begin are chosen, a third of those tried. Half and twice
+change nothing on a rig with a joint."""
 
 STRONG = 0.5
 """Share of the mean squared force that is missing up to which a single law leaves: it takes more of it than
 all that is left, and the model's own parameters are bent by it."""
 
 RESONANCES, JOINT_DAMPING = np.geomspace(1.5, 40.0, 12), 0.1
-"""Joints tried: resonance over the rate of the motion (its speed over its stroke), neighbours a third apart;
-damping ratio."""
+"""Joints tried: resonance over the rate of the motion (its speed over its stroke), neighbours a third apart,
+so that one is within 16 % of any; damping ratio, of which the resonance is 20 % wide at half its power."""
 
 LONG_WAVES, LONG_WAVE_TURNS = 5, (6.0, 30.0)
-"""Ripples that fits begin with by what they change in the output; wavelengths to the stroke up to which they
-are sought there, of one body and of two (200 runs of the segments then, a second at most)."""
+"""Ripples that fits begin with by what they change in the output (half and twice change nothing on a rig with
+a ripple); wavelengths to the stroke up to which they are sought there, of one body and of two (200 runs of
+the segments then, a second at most)."""
 
 RIPPLE_TURNS, RIPPLE_STEP, RIPPLE_COARSEST = 400.0, 0.3, 6.0
-"""Ripples tried: wavelengths to the stroke at most; between two of them (one turn apart they are orthogonal);
-shortest wavelength over the error of the smoothed position."""
+"""Ripples tried: wavelengths to the stroke at most, finer than encoders and cogging have (bounds work);
+between two of them: one turn apart they are orthogonal, and of one 0.15 turns off the nearest that is tried
+93 % of the power are seen; shortest wavelength over the error of the smoothed position: a phase is then known
+to one radian."""
 
 PROPORTIONAL_SIZES, SIZES = (0.02, 0.1, 0.4), (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Sizes of an effect of which nothing is known, over the natural one: where the change of the output is
@@ -35,19 +40,23 @@ AS_IT_IS, FACTOR_MOST = 1.25, 300.0
 away; by which it is at most: beyond nothing is proportional."""
 
 MOVING = 0.03
-"""Speed, over the typical one, from which a sample shows forces: below, friction may be anything."""
+"""Speed, over the typical one, from which a sample shows forces: below, friction may be anything; a sine
+leaves 1 % of its samples there. """
 
 DRY_LEAST, VISCOUS_LEAST = 0.01, 1e-3
-"""Regressed dry and viscous friction at least, over the typical force: fits move them by factors."""
+"""Regressed dry and viscous friction at least, over the typical force: both are moved by factors, so that
+none may be zero; less would show in no output. """
 
 JOINT_GAIN = 3e-2
-"""Relative gain of the cost at which the initial states of a joint are found well enough to compare it."""
+"""Relative gain of the cost at which the initial states of a joint are found well enough to compare it: its
+error is then known to 1.5 %, and neighbours on the grid differ by factors."""
 
 RIPPLE_LONGEST = 0.6
 """Wavelengths to the stroke at least: of a longer wave a stroke shows no more than of a spring."""
 
 WAVE_TRIED = 0.01
-"""Amplitude of a ripple whose change of the output is simulated, over the typical force: linear still."""
+"""Amplitude of a ripple whose change of the output is simulated, over the typical force: linear to a
+hundredth, and a thousand times the error of simulations (`RTOL_COARSE`)."""
 
 RUN_LEAST = 12
 """Samples of a part of a record without holes that is asked for ripples, at least: its second differences,
@@ -56,24 +65,31 @@ two of a wave)."""
 
 GRID_RANGE, GRID_STEPS, GRID_CONTRAST = (0.3, 3.0), (10, 4000), 0.9
 """Steps of a sensor that rounds: about the one whose error is the one seen, by half a decade; how many are
-tried (and samples asked), at least and at most; contrast over the largest from which a grid stands out."""
+tried (and samples asked), at least and at most; contrast over the largest from which a grid stands out: the
+true step lies a twelfth of a turn over the span off one that is tried (`GRID_PER_TURN`), and there keeps 0.99
+of its contrast, the rest is for noise."""
 
 LIKE_LEFT, LIKE_SAMPLES = 0.1, 300
 """Share of the power of one law's force that another may leave to begin a fit in its place: beyond, its error
 is no longer near the other's. Samples of a motion that tell it: more than enough for a few parameters."""
 
 RIPPLE_BAND, RIPPLE_RUN, RIPPLE_NEAR, RIPPLE_ROUNDS = 4, 32, 13, 3
-"""Part of the span of a state within which means are taken; parts of the longest run at least; ripples about
-the best one; rounds in which frequencies are weighted."""
+"""Part of the span over which a state is read off within which means are taken, so that they keep the motion;
+parts of the longest run at least, of which the nine forces that are regressed (`RUN_LEAST`) leave two thirds;
+ripples about the best one, a twentieth of a turn apart; rounds in which frequencies are weighted.
+Half and twice of the first two and of the rounds change nothing on a rig with a ripple."""
 
 AROUND, AROUND_WIDTH = 40, 1.4
-"""Frequencies at which the power around them is taken, and how far around, as a factor."""
+"""Frequencies at which the power around them is taken, and how far around, as a factor: half an octave to
+either side, so that of 40 over four decades neighbours overlap. """
 
 RIPPLES = 3
-"""Ripples of the spectrum that fits begin with."""
+"""Ripples of the spectrum that fits begin with. Half and twice change nothing on a rig with a ripple."""
 
 STARTS_APART = 0.25
-"""Relative difference of a value up to which two starts are one."""
+"""Relative difference of a value up to which two starts are one: the one leaves a sixteenth, 6 %, of the
+power of the other's effect."""
 
 GRID_PER_TURN, GRID_FINE = 6, 201
-"""Steps tried to a value more over the span; steps about the best one."""
+"""Steps tried to a value more over the span, a sixth of a turn of its ends apart; steps about the best one: a
+hundredth of that."""
