@@ -12,7 +12,7 @@ from ..prediction.values import with_values
 from ..thresholds import FLOOR, GROWTH, RULED_OUT
 from .evidence import ranked
 from .reference import Reference
-from .thresholds import ON_LIMIT, REFIT_MOST
+from .thresholds import ON_LIMIT, REFIT_MOST, REFIT_PROMISES
 
 
 def refitted(
@@ -105,7 +105,10 @@ def beyond_range(at: Reference, best: CandidateFit, refit: Callable):
         return None
     free = replace(at, data=replace(at.data, limits={}))
     regressed = with_values(at.base.block, at.regressed)
-    begins = (at.base, replace(at.base, train=free.data.fine.fit(regressed, at.base.train.names)))
+    every = at.base, replace(at.base, train=free.data.fine.fit(regressed, at.base.train.names))
+    begins = [t for t in every if t.train.rmse < REFIT_PROMISES * best.train.rmse]
+    if not begins:
+        return None
     other = min((refit(free, begin, seen=True) for begin in begins), key=lambda f: f.train.rmse)
     values = {k: p.value for k, p in other.block.parameters.items()}
     left = tuple(k for k, (a, b) in spans.items() if not a <= values[k] <= b)

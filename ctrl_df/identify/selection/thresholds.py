@@ -85,6 +85,10 @@ def by_chance(independent: float) -> float:
 REFIT_MOST = 600
 """Simulations at most that refit a model that may be named, as many as `refit` makes."""
 
+REFIT_PROMISES = 2.0
+"""Error over that of the best candidate from which a model without an effect is not refitted to see whether
+it explains as much: a refit goes on from a fit over the same records, and hardly halves its error."""
+
 ON_LIMIT = 1.001
 """Factor to the end of its range within which a parameter has come there: fits go on to a thousandth."""
 
