@@ -239,29 +239,26 @@ def test_what_an_earlier_step_has_seen_is_tried_again():
     assert [s.effect for s in study.steps] == ["", "coulomb", "position_ripple"]
 
 
+@pytest.fixture
+def falling(monkeypatch):
+    """Let errors fall by what evidence hardly tells from chance."""
+    monkeypatch.setattr(Given, "errors", lambda self, t: (math.exp(-t.level / 100),) * 2)
+
+
+@pytest.mark.usefixtures("falling")
 def test_of_two_that_hide_each_other_neither_need_be_significant():
     levels = {"": 0, "coulomb": 15, "constant_force": 5, "coulomb constant_force": 900}
-    data = Data(levels)
-    # errors fall, evidence does not reach what chance does
-    Given.errors, before = (lambda self, t: (math.exp(-t.level / 100),) * 2), Given.errors
-    try:
-        study = ladder_of(data)
-    finally:
-        Given.errors = before
+    study = ladder_of(Data(levels))
     assert set(study.effects) == {"coulomb", "constant_force"}
 
 
+@pytest.mark.usefixtures("falling")
 def test_a_better_end_is_left_by_its_own_branches():
     # two pairs of effects, of which neither shows alone
     levels = {"": 0, "coulomb": 15, "stiction": 10, "hysteresis": 8, "coulomb linear_spring": 200,
               "coulomb linear_spring constant_force": 215,
               "coulomb linear_spring constant_force quadratic_drag": 1000}  # fmt: skip
-    data = Data(levels)
-    Given.errors, before = (lambda self, t: (math.exp(-t.level / 100),) * 2), Given.errors
-    try:
-        study = ladder_of(data)
-    finally:
-        Given.errors = before
+    study = ladder_of(Data(levels))
     assert set(study.effects) == {"coulomb", "linear_spring", "constant_force", "quadratic_drag"}
 
 

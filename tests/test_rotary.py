@@ -170,15 +170,21 @@ def test_a_diagnosis_is_that_of_the_line_in_units_of_rotation():
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("speed [rad/s]", "missing torque [N m]")
 
 
-def test_what_nothing_explains_is_said_in_torques():
-    """Over the whole library's silence: the free torques that fit what remains."""
-    t = np.arange(0, 4, 4e-3)
+def spring_unknown(dt):
+    """A record of a shaft on a spring, sampled every `dt` [s], and a model without the spring."""
+    t = np.arange(0, 4, dt)
     u = sum(0.3 * np.sin(w * t + w) for w in (2.1, 5.3, 9.7, 17.0))
     true = cdf.Inertia(0.02, [cdf.Coulomb(0.05), cdf.Viscous(0.03), cdf.LinearSpring(0.4)])
     y = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
     noise = 1e-3 * y.std() * np.random.default_rng(0).normal(size=t.size)
     record = cdf.Measurement(t, u, y + noise, input_unit="N m", output_unit="rad")
     model = cdf.Inertia(0.022, [cdf.Coulomb(0.04), cdf.Viscous(0.04)])
+    return record, model
+
+
+def test_what_nothing_explains_is_said_in_torques():
+    """Over the whole library's silence: the free torques that fit what remains."""
+    record, model = spring_unknown(4e-3)
     found = cdf.diagnose(model, record, candidates=["quadratic_drag"])
     assert found.verdict == "unknown" and "behaves like a torque" in found.remains
 
@@ -201,13 +207,7 @@ def test_limits_of_an_experiment_are_those_of_the_motion():
 
 
 def test_an_experiment_keeps_limits_of_rotation():
-    t = np.arange(0, 4, 8e-3)
-    u = sum(0.3 * np.sin(w * t + w) for w in (2.1, 5.3, 9.7, 17.0))
-    true = cdf.Inertia(0.02, [cdf.Coulomb(0.05), cdf.Viscous(0.03), cdf.LinearSpring(0.4)])
-    y = np.asarray(cdf.event_response(true, t, u, input_hold="zoh").outputs)[0]
-    noise = 1e-3 * y.std() * np.random.default_rng(0).normal(size=t.size)
-    record = cdf.Measurement(t, u, y + noise, input_unit="N m", output_unit="rad")
-    model = cdf.Inertia(0.022, [cdf.Coulomb(0.04), cdf.Viscous(0.04)])
+    record, model = spring_unknown(8e-3)
     limits = {"torque": 0.5, "angle": 0.5}
     found = cdf.diagnose(model, record, candidates=["linear_spring"], limits=limits)
     for given, expected in ((dict(), 0.5), (dict(torque=0.3), 0.3)):
