@@ -16,6 +16,7 @@ import re
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
@@ -24,6 +25,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 import numpy as np
 from verdicts import RIGS, drawn
 
+import ctrl_df as cdf
+from ctrl_df.identify.planning.inputs import input_that_separates
+from ctrl_df.identify.residuals.horizons import error_by_horizon
 from ctrl_df.identify.smoothing.missing_force import missing_force
 
 
@@ -38,10 +42,6 @@ def smoothing(name) -> dict:
 
 def planning(name) -> dict:
     """Return the input planned for the true block and the user's model."""
-    from types import SimpleNamespace
-
-    from ctrl_df.identify.planning.inputs import input_that_separates
-
     rig, model = drawn(*RIGS[name][:2], **RIGS[name][2])
     asked = SimpleNamespace(train=[rig.train[0].measurement()])
     found = input_that_separates(asked, [model, rig.true_block], ("a", "b"))
@@ -50,8 +50,6 @@ def planning(name) -> dict:
 
 def records(name) -> dict:
     """Return what a diagnosis says."""
-    import ctrl_df as cdf
-
     rig, model = drawn(*RIGS[name][:2], **RIGS[name][2])
     free = [k for k, p in model.parameters.items() if p.free and k not in rig.known]
     d = cdf.diagnose(model, rig.train[0].measurement(), holdout=rig.holdout[0].measurement(), free=free)
@@ -65,8 +63,6 @@ def records(name) -> dict:
 
 def refit(name) -> dict:
     """Return a refit of the true structure from values a quarter off, to either side in turn."""
-    import ctrl_df as cdf
-
     rig, _ = drawn(*RIGS[name][:2], **RIGS[name][2])
     block = rig.true_block
     free = [k for k, p in block.parameters.items() if p.free and p.value > 0 and k not in rig.known]
@@ -87,8 +83,6 @@ def with_allowed(block, values):
 
 def horizons(name) -> dict:
     """Return the error of the true structure over horizons."""
-    from ctrl_df.identify.residuals.horizons import error_by_horizon
-
     rig, _ = drawn(*RIGS[name][:2], **RIGS[name][2])
     return {"nrmse": error_by_horizon(rig.true_block, [rig.train[0].measurement()]).nrmse}
 
@@ -96,8 +90,6 @@ def horizons(name) -> dict:
 def tables(name) -> dict:
     """Return what a diagnosis of describing functions says."""
     import test_frequency as known
-
-    import ctrl_df as cdf
 
     data, candidates = {
         "drag": (known.table(grid=known.MIDDLE, DRAG=60.0), ("quadratic_drag", "stribeck", "linear_spring")),

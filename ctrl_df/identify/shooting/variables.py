@@ -92,9 +92,9 @@ class Variable:
             self.lower, self.upper = max(self.lower, limits[0]), min(self.upper, limits[1])
         # of the value that it can have, where it begins; one that is next to nothing says nothing of a size
         size = abs(min(max(self.begin, self.lower), self.upper))
+        if self.log:
+            size = math.copysign(size, self.begin)
         self.scale = size if self.log or size > NO_SIZE * natural else natural
-        if self.log and self.begin < 0:
-            self.scale = -self.scale
 
     def q(self, p: float) -> float:
         """Return the scaled value of a physical one."""
@@ -110,7 +110,7 @@ class Variable:
         """Return the scaled value within the bounds nearest to `q`."""
         if self.log:
             near, far = (self.lower, self.upper) if self.scale > 0 else (self.upper, self.lower)
-            low = self.q(near) if near / self.scale > 0 and math.isfinite(near) else -math.inf
+            low = self.q(near) if near / self.scale > 0 else -math.inf
             return min(max(q, low), self.q(far) if math.isfinite(far) else math.inf)
         return min(max(q, self.lower / self.scale), self.upper / self.scale)
 
