@@ -192,6 +192,43 @@ def test_what_drove_a_lag_before_the_record_is_found():
     assert fit.comparison.white and fit.comparison.rmse < 1.1e-5
 
 
+def _recorded_early(by: float, seed: int = 0) -> cdf.Measurement:
+    """A machine that was moving before the record began, its force recorded too early [s]."""
+    rng, t = np.random.default_rng(seed), 0.01 * np.arange(601)
+    waves = list(zip((0.25, 0.55, 0.9, 1.4, 1.9), rng.uniform(0, 6, 5), rng.uniform(3, 8, 5), strict=True))
+
+    def force(s):
+        return sum(a * np.sin(2 * np.pi * f * s + p) for f, p, a in waves)
+
+    x = np.asarray(cdf.event_response(cdf.friction_mass(2, 3, 4), t, force(t), input_hold="zoh").outputs)[0]
+    return cdf.Measurement(t, force(t + by), x + 2e-3 * np.std(x) * rng.standard_normal(len(t)))
+
+
+@pytest.mark.parametrize("delay", [cdf.InputDelay, cdf.SensorDelay])
+def test_what_a_dead_time_lets_act_of_the_time_before_the_record_is_found(delay):
+    fit = cdf.refit(cdf.friction_mass(2.2, 2.5, 4.5).with_effect(delay(0.28)), _recorded_early(0.3))
+    assert fit.comparison.nrmse < 2.1e-3  # 1.98e-3; 15e-3 where the first force holds before the record
+    assert fit.parameters[f"{delay.id}.delay"].value == pytest.approx(0.3, abs=1e-3)
+    assert fit.parameters["mass"].value == pytest.approx(2, rel=2e-3)
+
+
+def test_a_force_recorded_more_than_a_period_early_is_called_a_dead_time():
+    found = cdf.diagnose(cdf.friction_mass(1.8, 3.3, 3.5), _recorded_early(0.6))
+    assert found.verdict == "effect" and {found.ranking[0].id, *found.ranking[0].equivalents} == {
+        "input_delay",
+        "sensor_delay",
+    }
+    assert found.best.model.effects[-1].delay == pytest.approx(0.6, abs=1e-3)
+
+
+def test_no_noise_is_faster_than_the_record():
+    """A force recorded late: an axis whose load rattles in a gap errs less, and faster than was measured."""
+    found = cdf.diagnose(
+        cdf.friction_mass(1.8, 3.3, 3.5), _recorded_early(-0.3), candidates=["backlash", "hard_stop"]
+    )
+    assert found.verdict == "unknown" and "A force recorded 0.3 s earlier" in found.explanation
+
+
 def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
     """Refitted without the drift the model is bent: what is small beside that explains nothing."""
     rng = np.random.default_rng(2)

@@ -198,6 +198,12 @@ class InputDelay(Effect):
         return (Delay(self.delay),)
 
     @classmethod
+    def regress(cls, screen):
+        """Yield a dead time that explains most of the force."""
+        for delay, values in screen.dead_times():
+            yield cls(delay), values
+
+    @classmethod
     def suggest_on_plane(cls, plane):
         """Return shares of the shortest period."""
         return plane.in_periods(cls)

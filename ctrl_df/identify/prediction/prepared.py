@@ -16,7 +16,8 @@ from ...blocks.primitives import Delay, Lag, PiecewiseAffine, Quantizer, Ramp
 from ...simulate.engine import Engine
 from ..data.measurement import Measurement
 from .decimated import decimated, lagged
-from .thresholds import LONG_BEFORE
+from .sensed import POSITION, sensed
+from .thresholds import EARLIER_INPUTS, LONG_BEFORE
 
 _DRIVES: WeakKeyDictionary[Measurement, dict] = WeakKeyDictionary()
 REFERENCE = ("reference", "r")
@@ -35,6 +36,7 @@ class PreparedModel:
     output: list = field(default_factory=list)  # (primitive, delay still to come)
     lags: list = field(default_factory=list)  # (state, samples)
     hold: str = ""  # between the values of the drive; as recorded if not said
+    earlier: int = 0  # values of the drive before the record that dead times let act in it, after the first
 
 
 def recorded_reference(record) -> np.ndarray | None:
@@ -96,17 +98,21 @@ def of_block(block, record, u, decimation: int, engine: Engine | None = None) ->
         engine = Engine(block.with_effects(kept) if outside else block)
     inner: Any = engine.system
     time, value, hold = _driven(record, held, decimation)
+    time = time + input_delay if input_delay else time
+    late = float(sum(delays)) if POSITION in sensed(record).columns else 0.0
+    time, value, earlier = _with_earlier(time, value, input_delay + late)
     lags = [(state, np.interp(t - input_delay, t, s)) for state, s in _lags(inner.core, record, held)]
     return PreparedModel(
         engine,
         inner.core,
         0,
-        time + input_delay if input_delay else time,
+        time,
         value,
         float(sum(delays)),
         output,
         lags,
         hold,
+        earlier,
     )
 
 
@@ -122,6 +128,18 @@ def _driven(record, held, decimation):
             time, value, hold = decimated(time, held, decimation)
         known[decimation] = (*_before(record, time, value), hold)
     return known[decimation]
+
+
+def _with_earlier(time, value, unseen: float):
+    """Give the last `unseen` seconds before a drive's first value places of their own, which values hold it.
+
+    Returns times, values, and how many these are.
+    """
+    if not unseen:
+        return time, value, 0
+    places = time[1] - unseen * np.arange(EARLIER_INPUTS, 0, -1) / EARLIER_INPUTS
+    held = np.full(EARLIER_INPUTS, value[0])
+    return np.insert(time, 1, places), np.insert(value, 1, held), EARLIER_INPUTS
 
 
 def _lags(core, record, signal):

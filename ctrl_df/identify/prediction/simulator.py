@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...blocks.mechanism import Mechanism
-from ...blocks.primitives import Lag, Ramp
+from ...blocks.primitives import Delay, Lag, Ramp
 from ...cached import cached_property
 from ...simulate.engine import State, sampled_drive
 from ...simulate.groups import grouped
@@ -21,13 +21,28 @@ from . import initial_states
 from .prepared import PreparedModel, of_block, of_loop, of_system
 from .segments import Segments, facts_of
 from .sensed import POSITION, sensed
-from .thresholds import FAR_LIMIT, FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
+from .thresholds import EARLIER_INPUTS, FAR_LIMIT, FORGOTTEN, RESTORING, STEPS_AT_LEAST, STEPS_PER_SAMPLE
 from .values import block_of, for_record, with_values
 
 Request = tuple[Segments, Mapping[str, float] | None, np.ndarray | None]
 """Windows, parameters that differ from the model's, corrections of the initial states."""
 
 _PREPARED = 16  # parameter sets whose models are kept ready: those of a Jacobian, and the one they are about
+
+
+class _Inputs:
+    """Times and values of inputs, each pair of arrays once: they are shared by segments and by models."""
+
+    def __init__(self):
+        self.pairs: list[tuple[np.ndarray, np.ndarray]] = []
+        self._known: dict[tuple[int, int], int] = {}
+
+    def add(self, time: np.ndarray, value: np.ndarray) -> int:
+        """Return the number of a pair, which is kept."""
+        number = self._known.setdefault((id(time), id(value)), len(self.pairs))
+        if number == len(self.pairs):
+            self.pairs.append((time, value))
+        return number
 
 
 def most_steps(samples):
@@ -108,15 +123,28 @@ class Simulator:
         """Names of the initial states estimated beside the parameters, per segment."""
         if not self.mechanism:
             return ()
-        return (*initial_states.fitted_names(self.block.core, self.begins), *self._unsettled)
+        return (*initial_states.fitted_names(self.block.core, self.begins), *self._unsettled, *self._earlier)
 
     @cached_property
     def _unsettled(self) -> dict[str, Lag]:
         """Lags of the input, whose first states nobody knows, by the names of their corrections."""
-        if not self.mechanism or self.closed or self.begins != initial_states.FREE:
+        if self._settled:
             return {}
         core = self.block.core
         return {core.state_names[state]: p for p, state in core.input_channel if isinstance(p, Lag)}
+
+    @cached_property
+    def _earlier(self) -> tuple[str, ...]:
+        """Names of the inputs before the record that dead times let act in it, less its first one."""
+        dead = (p for e in self.block.effects if e.role in ("input", "output") for p in e.channel())
+        if self._settled or not any(isinstance(p, Delay) for p in dead):
+            return ()
+        return tuple(f"input {i} before" for i in range(EARLIER_INPUTS))
+
+    @property
+    def _settled(self) -> bool:
+        """Whether what came before the record is taken as its first sample has it."""
+        return not self.mechanism or self.closed or self.begins != initial_states.FREE
 
     @cached_property
     def continued(self) -> bool:
@@ -132,14 +160,21 @@ class Simulator:
         """Return how far each initial state may be from its estimate, (nw, number of them)."""
         if not self.free_states:
             return np.zeros((len(segments), 0))
-        unsettled = self._unsettled
-        states = [n for n in self.free_states if n not in unsettled]
+        unsettled, earlier = self._unsettled, self._earlier
+        states = [n for n in self.free_states if n not in unsettled and n not in earlier]
         reach = initial_states.reach(states, self.block.core, self.facts, segments)
         since = self.record.t[segments.begins] - self.record.t[0]
         # a lag forgets: deep in the record its state is known
         begun = abs(float(self.input[0])) + self.facts.force
         forgets = [np.maximum(np.exp(-since / p.time_constant), FORGOTTEN) for p in unsettled.values()]
+        forgets += [np.where(self.acts(n, segments), 1.0, FORGOTTEN) for n in earlier]
         return np.column_stack((reach, *(begun * left for left in forgets)))
+
+    def acts(self, name: str, segments: Segments) -> np.ndarray:
+        """Return in which segments (nw,) an initial state shows: one of the time before the record in few."""
+        if name not in self._earlier:
+            return np.full(len(segments), True)
+        return self._unseen(self.prepared(None), segments)
 
     def run(
         self,
@@ -163,7 +198,7 @@ class Simulator:
             Corrections of the initial states: position [m], velocity [m/s], then for a joint with a gap its
             slack (0 to 1, None: from the acceleration) and its rate [m/s], for an elastic joint its
             deflection [m] and rate [m/s] beyond the steady one, for bristles the share of full deflection
-            beyond the steady one.
+            beyond the steady one, for lags and dead times the force before the record beyond its first [N].
         rounded : bool
             Whether an encoder of the model rounds the output. Fits leave it out: its steps have no slope.
 
@@ -247,19 +282,16 @@ class Simulator:
         edges = np.cumsum([0, *(len(segments) for segments, _, _ in asked)])
         ranges = [np.arange(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True)]
         x0, begins, lengths, drive = [], [], [], []
-        drives: dict[tuple[int, int], int] = {}  # shared by all segments, and by parts of one drive
+        drives = _Inputs()
         for part, (segments, _, start) in zip(parts, asked, strict=True):
             x0.append(self._starts(part, segments, start))
             begins.append(self.record.t[segments.begins] - self.late(part))
             lengths.append(segments.counts)
-            inputs = id(part.drive_time), id(part.drive_value)
-            drive.append(np.full(len(segments), drives.setdefault(inputs, len(drives))))
+            drive.append(self._driving(part, segments, start, drives))
         length = np.concatenate(lengths)
         first = np.concatenate(([0], np.cumsum(length)[:-1]))
-        known = {(id(p.drive_time), id(p.drive_value)): p for p in parts}
-        shared = [known[i] for i in drives]
         groups = grouped([(p.engine, rows) for p, rows in zip(parts, ranges, strict=True)])
-        sampled = self._sampled(shared)
+        sampled = self._sampled(drives, parts[0].hold)
         ends, outputs = np.concatenate((first, [int(np.sum(length))])), {}
         for columns, delays in self._readings(parts):
             every = np.concatenate(
@@ -278,15 +310,30 @@ class Simulator:
             for i, j in zip(edges[:-1], edges[1:], strict=True)
         ]
 
-    def _sampled(self, parts: Sequence[PreparedModel]) -> Drives:
+    def _driving(self, part, segments: Segments, start, drives: _Inputs) -> np.ndarray:
+        """Return which of the inputs drives each of the segments (nw,); those that are new are added."""
+        which = np.full(len(segments), drives.add(part.drive_time, part.drive_value))
+        if start is not None and self._earlier and part.earlier:
+            off = np.asarray(start)[:, -EARLIER_INPUTS:]
+            for w in np.flatnonzero(self._unseen(part, segments) & np.any(off != 0, axis=1)):
+                value = part.drive_value.copy()
+                value[1 : 1 + part.earlier] += off[w]
+                which[w] = drives.add(part.drive_time, value)
+        return which
+
+    def _unseen(self, part, segments: Segments) -> np.ndarray:
+        """Return whether segments begin while what came before the record still acts, (nw,) booleans."""
+        return self.record.t[segments.begins] - self.late(part) < part.drive_time[1 + part.earlier]
+
+    def _sampled(self, drives: _Inputs, hold: str) -> Drives:
         """Return what drives these, as the engine takes it; the last is kept, mostly asked for again."""
-        inputs = tuple(array for p in parts for array in (p.drive_time, p.drive_value))
+        inputs = tuple(array for pair in drives.pairs for array in pair)
         kept, sampled = self._kept_drives
         if len(kept) != len(inputs) or any(a is not b for a, b in zip(kept, inputs, strict=True)):
             sampled = sampled_drives(
                 np.array(inputs[::2]),
                 np.array(inputs[1::2])[:, None],
-                parts[0].hold or self.record.input_hold,
+                hold or self.record.input_hold,
             )
             self._kept_drives = inputs, sampled
         return sampled
@@ -379,13 +426,11 @@ class Simulator:
             return found
         some = segments.only(follows)
         times = self.record.t[np.column_stack((some.begins, segments.begins[follows + 1]))] - self.late(part)
-        engine, runs = part.engine, np.arange(len(follows))
+        engine, runs, drives = part.engine, np.arange(len(follows)), _Inputs()
+        drive = self._driving(part, some, start[follows], drives)
         result = run_many(
             grouped([(engine, runs)]), self._starts(part, some, start[follows]), times[:, 0], times[:, 1],
-            times.ravel(),
-            sampled_drives(
-                part.drive_time, part.drive_value[None, None], part.hold or self.record.input_hold
-            ),
+            times.ravel(), self._sampled(drives, part.hold), drive=drive,
             first=2 * runs, count=2, order=5, rtol=self.rtol,
             max_steps=most_steps(some.ends - some.begins),
         )  # fmt: skip

@@ -181,6 +181,14 @@ def far_off(fitted, names, stated) -> str:
     return f"Without any effect, but with {values}, the model errs by {percent(fitted.train.nrmse)}. {_UNITS}"
 
 
+def runs_ahead(seconds: float) -> str:
+    """Return that the motion comes before the force that would explain it."""
+    return (
+        f"A force recorded {digits(seconds)} s earlier would explain more of the motion: check whether force and "
+        "motion were recorded by one clock."
+    )
+
+
 _UNITS = "Check the units of record and model."
 
 

@@ -179,6 +179,10 @@ class Search(ABC):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
         return ()
 
+    def record_faults(self) -> tuple[str, ...]:
+        """Return a sentence for every fault of the records that would explain what no effect does."""
+        return ()
+
     def predicted(self, candidate) -> tuple[Any, tuple] | None:
         """Return a model and the records that it is to predict; None where there is nothing to predict."""
         return None

@@ -15,7 +15,8 @@ from ..estimation.thresholds import RESTARTS_KEPT
 from ..monitor import Monitor
 from ..prediction.segments import facts
 from ..prediction.sensed import POSITION, place_unit, sensed
-from ..results.explain import explains_nothing, far_off, grows
+from ..results.explain import explains_nothing, far_off, grows, runs_ahead
+from ..starting.dead_times import lead
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
@@ -195,6 +196,11 @@ class StructureSearch(Search):
     def open_directions(self):
         """Return a sentence for every direction of the model's parameters that leaves its output as it is."""
         return indistinguishable_parameters(self.at.base.train)
+
+    def record_faults(self):
+        """Return a sentence where the motion runs ahead of the force."""
+        ahead = lead(self.at.data, self.at.base.block)
+        return (runs_ahead(ahead),) if ahead else ()
 
     def predicted(self, candidate):
         """Return the model and the records held out (angles as these have them), or those fitted."""

@@ -160,14 +160,13 @@ class SegmentOutputs:
         for k, simulator in enumerate(self.simulators):
             begun = states.values[k]
             asked = [(self.segments[k], problem.values(q, k), begun) for q in thetas]
-            starts, widths = self._moved_starts(k, begun, self.segments[k], states.reach[k])
-            values = problem.values(theta, k)
-            asked += [(self.segments[k], values, start) for start in starts if start is not None]
+            moves = self._moves(k, begun, self.segments[k], states.reach[k])
+            asked += _requests(moves, problem.values(theta, k))
             signals = simulator.run_all(asked)
             for found, y in zip(moved, signals, strict=False):
                 found.append(y)
-            by_start.append(_by_start(starts, widths, signals[len(thetas) :], base[k], self._by_place(k)))
-            problem.nfev += len(starts) / len(self.simulators)
+            by_start.append(_by_start(moves, signals[len(thetas) :], base[k], self._by_place(k)))
+            problem.nfev += _share_run(moves, self.segments[k]) / len(self.simulators)
         problem.nfev += len(thetas)
         columns: list[Signals] = [[] for _ in self.segments]
         ready = iter(moved)
@@ -217,21 +216,20 @@ class SegmentOutputs:
         """
         segments, simulator = self.segments[k], self.simulators[k]
         some = segments.only(which)
-        moved, widths = self._moved_starts(k, starts, some, reach)
-        signals = simulator.run_all([(some, None, start) for start in moved if start is not None])
-        self.problem.nfev += len(moved) * len(some) / len(segments) / len(self.segments)
+        moves = self._moves(k, starts, some, reach)
+        signals = simulator.run_all(_requests(moves, None))
+        self.problem.nfev += _share_run(moves, some) * len(some) / len(segments) / len(self.segments)
         base = self.measured[k][seen] - residual
-        js = _by_start(moved, widths, signals, base, self._by_place(k)[seen])
+        js = _by_start(moves, signals, base, self._by_place(k)[seen])
         return products_of(js, residual, None, some)
 
-    def _moved_starts(self, k, starts, segments, reach):
-        """Move each initial state of one record: states (nw, ns), None where the derivative is 1; how far."""
+    def _moves(self, k, starts, segments, reach) -> list[_Move | None]:
+        """Move each initial state (nw, ns) of one record; None where the derivative is 1."""
         simulator, known = self.simulators[k], self.problem.known[k]
-        moved, widths = [], []
+        moves: list[_Move | None] = []
         for j, name in enumerate(simulator.free_states):
             if name == "x" and not simulator.position_dependent:
-                moved.append(None)
-                widths.append(None)
+                moves.append(None)
                 continue
             typical = {"x": known.position, "v": known.speed}.get(name)
             size = HIDDEN_NUDGE * reach[:, j]
@@ -240,9 +238,13 @@ class SegmentOutputs:
             trial = starts.copy()
             sign = np.where(trial[:, j] > SLACK_TURNED, -1.0, 1.0) if name == "slack" else np.ones(len(size))
             trial[:, j] += sign * size
-            moved.append(trial)
-            widths.append(segments.spread(sign * size))
-        return moved, widths
+            widths, which = segments.spread(sign * size), simulator.acts(name, segments)
+            if not np.all(which):
+                seen = segments.spread(which)
+                moves.append(_Move(segments.only(which), trial[which], widths[seen], seen))
+            else:
+                moves.append(_Move(segments, trial, widths, slice(None)))
+        return moves
 
     def _by_place(self, k) -> np.ndarray:
         """Return the derivatives by the place where no law knows it."""
@@ -282,11 +284,32 @@ class SegmentOutputs:
         return h, g, back
 
 
-def _by_start(starts, widths, signals, base, by_place) -> np.ndarray:
+@dataclass(frozen=True)
+class _Move:
+    """An initial state that is moved: in which segments, states (nw, ns), how far and where in the signal."""
+
+    segments: Segments
+    starts: np.ndarray
+    widths: np.ndarray
+    seen: Any
+
+
+def _requests(moves, values) -> list:
+    """Return what a simulator is asked for."""
+    return [(m.segments, values, m.starts) for m in moves if m is not None and len(m.segments)]
+
+
+def _share_run(moves, segments) -> float:
+    """Return how often segments are simulated; a derivative that is known counts as one."""
+    return sum(1.0 if m is None else len(m.segments) / len(segments) for m in moves)
+
+
+def _by_start(moves, signals, base, by_place) -> np.ndarray:
     """Return derivatives (n, ns) of one record's output by its initial states, all segments at once."""
-    moved = iter(signals)
-    rows = [
-        by_place if start is None else (next(moved) - base) / width
-        for start, width in zip(starts, widths, strict=True)
-    ]
-    return np.array(rows).T.reshape(len(base), len(rows))
+    moved, columns = iter(signals), np.zeros((len(base), len(moves)))
+    for j, move in enumerate(moves):
+        if move is None:
+            columns[:, j] = by_place
+        elif len(move.segments):
+            columns[move.seen, j] = (next(moved) - base[move.seen]) / move.widths
+    return columns

@@ -19,6 +19,7 @@ from ..estimation.segmented import SegmentedData
 from ..estimation.starts import continued_states
 from ..shooting.scales import Scales
 from ..thresholds import NOTHING
+from .dead_times import dead_times
 from .extend import extended
 from .regression import ForceFit, Start, force_fit, motion_of, regressed
 from .ripple_spectrum import Wave
@@ -32,7 +33,7 @@ class Screen:
 
     What `Effect.suggest` and `Effect.regress` may ask of it: `block`, `bodies`, `friction`, `scales`
     (``force``, ``position``, ``speed``, ``mass``, ``of(unit)``), `motion` (``u``, ``x``, ``v``, ``a``),
-    `force_fit`, `step`, `long_waves`, `waves`.
+    `force_fit`, `step`, `long_waves`, `waves`, `dead_times`.
 
     Parameters
     ----------
@@ -96,6 +97,10 @@ class Screen:
     def waves(self, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
         """Yield ripples of any length that explain most, with values of the model's parameters beside."""
         return waves(self, known)
+
+    def dead_times(self) -> Iterator[tuple[float, dict[str, float]]]:
+        """Yield a dead time [s] that explains most of the force, with values of the model's parameters."""
+        return dead_times(self.data, self.block)
 
     def project(self, signals) -> np.ndarray:
         """Remove what the baseline's parameters and initial states can explain."""

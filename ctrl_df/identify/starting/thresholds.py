@@ -16,6 +16,11 @@ STRONG = 0.5
 """Share of the mean squared force that is missing up to which a single law leaves: it takes more of it than
 all that is left, and the model's own parameters are bent by it."""
 
+DEAD_TIME_LONGEST, DEAD_TIME_STEP, DEAD_TIMES = 0.25, 0.5, 200
+"""Dead times tried: the longest over the record, of which three quarters then judge all of them; step over
+half the span in which a state is read off, so that one lies within a sixteenth of the shortest period of the
+right one; how many at most, a regression of a millisecond each."""
+
 RESONANCES, JOINT_DAMPING = np.geomspace(1.5, 40.0, 12), 0.1
 """Joints tried: resonance over the rate of the motion (its speed over its stroke), neighbours a third apart,
 so that one is within 16 % of any; damping ratio, of which the resonance is 20 % wide at half its power."""
