@@ -184,8 +184,8 @@ def far_off(fitted, names, stated) -> str:
 def runs_ahead(seconds: float) -> str:
     """Return that the motion comes before the force that would explain it."""
     return (
-        f"A force recorded {digits(seconds)} s earlier would explain more of the motion: check whether force and "
-        "motion were recorded by one clock."
+        f"A force recorded {digits(seconds)} s earlier would explain more of the motion: check whether force "
+        "and motion were recorded by one clock."
     )
 
 
