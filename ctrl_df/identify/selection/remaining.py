@@ -11,7 +11,8 @@ from ..prediction.segments import facts
 from ..residuals.missing_forces import FreeForce, missing_forces
 from ..residuals.regions import error_regions
 from ..results.explain import places
-from ..shooting.noise_model import NoiseModel, noise_of_outputs
+from ..shooting.noise_model import NoiseModel, prediction_errors
+from ..shooting.thresholds import NOISE_ORDER
 from ..smoothing.missing_force import missing_force
 from ..thresholds import BY_CHANCE, NOTHING
 from .evidence import rounding_error, rounds
@@ -62,7 +63,7 @@ def remainder(
     structure = missed[0].rms if telling else 0.0
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
-        most = min(most, _noise_most(best.train.rmse, data, noise))
+        most = min(most, _noise_most(best, data))
         structure = max(structure, math.sqrt(max(best.train.rmse**2 - most**2, 0.0)))
     spread = math.sqrt(max(best.train.rmse**2 - structure**2, 0.0))
     there = math.sqrt(max(base.train.rmse**2 - spread**2, structure**2, NOTHING))
@@ -87,15 +88,19 @@ def remainder(
     return Remainder(spread, max(structure, outside), unexplained, missed, more=more)
 
 
-def _noise_most(error: float, data: SegmentedData, noise: NoiseModel) -> float:
-    """Return how much of an error noise may make: no noise is harder to predict than a record that has it.
+def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
+    """Return how much of an error noise may make: none is harder to predict than a record that has it.
 
-    `noise`: of the error, were it noise.
+    From as many values before; a predictor errs by the noise and by the signal, which do not know each other.
     """
-    outputs, segments = data.train.outputs, data.train.segments
-    pieces = [y[w] for y, windows in zip(outputs, segments, strict=True) for w in windows.slices]
-    recorded = noise_of_outputs(pieces, segments[0].outputs).sigma * by_chance(sum(map(len, outputs)))
-    return error * min(recorded / max(noise.sigma, NOTHING), 1.0)
+    windows, outputs = data.train.segments, data.train.segments[0].outputs
+    recorded = [y[w] for y, ws in zip(data.train.outputs, windows, strict=True) for w in ws.slices]
+    residuals, shares = best.train.residual_pieces, []
+    for i in range(outputs):
+        most, least = (prediction_errors(s[i::outputs], NOISE_ORDER) for s in (recorded, residuals))
+        n = min(len(most), len(least))
+        shares.append(float(np.min(most[:n] / np.maximum(least[:n], NOTHING))))
+    return best.train.rmse * min(by_chance(sum(map(len, recorded)) / outputs) * max(shares), 1.0)
 
 
 def _noisier(best: CandidateFit, coloured: NoiseModel) -> float:

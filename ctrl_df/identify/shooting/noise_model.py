@@ -7,7 +7,7 @@ last sample of one to the first of the next.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -178,19 +178,35 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = NOISE_ORDER_MOST
     Burg (1975); Schwarz (1978).
     """
     pieces = [residual] if isinstance(residual, np.ndarray) else residual
+    n, best = sum(map(len, pieces)), (math.inf, NoiseModel(np.zeros(0), 0.0))
+    for a, left in _burg(pieces, max_order):
+        if left > 0:
+            score = n * math.log(left) + len(a) * math.log(n)
+            best = min(best, (score, NoiseModel(a, math.sqrt(left))), key=lambda x: x[0])
+    return best[1]
+
+
+def prediction_errors(pieces: Pieces, max_order: int) -> np.ndarray:
+    """Return the rms errors with which the last 0, 1, ... `max_order` values predict the next one.
+
+    Fewer where pieces are short, or nothing is left.
+    """
+    return np.sqrt([max(left, 0.0) for _, left in _burg(pieces, max_order)])
+
+
+def _burg(pieces: Pieces, max_order: int) -> Iterator[tuple[np.ndarray, float]]:
+    """Yield coefficients and mean squared prediction error of order 0, 1, ..., by Burg's method."""
     pieces = [np.asarray(r, dtype=float) for r in pieces]
     n = sum(map(len, pieces))
     mean = sum(float(r.sum()) for r in pieces) / n
     forward = backward = [r - mean for r in pieces]
     left, a = power(forward) / n, np.zeros(0)
-    if left <= 0:
-        return NoiseModel(a, 0.0)
-    best = (n * math.log(left), a, left)
-    for order in range(1, min(max_order, min(map(len, pieces)) // 4) + 1):
+    yield a, left
+    for _ in range(min(max_order, min(map(len, pieces)) // 4)):
         forward, backward = [f[1:] for f in forward], [b[:-1] for b in backward]
         norm = power(forward) + power(backward)
         if norm <= 0:
-            break
+            return
         k = 2 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / norm
         forward, backward = (
             [f - k * b for f, b in zip(forward, backward, strict=True)],
@@ -199,11 +215,8 @@ def noise_model(residual: np.ndarray | Pieces, max_order: int = NOISE_ORDER_MOST
         a = np.append(a - k * a[::-1], k)
         left *= 1 - k * k
         if left <= 0:
-            break
-        score = n * math.log(left) + order * math.log(n)
-        if score < best[0]:
-            best = (score, a, left)
-    return NoiseModel(best[1], math.sqrt(best[2]))
+            return
+        yield a, left
 
 
 def averaged(x, segments, step: int) -> tuple[np.ndarray, np.ndarray]:
