@@ -241,6 +241,19 @@ class Effect:
         except (TypeError, ValueError):  # it needs more than parameters, or refuses these
             return None
 
+    @classmethod
+    def from_special(cls, special: Effect) -> Effect | None:
+        """Return one that begins as the special case that it `generalizes`; None where that says too little.
+
+        The base class takes over the parameters that both have, and leaves others at their defaults.
+        """
+        names = {name for name, _ in stated_parameters(cls)}
+        shared = {k: p.value for k, p in special.parameters.items() if k in names}
+        try:
+            return cls(**shared)
+        except (TypeError, ValueError):
+            return None
+
     @property
     def parameters(self) -> dict[str, Parameter]:
         """Its parameters by field name."""

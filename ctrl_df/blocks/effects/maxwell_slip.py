@@ -92,6 +92,11 @@ class MaxwellSlip(Effect):
                 yield cls(softest * sum(steps) * spread, spread)
 
     @classmethod
+    def from_special(cls, special):
+        """Return elements that slip nearly together."""
+        return cls(special.stiffness, 3.0, special.damping)
+
+    @classmethod
     def suggest_on_plane(cls, plane):
         """Yield elements that slip over shares of the swings."""
         for bend in plane.swing.over(4, 0.3, 0.3):

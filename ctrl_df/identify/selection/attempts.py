@@ -143,12 +143,14 @@ def fit_effects(
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in begun for a in found]
     rounds = _Rounds(run, screen, span, 1 if known else KEPT, GIVE_UP * reached)
-    later = {c.id: c.generalizes for c in kinds if c.generalizes in kinds}
+    later = {c.id: c for c in kinds if c.generalizes in kinds}
     best = rounds.fitted(
         [a for a in attempts if a.key not in later], _Best({}, min(screen.base.rmse, reached))
     )
-    again = [a for a in attempts if a.key in later and best.promises(later[a.key].id, screen.base.rmse)]
-    best = rounds.fitted(again, best)
+    promising = [c for c in later.values() if best.promises(c.generalizes.id, screen.base.rmse)]
+    further = [_attempt_from_special(c, best.fits[c.generalizes.id], screen, places, free) for c in promising]
+    further += [a for a in attempts if any(a.key == c.id for c in promising)]
+    best = rounds.fitted([a for a in further if a is not None], best)
     return [best.fits[c.id] for c in kinds if c.id in best.fits]
 
 
@@ -371,6 +373,19 @@ def _attempt_at(start: Start, screen: Screen, places: _Places, free) -> Attempt 
     begin = places.starts(block, start.values, many)
     effort = EFFORT_ILL_CONDITIONED if start.effect.ill_conditioned else EFFORT_TRIED
     return Attempt(key, block, names, places.data(many), *effort, screen.data.count(block, added), begin)
+
+
+def _attempt_from_special(cls, special: CandidateFit, screen, places: _Places, free) -> Attempt | None:
+    """Return the attempt at an effect from the fit of its special case; None where that says too little."""
+    effect = cls.from_special(special.block.effects[-1])
+    if effect is None:
+        return None
+    values = tuple((k, special.block.parameters[k].value) for k in free)
+    attempt, data = _attempt_at(Start(effect, 0.0, values), screen, places, free), screen.data
+    if attempt is None:
+        return None
+    # near a minimum long segments have no others, once its own hidden states are found
+    return replace(attempt, data=data, starts=data.states_of(attempt.block).starts)
 
 
 def _first_steps(job) -> Attempt:

@@ -113,13 +113,19 @@ class Reference:
 
     def rebased(self, found: Sequence[CandidateFit], free: tuple[str, ...]) -> Reference:
         """Refit the model from its parameters in the best candidates: it may be in a wrong minimum."""
-        base = self.base
-        for best in found[:2]:
-            values = {k: best.block.parameters[k].value for k in free}
-            again = self.data.fit(with_values(base.block, values), free, iterations=BASE_STEPS)
-            if again.rmse < base.train.rmse:
-                base = CandidateFit("", again)
-        return replace(self, base=base)
+        base = refitted_from(found, self.base.train, self.data, free)
+        return replace(self, base=CandidateFit("", base))
+
+
+def refitted_from(
+    found: Sequence[CandidateFit], base: FitResult, data: SegmentedData, free: tuple[str, ...]
+) -> FitResult:
+    """Return a model refitted over segments from its parameters in the best candidates, or as it is."""
+    for best in found[:2]:
+        values = {k: best.block.parameters[k].value for k in free}
+        again = data.fit(with_values(base.model, values), free, iterations=BASE_STEPS)
+        base = min(base, again, key=lambda f: f.rmse)
+    return base
 
 
 def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str, ...]) -> Reference:

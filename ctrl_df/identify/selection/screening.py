@@ -15,7 +15,7 @@ from ..thresholds import BY_CHANCE, GROWTH
 from .attempts import fit_effects
 from .equivalence import restarted_from_better
 from .evidence import ranked
-from .reference import Reference
+from .reference import Reference, refitted_from
 from .thresholds import (
     CONFIRMED,
     EFFORT_MOVED,
@@ -101,7 +101,10 @@ class Screening:
         """Return the model and every effect fitted over every second of the segments for validation."""
         data = at.data.sampled
         base = data.moved(at.base.train, RIVAL_BASE_STEPS)
-        return base, self._fitted_over(at, data, base, base, self._short(at, data), screened)
+        found = self._fitted_over(at, data, base, base, self._short(at, data), screened)
+        # these segments may lack what bends the model in all of them: a stop that is seldom reached
+        base = refitted_from(found, base, data, self.free)
+        return base, ranked(CandidateFit("", base), found)[0]
 
     def _fitted_over(
         self,
