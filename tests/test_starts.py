@@ -13,6 +13,7 @@ from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.residuals.rounding import rounding_evidence
 from ctrl_df.identify.selection.attempts import _attempts_of, _Places
 from ctrl_df.identify.selection.equivalence import restarted_from_better
+from ctrl_df.identify.selection.reference import refitted_from
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
@@ -227,6 +228,22 @@ def test_no_noise_is_faster_than_the_record():
         cdf.friction_mass(1.8, 3.3, 3.5), _recorded_early(-0.3), candidates=["backlash", "hard_stop"]
     )
     assert found.verdict == "unknown" and "A force recorded 0.3 s earlier" in found.explanation
+
+
+def test_a_model_bent_by_other_segments_is_refitted_from_the_best_candidates():
+    run = record(PLAIN)
+    data, free = prepare(PLAIN, [run]).segmentations[-1], default_free(PLAIN)
+    bent = data.fit(PLAIN.with_parameters({"mass": 3.5, "viscous.coefficient": 1.0}), free, iterations=0)
+    found = CandidateFit("constant_force", data.fit(PLAIN.with_effect(cdf.ConstantForce(0.0)), free))
+    assert refitted_from([found], bent, data, free).rmse < 1e-3 * bent.rmse
+    assert refitted_from([], bent, data, free) is bent
+
+
+def test_a_general_law_begins_as_its_special_case():
+    bristle = cdf.Bristle(4000.0, 30.0)
+    assert cdf.MaxwellSlip.from_special(bristle) == cdf.MaxwellSlip(4000.0, 3.0, 30.0)
+    assert cdf.Compliance.from_special(bristle) == cdf.Compliance(4000.0, 30.0)  # what both have
+    assert cdf.Viscous.from_special(bristle) is None
 
 
 def test_an_effect_stronger_than_all_else_begins_beside_the_users_values():
