@@ -7,6 +7,7 @@ for all of them at once.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -103,16 +104,22 @@ def _strong(cls, screen) -> Iterator[tuple[Effect, dict[str, float]]]:
     except (TypeError, ValueError):
         return
     block, motion = extended(screen.block, one), screen.motion
-    columns = () if block is None else own_columns(block, motion.u, motion.x, motion.v)
-    name = "" if block is None else f"{block.newest}.{next(iter(one.parameters))}"
-    column = dict(columns).get(name)
-    if column is None:
+    if block is None:
         return
-    fit = screen.force_fit([column])
-    if fit.sensible and fit.left < STRONG * screen.force_fit([]).left:
-        p = next(iter(one.parameters.values()))
-        if p.lower <= fit.weights[0] <= p.upper:
-            yield cls(fit.weights[0]), fit.values
+    p, most = next(iter(one.parameters.values())), STRONG * screen.force_fit([]).left
+    name = f"{block.newest}.{next(iter(one.parameters))}"
+    column = dict(own_columns(block, motion.u, motion.x, motion.v)).get(name)
+    if column is not None:
+        fit = screen.force_fit([column])
+        size, values = fit.weights[0], fit.values
+    elif name in (dry_level(block), viscous_slope(block)):
+        # plain friction: of a model that has it the regression is where fits begin, however much it takes
+        fit, most = force_fit(motion, screen.scales, block, []), math.inf
+        size, values = fit.values.get(name, 0.0), {k: v for k, v in fit.values.items() if k != name}
+    else:
+        return
+    if fit.sensible and fit.left < most and p.lower <= size <= p.upper:
+        yield cls(size), values
 
 
 def force_fit(motion: Motion, scales: Scales, block, columns) -> ForceFit:
