@@ -239,6 +239,17 @@ def test_a_model_bent_by_other_segments_is_refitted_from_the_best_candidates():
     assert refitted_from([], bent, data, free) is bent
 
 
+def test_plain_friction_begins_at_the_regression_of_the_model_that_has_it():
+    slick, run = cdf.Mass(2.0).with_effect(cdf.Viscous(3.0)), record(PLAIN, steps=False)
+    data = prepare(slick, [run]).segmentations[-1]
+    bent = data.fit(slick.with_parameters({"viscous.coefficient": 20.0}), (), iterations=0)
+    (start,) = regressed(cdf.Coulomb, Screen(bent, data))
+    values = dict(start.values)
+    assert start.effect.level == pytest.approx(0.4, rel=0.1)
+    assert values["mass"] == pytest.approx(2, rel=0.05)
+    assert values["viscous.coefficient"] == pytest.approx(3, rel=0.05)
+
+
 def test_a_general_law_begins_as_its_special_case():
     bristle = cdf.Bristle(4000.0, 30.0)
     assert cdf.MaxwellSlip.from_special(bristle) == cdf.MaxwellSlip(4000.0, 3.0, 30.0)
