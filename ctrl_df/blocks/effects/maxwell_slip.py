@@ -94,7 +94,8 @@ class MaxwellSlip(Effect):
     @classmethod
     def from_special(cls, special):
         """Return elements that slip nearly together."""
-        return cls(special.stiffness, 3.0, special.damping)
+        known = special.parameters
+        return cls(known["stiffness"].value, 3.0, known["damping"].value)
 
     @classmethod
     def suggest_on_plane(cls, plane):
