@@ -200,7 +200,7 @@ class InputDelay(Effect):
     @classmethod
     def regress(cls, screen):
         """Yield a dead time that explains most of the force."""
-        for delay, values in screen.dead_times():
+        for delay, values in screen.dead_times:
             yield cls(delay), values
 
     @classmethod

@@ -41,7 +41,7 @@ class SensorDelay(Effect):
     @classmethod
     def regress(cls, screen):
         """Yield a dead time that explains most of the force."""
-        for delay, values in screen.dead_times():
+        for delay, values in screen.dead_times:
             yield cls(delay), values
 
     @classmethod

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ...blocks.core import kinetic_level
+from ...cached import cached_property
 from ...checks import above
 from ..estimation.fit import FitResult
 from ..estimation.segmented import SegmentedData
@@ -98,9 +99,10 @@ class Screen:
         """Yield ripples of any length that explain most, with values of the model's parameters beside."""
         return waves(self, known)
 
-    def dead_times(self) -> Iterator[tuple[float, dict[str, float]]]:
-        """Yield a dead time [s] that explains most of the force, with values of the model's parameters."""
-        return dead_times(self.data, self.block)
+    @cached_property
+    def dead_times(self) -> tuple[tuple[float, dict[str, float]], ...]:
+        """A dead time [s] that explains most of the force, with values of the model's parameters, if any."""
+        return tuple(dead_times(self.data, self.block))
 
     def project(self, signals) -> np.ndarray:
         """Remove what the baseline's parameters and initial states can explain."""
