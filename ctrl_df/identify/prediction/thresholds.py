@@ -39,7 +39,7 @@ RESTORING = 0.1
 """Force between two rms positions to either side, over the typical one, with which free runs do not drift: a
 force that the model lacks of one per cent then moves its rest by 0.4 rms positions at most."""
 
-STEPS_PER_SAMPLE, STEPS_AT_LEAST = 60, 20_000
+STEPS_PER_SAMPLE, STEPS_AT_LEAST = 10, 500
 """Steps of a run at most, a sample and besides: a model that takes more (chatter, laws far stiffer than the
 record) is of no use to a fit, and is given up before it holds up the others."""
 

@@ -40,7 +40,8 @@ from .thresholds import (
     SPECTRUM_SAMPLES,
 )
 
-_PLAIN = ("dry", "linear", "constant")
+_FORCES = ("dry", "linear", "constant", "unequal to both sides", "elastic", "drag")
+_PLAIN, _ELASTIC = _FORCES[:3], "elastic"
 
 
 @dataclass(frozen=True)
@@ -68,10 +69,14 @@ class RippleSpectrum:
         Records, evenly sampled, and the parts of each that count (one of 20 samples at least).
     known : sequence of float
         Wave numbers [rad/m] of ripples that the model has already.
+    elastic : bool
+        Whether the model has a force that depends on the place.
     """
 
-    def __init__(self, records: Sequence, segments: Sequence, known: Sequence[float] = ()):
-        self.records = records
+    def __init__(
+        self, records: Sequence, segments: Sequence, known: Sequence[float] = (), elastic: bool = False
+    ):
+        self.records, self.elastic = records, elastic
         self.places = [_smoothed(r) for r in records]
         self.span = max(float(np.ptp(x)) for x in self.places)
         # the band of the motion and some of the noise above it
@@ -124,7 +129,8 @@ class RippleSpectrum:
         waves = [np.exp(1j * k * x) for x in self.places]
         pairs = self._apart(self._response(waves))
         # what a drive may have besides blurs the parameters of what it does have
-        plain = self._base[: len(_PLAIN) + 1]
+        has = [True, *(name in _PLAIN or (self.elastic and name == _ELASTIC) for name in _FORCES)]
+        plain = [column for column, there in zip(self._base, has, strict=False) if there]
         columns = [[part(p) for p in pair] for pair in pairs for part in (np.imag, np.real)]
         w = self._regressed([*plain, *columns])
         if w[0] <= 0:
@@ -204,7 +210,7 @@ def _fade(length: int) -> np.ndarray:
 
 
 def _forces(record, place) -> list[np.ndarray]:
-    """Return forces that a drive may have: those of `_PLAIN`, then unequal to both sides, elastic, drag."""
+    """Return forces that a drive may have, those of `_FORCES`."""
     v = facts(record).velocity
     return [-np.sign(v), -v, np.ones(len(v)), -np.abs(v), place, v * np.abs(v)]
 

@@ -70,7 +70,8 @@ def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, floa
     view, _ = screen.data.whole or (screen.view, None)
     if not all(r.regular for r in view.records):
         return
-    search = RippleSpectrum(view.records, view.segments, [2 * math.pi / length for length in known])
+    has = [2 * math.pi / length for length in known]
+    search = RippleSpectrum(view.records, view.segments, has, screen.block.core.position_dependent)
     # where friction drifts the fit over segments knows the mass better than whitened forces do
     plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
     for wave in search.best(RIPPLES):
