@@ -46,6 +46,28 @@ def test_short_waves(seed):
     assert first.gain > second.gain + 10
 
 
+def test_beside_a_spring_that_the_model_has():
+    """A slow axis held stiffly: without the spring, which hides it, its mass came out below nothing."""
+    t = np.arange(4000) * 2e-3
+    x, v, h, k, places, forces = 0.0, 0.0, 2e-4, 2 * math.pi / 0.032, [], []
+    for wanted in (0.15 * np.sin(0.4 * math.pi * t)).tolist():
+        places.append(x)
+        forces.append(2e4 * (wanted - x) - 400 * v)
+        for _ in range(10):
+            pull = forces[-1] - 1.4 * math.sin(k * x + 1) - 60 * x
+            free = v + h / MASS * (pull - VISCOUS * v)
+            v = math.copysign(max(abs(free) - h / MASS * 5.0, 0.0), free)
+            x += h * v
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(t.size)
+    run = cdf.Measurement(t, np.array(forces), np.array(places) + noise)
+    plain, beside = (RippleSpectrum([run], [cut(run, 4)], elastic=e).best(1) for e in (False, True))
+    assert not plain or abs(plain[0].wavelength - 0.032) > 0.01
+    # measured 5.08 kg, 0.03194 m, 1.39 N
+    assert beside[0].wavelength == pytest.approx(0.032, rel=5e-3)
+    assert beside[0].amplitude == pytest.approx(1.4, rel=0.1)
+    assert beside[0].mass == pytest.approx(MASS, rel=0.05)
+
+
 def moves(ripple, dt=4e-3):
     """Return a run of a servo: three moves of 30 rad/s, held in between by torques below friction."""
     rng = np.random.default_rng(2)

@@ -11,10 +11,12 @@ from ctrl_df.identify.prediction import initial_states
 from ctrl_df.identify.prediction.segments import make_segments
 from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.residuals.rounding import rounding_evidence
+from ctrl_df.identify.selection import confirmation
 from ctrl_df.identify.selection.attempts import _attempts_of, _Places
 from ctrl_df.identify.selection.equivalence import restarted_from_better
 from ctrl_df.identify.selection.reference import refitted_from
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
+from ctrl_df.identify.shooting.noise_model import prediction_errors
 from ctrl_df.identify.shooting.variables import default_free
 from ctrl_df.identify.starting.extend import applicable
 from ctrl_df.identify.starting.like_another import like_another
@@ -174,6 +176,11 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
     bump, lost = PLAIN.with_effect(cdf.Stribeck(0.9, 1e-3)), PLAIN.with_effect(cdf.Stiction(0.5))
     found = [CandidateFit(b.newest, data.fit(b, tuple(b.parameters), iterations=0)) for b in (bump, lost)]
     again = {t.key: t.train for t in restarted_from_better(found, data, PLAIN)}
+    # and so where only longer segments tell that it was lost; what nothing can act as stays
+    fits = [data.fit(PLAIN, ()), *(t.train for t in found), None]
+    base, first, second, none = confirmation._from_better(fits, data, PLAIN)
+    assert (base, first, none) == (fits[0], fits[1], None)
+    assert second.rmse == pytest.approx(again["stiction"].rmse, rel=1e-9)
     # 26 times the noise as it was lost, 0.95 begun again
     assert again["stiction"].rmse < 1.1 * data.noise < found[1].train.rmse / 10
 
@@ -222,12 +229,22 @@ def test_a_force_recorded_more_than_a_period_early_is_called_a_dead_time():
     assert found.best.model.effects[-1].delay == pytest.approx(0.6, abs=1e-3)
 
 
-def test_no_noise_is_faster_than_the_record():
-    """A force recorded late: an axis whose load rattles in a gap errs less, and faster than was measured."""
-    found = cdf.diagnose(
-        cdf.friction_mass(1.8, 3.3, 3.5), _recorded_early(-0.3), candidates=["backlash", "hard_stop"]
-    )
+def test_a_force_recorded_late_is_told_beside_unknown():
+    found = cdf.diagnose(cdf.friction_mass(1.8, 3.3, 3.5), _recorded_early(-0.3), candidates=["hard_stop"])
     assert found.verdict == "unknown" and "A force recorded 0.3 s earlier" in found.explanation
+
+
+def test_no_noise_is_harder_to_predict_than_a_record_that_has_it():
+    rng, t = np.random.default_rng(4), np.arange(4000)
+    noise = rng.standard_normal(len(t))
+    slow = np.convolve(rng.standard_normal(len(t)), np.ones(10) / 10, "same")
+    for signal in (noise, slow):
+        of_record = prediction_errors([signal + 20 * np.sin(t / 90)], 12)
+        assert np.all(of_record > 0.98 * prediction_errors([signal], 12))
+    # twice the noise: this residual has something else in it
+    assert np.min(prediction_errors([noise + 20 * np.sin(t / 90)], 12)) < 0.6 * np.min(
+        prediction_errors([2 * noise], 12)
+    )
 
 
 def test_a_model_bent_by_other_segments_is_refitted_from_the_best_candidates():

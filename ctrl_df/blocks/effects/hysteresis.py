@@ -36,7 +36,7 @@ class Hysteresis(Effect):
 
     force: float = parameter("N", meaning="saturated force")
     stroke: float = parameter("m", strict=True, default=0.01, meaning="stroke over which it builds up")
-    shape: float = parameter("", lower=1.0, default=2.0, free=False, meaning="sharpness of the bend")
+    shape: float = parameter("", lower=1.0, default=2.0, meaning="sharpness of the bend")
 
     role: ClassVar[str] = "force"
     states: ClassVar[int] = 1

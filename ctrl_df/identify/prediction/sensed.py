@@ -95,8 +95,8 @@ def sensed(record: Measurement) -> Sensed:
 
 
 def noise_of(t, y) -> float:
-    """Return the noise floor of an output, that of computed numbers at least."""
-    return max(derivatives.noise_floor(t, y), NOISE_FREE * float(np.std(y)))
+    """Return the noise floor of an output, that of computed numbers at least; above 0 even of one at rest."""
+    return max(derivatives.noise_floor(t, y), NOISE_FREE * float(np.std(y)), NOTHING)
 
 
 def place_unit(record: Measurement) -> str:

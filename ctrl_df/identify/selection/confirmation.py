@@ -27,7 +27,7 @@ from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
-from .equivalence import matching_along
+from .equivalence import matching_along, restarted_from_better
 from .evidence import misses_lines, ranked, rounds
 from .reference import Reference
 from .thresholds import (
@@ -214,13 +214,28 @@ def stages(at: Reference, fits: Sequence[FitResult]) -> tuple[Stages, float]:
     floor = FLOOR * min(f.rmse for f in short)
     if at.data.disturbed:
         return [short], floor
-    near = over(middle, fits, short, floor)
-    far = over(longest, near, near, floor)
+    near = _from_better(over(middle, fits, short, floor), middle, at.base.block)
+    far = _from_better(over(longest, near, near, floor), longest, at.base.block)
     likely = STILL_POSSIBLE * min(f.rmse for f in far if f is not None)
     both = side_by_side(
         lambda pair: _reconciled(middle, longest, pair[0], pair[1], likely), zip(near, far, strict=True)
     )
     return [short, [n for n, _ in both], [f for _, f in both]], floor
+
+
+def _from_better(fits: list[FitResult | None], data: SegmentedData, block) -> list[FitResult | None]:
+    """Start candidates that fall behind over longer segments from the best one, if their laws can act as its.
+
+    Short segments leave a static level open by what single samples pass; over long ones a level that is off
+    by so little errs far more.
+    """
+    there = [CandidateFit(str(i), f) for i, f in enumerate(fits) if i and f is not None]
+    if not there:
+        return fits
+    best = min(there, key=lambda t: t.train.rmse)
+    behind = [t for t in there if t.train.rmse > GROWTH * best.train.rmse]
+    again = {t.key: t.train for t in restarted_from_better([best, *behind], data, block, 1)}
+    return [again.get(str(i), f) for i, f in enumerate(fits)]
 
 
 def _reconciled(

@@ -31,7 +31,9 @@ def matching_along(data: SegmentedData, block) -> Callable:
     return lambda effect, other: like_another(effect, other, motion.x, motion.v)
 
 
-def restarted_from_better(found: Sequence[CandidateFit], data: SegmentedData, block) -> list[CandidateFit]:
+def restarted_from_better(
+    found: Sequence[CandidateFit], data: SegmentedData, block, best_ones: int = CONFIRMED
+) -> list[CandidateFit]:
     """Start candidates from the fit of a better one whose law theirs can represent.
 
     A spring is a pendulum over a small angle; what breaks away is the limit of a narrow bump over speed: no
@@ -45,6 +47,8 @@ def restarted_from_better(found: Sequence[CandidateFit], data: SegmentedData, bl
         The data that they are fitted to.
     block : Mechanism
         The model without them.
+    best_ones : int
+        How many of the first others may start from.
 
     Returns
     -------
@@ -52,7 +56,7 @@ def restarted_from_better(found: Sequence[CandidateFit], data: SegmentedData, bl
         In the same order.
     """
     matching = matching_along(data, block)
-    pairs = [(t, best) for i, best in enumerate(found[:CONFIRMED]) for t in found[i + 1 :]]
+    pairs = [(t, best) for i, best in enumerate(found[:best_ones]) for t in found[i + 1 :]]
     matches = side_by_side(lambda pair: matching(*(t.block.effects[-1] for t in pair)), pairs)
     able = [
         (*pair, match)
