@@ -7,9 +7,9 @@ import ctrl_df as cdf
 from ctrl_df.df import threads, work
 from ctrl_df.df.dispatch import method_for
 from ctrl_df.limit_cycles.finder import OrbitFinder
-from ctrl_df.simulate.beside import flow
 from ctrl_df.simulate.engine import Engine, constant_drive
 from ctrl_df.simulate.kernel import driver
+from ctrl_df.simulate.mode_flow import flow
 from ctrl_df.simulate.section import intervals
 
 HARDENING = cdf.Mass(9.0, [cdf.Coulomb(5), cdf.Viscous(0.5), cdf.LinearSpring(200.0), cdf.CubicSpring(1e5)])

@@ -90,7 +90,7 @@ class Run:
     states: np.ndarray  # (nt, nx)
     recorded: int
     steps: int
-    propagated: int  # steps taken by constant propagators, see `ctrl_df.simulate.kernel.glide`
+    propagated: int  # steps taken by constant propagators, see `ctrl_df.simulate.kernel.propagators`
     event_count: int
     events: tuple[np.ndarray, np.ndarray, np.ndarray]  # time, node, kind
     before: np.ndarray  # state just before the event that stopped the run

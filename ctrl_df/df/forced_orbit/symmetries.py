@@ -14,7 +14,7 @@ import numpy as np
 
 from ...blocks.mechanism import Mechanism
 from ...simulate.engine import Engine, constant_drive
-from ...simulate.kernel.look import look_at
+from ...simulate.kernel.evaluation import evaluate_each
 from ...simulate.program import layout as L
 from ..thresholds import ALIKE, AT_REST, GRAIN, INPUT_DECADES, PROBES, RIPPLED, SHIFTS, STATE_DECADES
 
@@ -133,7 +133,7 @@ class Probe:
         dx, g, y = np.zeros(x.shape), np.full((m, self.ng + 1), np.inf), np.zeros((m, engine.noutputs))
         drive, times = constant_drive(np.zeros(engine.ninputs)), np.broadcast_to(t, m).astype(float)
         inputs = np.asarray(u, float)
-        look_at(prog, drive, times, x, inputs, engine.modes, engine.space.work, dx, g, y)
+        evaluate_each(prog, drive, times, x, inputs, engine.modes, engine.space.work, dx, g, y)
         for node in prog.nodes:
             mine = slice(node[L.G], node[L.G] + node[L.NG])
             # what a quantizer does with its steps shows in the rates, or it does nothing

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...simulate.beside import flow
 from ...simulate.engine import Drive, Engine, State, constant_drive
 from ...simulate.kernel import driver
-from ...simulate.kernel.look import jump, look
+from ...simulate.kernel.evaluation import evaluate, jump
+from ...simulate.mode_flow import flow
 from ...simulate.program import layout
 from ...status import Status
 from ..thresholds import NOTHING
@@ -78,7 +78,9 @@ class Tracer:
     def rate_and_margins(self, t, x, mode, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Rates of a state in a mode, and its event margins, which look `reach` [s] ahead."""
         dx = np.zeros(self.n)
-        look(self.engine.program, self.drive, t, x, mode, self._work, dx, self._g, self._none, False, reach)
+        evaluate(
+            self.engine.program, self.drive, t, x, mode, self._work, dx, self._g, self._none, False, reach
+        )
         return dx, self._g.copy()
 
     def trace(self, state: State, length: float, differentiate: bool = True, size=None) -> PeriodTrace:

@@ -64,7 +64,7 @@ class Memory(NamedTuple):
     order: np.ndarray  # (2,): modes that are known, and modes that this run has met
     ready: (
         np.ndarray
-    )  # (SLOTS * LENGTHS * ranks,) whether it has propagators, see `ctrl_df.simulate.kernel.glide`
+    )  # (SLOTS * LENGTHS * ranks,) whether it has propagators, see `ctrl_df.simulate.kernel.propagators`
     a: np.ndarray  # (SLOTS, n, n)
     b: np.ndarray  # (SLOTS, n, nr)
     d: np.ndarray  # (SLOTS, n)

@@ -59,9 +59,9 @@ from ..thresholds import (
     ZENO,
 )
 from .affine import crossing, forced, recall, series, shrink
-from .glide import forget_run
 from .locate import NOW, bump_share, complete, locate_event, margins, may_touch, renewed, tolerances, worst
 from .outputs import accumulate, next_sample, record, record_inside, remember, start_delays, tick
+from .propagators import forget_run
 from .space import space_at, workspace
 from .stepper import grains, inside, prepare, prepare8, roughness, step
 

@@ -5,9 +5,9 @@
 In such a mode dx/dt = A x + B r + c + d t + Q q(x, t); q are the forces of the curved laws and the rates of
 their own states (`affine`). With J = A + Q K and the remainder R = q - K x the affine part
 is taken exactly, inputs that are held or interpolated included, and R as a polynomial through m + 1 equal
-parts of the step, foretold from the step before. Each node, once known, changes what is foretold behind it by
-D_i u (u - 1) .. (u - i + 1) / i!, u counting nodes: x_k = E_k z + P_k p + sum_i G_ki D_i at node k, i < k,
-z = (x, r, s, t, 1) as in `glide` and p the parabola foretold; the matrices are the same in
+parts of the step, predicted from the step before. Each node, once known, changes what is predicted behind it
+by D_i u (u - 1) .. (u - i + 1) / i!, u counting nodes: x_k = E_k z + P_k p + sum_i G_ki D_i at node k, i < k,
+z = (x, r, s, t, 1) as in `propagate` and p the parabola predicted; the matrices are the same in
 every step of a length. What the last node changes, G_mm D_m, is the difference between the results with
 polynomials of degree m - 1 and m: the error of the former, asked to stay within the tolerance of a step (the
 result is the latter). The curved laws are evaluated once a node: twice a step (m = 2), and up to eight times
@@ -44,7 +44,7 @@ BINOMIAL = np.array([[math.comb(k, i) for k in range(MOST + 1)] for i in range(M
 
 
 class Bend(NamedTuple):
-    """What the curved laws add to a `ctrl_df.simulate.kernel.glide.Glide`."""
+    """What the curved laws add to a `ctrl_df.simulate.kernel.propagators.Propagators`."""
 
     base: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): rows E_k, P_k of all nodes
     gain: np.ndarray  # (SLOTS * LENGTHS * RANKS, room): G_ki, as they are needed
@@ -129,7 +129,7 @@ def bent_step(prog, node, mode, acting, push, dx, nodes, slope, curled, base, ga
     width = here.shape[0]
     nz = width - 3 * nq
     at_r, at_d, sigma, binomial = nz + nq, nz + 2 * nq, h / m, lean(BINOMIAL)
-    # --- the remainder here and, foretold, ahead: a parabola through the last nodes of the step before
+    # --- the remainder here and, predicted, ahead: a parabola through the last nodes of the step before
     if not goes_on:
         ask(prog, node, t, here, mode, acting, push, dx, nodes[0], nz)
     for f in range(nq):

@@ -11,7 +11,7 @@ import numpy as np
 from ..compiler.compiled import apart, part
 from ..compiler.native import native_address
 from ..program.layout import H_AFFINE, H_HISTORY, Drive, Program
-from .glide import glide
+from .propagators import propagate
 from .space import Space, space_at, workspace
 
 
@@ -39,9 +39,9 @@ def affine_pace(
     prog, drive, space, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout, scale, rtol, atol,
     long, next_tick,
 ):  # fmt: skip
-    """`glide` where all laws are affine; returns the steps gone, and leaves in `Space.led` where they led."""
+    """`propagate` where all laws are affine; returns the number of steps, `Space.led` has where they led."""
     room = space_at(space)
-    return _led(room, glide(
+    return _led(room, propagate(
         prog, drive, room.work, room.store, room.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
         xout, yout, room.size, scale, rtol, atol, long, room.grain, next_tick, room.x1, room.xi, room.dx,
         room.g, None,
@@ -55,7 +55,7 @@ def curved_pace(
 ):  # fmt: skip
     """Do the same where some laws are not."""
     room = space_at(space)
-    return _led(room, glide(
+    return _led(room, propagate(
         prog, drive, room.work, room.store, room.tracks, slot, t, t_end, hmax, segment, index, x, mode, tout,
         xout, yout, room.size, scale, rtol, atol, long, room.grain, next_tick, room.x1, room.xi, room.dx,
         room.g, room.bend,
@@ -64,7 +64,7 @@ def curved_pace(
 
 @part(inline=True)
 def _led(room, gone):
-    """Keep where `glide` has led; return the steps gone."""
+    """Keep where `propagate` has led; return the steps gone."""
     room.led[0], room.led[1], room.led[2], room.led[3] = gone[1], gone[2], gone[3], gone[4]
     room.led[4] = 1.0 if gone[5] else 0.0
     return gone[0]

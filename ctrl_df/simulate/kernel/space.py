@@ -27,7 +27,7 @@ from ..program.layout import (
 from ..thresholds import TERMS
 from .affine import Memory, memory
 from .exponential import Bend, bend_memory
-from .glide import Glide, glide_memory
+from .propagators import Propagators, propagator_memory
 from .stepper import STAGES
 
 _NONE = np.zeros(0, np.int64)
@@ -57,7 +57,7 @@ class Space(NamedTuple):
     owner: np.ndarray  # node of each margin
     memo: np.ndarray  # events without progress, time of the last one, whether the next call goes on
     store: Memory
-    tracks: Glide
+    tracks: Propagators
     bend: Bend
     paced: np.ndarray  # (1,): address of the steps at a pace, see `pace`; 0: none are taken
     led: np.ndarray  # where the last of these led: time, segment, next output, next tick, whether one ticked
@@ -103,7 +103,7 @@ def workspace(prog, delays: bool = False):
     store = memory(prog)
     space = Space(
         work, np.zeros((STAGES, n)), np.zeros((TERMS, n)), x1, xi, dx, size, grain, g, g0, gtol, lowest, norm,
-        owner, np.zeros(3), store, glide_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])),
+        owner, np.zeros(3), store, propagator_memory(store, bool(prog.ints[H_AFFINE]), int(prog.ints[H_NY])),
         bend_memory(store), np.zeros(1, np.int64), np.zeros(5), _NONE, 0,
     )  # fmt: skip
     words = LAYOUT.pack(space)

@@ -60,7 +60,7 @@ USABLE, USELESS = 1, 2  # entries of `Memory.ready`
 RANK, LEFT = 2, 3  # entries of `Bend.state`
 
 
-class Glide(NamedTuple):
+class Propagators(NamedTuple):
     """Propagators of the modes a `Memory` knows, one for each length and rank, and scratch.
 
     Rows: states (unless laws are curved), margins, outputs.
@@ -86,14 +86,14 @@ class Glide(NamedTuple):
     values: np.ndarray  # (nz * nz,)
 
 
-def glide_memory(memory: Memory, usable: bool, ny: int) -> Glide:
+def propagator_memory(memory: Memory, usable: bool, ny: int) -> Propagators:
     """Allocate the propagators that go with a memory; small where none can be used."""
     slots, n, nr = memory.b.shape
     used = memory.ready.shape[0]
     margins = memory.rows.shape[1] if usable else 0
     nz = n + 2 * nr + 2 if usable else 0
     rows = n + margins + ny if usable else 0
-    return Glide(
+    return Propagators(
         np.zeros(LENGTHS), np.zeros(1, np.int64), np.zeros((used, rows + 1), np.int64),
         np.zeros((used, rows * nz), np.int64), np.zeros((used, rows * nz)),
         np.zeros((used, margins), np.int64), np.zeros(used, np.int64), np.zeros((used, margins), np.int64),
@@ -116,8 +116,8 @@ def forget_run(store, tracks):
 
 
 @part
-def glide(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout, yout,
-          size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g, bend):  # fmt: skip
+def propagate(prog, drive, work, store, tracks, slot, t, t_end, hmax, segment, index, x, mode, tout, xout,
+              yout, size, scale, rtol, atol, long, grain, next_tick, x1, xi, dx, g, bend):  # fmt: skip
     """Go on from `t` over as many steps as hold no event.
 
     `bend` goes with curved laws; where there are none it is None, and the branches that need it are not even
@@ -278,8 +278,8 @@ def _march(
 ):  # fmt: skip
     """Go on from sample to sample as long as nothing but the inputs changes, every sample an output or none.
 
-    These are the steps of `glide`, without what it asks at each of them. `t` is the time of the sample after
-    `segment`. Returns how many, and the next output's index.
+    These are the steps of `propagate`, without what it asks at each of them. `t` is the time of the sample
+    after `segment`. Returns how many, and the next output's index.
     """
     time, samples = drive.time, drive.samples
     here, ahead, bound, slack = tracks.here, tracks.ahead, tracks.bound, tracks.slack
@@ -333,7 +333,7 @@ def _straight(
     here, ahead, bound, slack, curved, active, live, fed, owner, first, column, values, stale, jumped, scale,
     n,
 ):  # fmt: skip
-    """Take an affine step from `here` to `ahead`, fields of a `Glide`; whether no event lies inside.
+    """Take an affine step from `here` to `ahead`, fields of a `Propagators`; whether no event lies inside.
 
     `stale`: bounds, slack and the margins here are to be taken anew; `jumped`: the inputs have.
     """

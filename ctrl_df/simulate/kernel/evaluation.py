@@ -1,6 +1,6 @@
 # pyright: reportCallIssue=false
 # (numba's stubs know neither its private options nor the arguments of an intrinsic)
-"""States looked at from Python: rates, margins and outputs there, and the jump of one event."""
+"""What Python asks of single states: rates, margins and outputs there, and the jump of one event."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .locate import complete
 
 
 @njit(error_model="numpy")
-def look(prog, drive, t, x, mode, work, dx, g, y, settled, reach):
+def evaluate(prog, drive, t, x, mode, work, dx, g, y, settled, reach):
     """Write rates to `dx`, margins to `g` and outputs to `y` (as many as it has room for) at one state.
 
     With `settled` the modes (and what they reset) are brought in line first. Margins that need the rate of an
@@ -33,7 +33,7 @@ def look(prog, drive, t, x, mode, work, dx, g, y, settled, reach):
 
 
 @njit(error_model="numpy")
-def look_at(prog, drive, t, x, u, mode, work, dx, g, y):
+def evaluate_each(prog, drive, t, x, u, mode, work, dx, g, y):
     """Write rates `dx`, margins `g` and outputs `y` at each of many states `x` (m, n), modes settled first.
 
     All inputs are held at `u` (m,) at the times `t` (m,), as the harmonics of order zero of `drive`; every
