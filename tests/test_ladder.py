@@ -169,6 +169,27 @@ def test_the_end_is_exchanged_for_a_better_neighbour():
     assert study.steps[-1].diagnosis.verdict == "none"
 
 
+def test_what_can_act_as_the_effect_of_the_end_begins_as_that():
+    """Of its own start a spring does not come as far as the pendulum that it is over a small angle."""
+
+    class Acting(Given):
+        def acting_as(self, effect, other):
+            return cdf.LinearSpring(2.0) if (effect.id, other.id) == ("linear_spring", "hysteresis") else None
+
+    class Stiff(Data):
+        def level(self, block):
+            stiff = any(e == cdf.LinearSpring(2.0) for e in block.effects)
+            return super().level(block) + (300 if stiff else 0)
+
+        def search(self, block, free):
+            return Acting(self, block, free)
+
+    study = ladder_of(Stiff({"": 0, "hysteresis": 510, "linear_spring": 500, "constant_force": 50}))
+    assert (
+        study.effects == ("linear_spring",) and study.model.parameters["linear_spring.stiffness"].value == 2
+    )
+
+
 def test_two_that_stood_in_for_one_are_merged():
     # a bad optimum: beside either half the right one shows what it can do, and the other half is idle
     levels = {"": 0, "constant_force": 300, "linear_spring": 200, "hysteresis": 150, "stiction": 180,

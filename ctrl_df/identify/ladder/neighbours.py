@@ -67,9 +67,11 @@ class Neighbourhood:
     def _fitted(self, block, iterations):
         return self.search.fitted(block, self.free(block), iterations)
 
-    def fit(self, trial: Trial) -> None:
-        """Fit one to the data on which the model is validated."""
-        self.refitted.append((trial, self._fitted(trial.structure.block, STEPS_NEIGHBOUR)))
+    def fit(self, trial: Trial, *others) -> None:
+        """Fit one to the data on which the model is validated, from its block or `others`; keep the best."""
+        fits = [self._fitted(block, STEPS_NEIGHBOUR) for block in (trial.structure.block, *others)]
+        best = self.search.ranked_over(self.own, fits)[0].block if others else fits[0].block
+        self.refitted.append((trial, next(f for f in fits if f.block is best)))
 
     # --- an effect less ---------------------------------------------------------------------------------
 
@@ -95,14 +97,24 @@ class Neighbourhood:
         nearest = others[:RIVALS]
         for t in [*again, *nearest]:
             rivals = (old, *(o.block.effects[-1] for o in nearest if o is not t))
-            self.fit(
-                Trial(EXCHANGE, (old.id,), t.block.effects[-1].id, alternatives.less.plus(t.block, rivals))
-            )
+            new = t.block.effects[-1]
+            trial = Trial(EXCHANGE, (old.id,), new.id, alternatives.less.plus(t.block, rivals))
+            self.fit(trial, *(self._in_place(place, new) if t in nearest else ()))
         for t in others[RIVALS:]:
             added = t.block.effects[-1].id
             self.screened.append(
                 _row(EXCHANGE, (old.id,), added, t.evidence, alternatives.errors(t), WORSE, False, t.block)
             )
+
+    def _in_place(self, place: int, effect) -> list:
+        """Return the model as it is with an effect that acts as the one of that place; none where none can.
+
+        A spring is a pendulum over a small angle: of its own start its fit may not come as far.
+        """
+        at = self.structure.at(self.own.block)
+        like = self.search.acting_as(effect, at.added[place])
+        block = None if like is None else exchanged(at.without(place).block, like)
+        return [] if block is None else [block]
 
     def merge(self) -> None:
         """Drop a second effect where an exchange is no worse than the model: one effect may replace two.

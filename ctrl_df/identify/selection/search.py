@@ -195,9 +195,9 @@ class Search(ABC):
     def equivalent(self, a, b) -> bool:
         """Whether two confirmed candidates are equivalent on these data, within noise."""
 
-    def represents(self, effect, other) -> bool:
-        """Whether an effect can act as another one along the motion, with other values."""
-        return False
+    def acting_as(self, effect, other):
+        """Return an effect with the values with which it acts as another one along the motion; or None."""
+        return None
 
     def in_full(self):
         """Return the model without an effect as a whole refit has it; None: no better than it is."""

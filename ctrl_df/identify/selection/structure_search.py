@@ -142,9 +142,9 @@ class StructureSearch(Search):
             return True
         return indistinguishable(a.outputs, b.outputs, self.at.noise)
 
-    def represents(self, effect, other) -> bool:
-        """Whether an effect can act as another one along the motion, with other values."""
-        return matching_along(self.at.data, self.at.base.block)(effect, other) is not None
+    def acting_as(self, effect, other):
+        """Return an effect with the values with which it acts as another one along the motion; or None."""
+        return matching_along(self.at.data, self.at.base.block)(effect, other)
 
     # --- results --------------------------------------------------------------------------------------
 

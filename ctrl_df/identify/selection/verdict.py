@@ -272,7 +272,7 @@ def favoured_held_out(ranking, search: Search) -> list[CandidateEffect]:
         for c in others
         if ahead.get(c.id, 0.0) > search.significant_validation
         and c.id not in first.equivalents
-        and not search.represents(first.effect, c.effect)
+        and search.acting_as(first.effect, c.effect) is None
     ]
     return sorted(found, key=lambda c: -ahead[c.id])
 
