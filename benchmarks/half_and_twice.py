@@ -1,6 +1,6 @@
 """What half and twice of tuned numbers change on a few rigs.
 
-    python benchmarks/half_and_twice.py smoothing|planning|refit|horizons|records|tables [NAME ...]
+    python benchmarks/half_and_twice.py smoothing|planning|refit|horizons|records|ladder|tables [NAME ...]
 
 NAME is a constant of a ``thresholds.py``, ``NAME[1]`` one number of several, ``A+B`` both at once. One line
 for each of the two factors and each rig: what comes out otherwise than with the number as it is, and the
@@ -61,6 +61,15 @@ def records(name) -> dict:
     }  # fmt: skip
 
 
+def ladder(name) -> dict:
+    """Return the model that a ladder ends with."""
+    options = {k: v for k, v in RIGS[name][2].items() if k != "ladder"}
+    rig, model = drawn(*RIGS[name][:2], **options)
+    free = [k for k, p in model.parameters.items() if p.free and k not in rig.known]
+    study = cdf.improve(model, rig.train[0].measurement(), rig.holdout[0].measurement(), free=free)
+    return {"effects": " ".join(study.effects), "error": study.steps[-1].nrmse_holdout}
+
+
 def refit(name) -> dict:
     """Return a refit of the true structure from values a quarter off, to either side in turn."""
     rig, _ = drawn(*RIGS[name][:2], **RIGS[name][2])
@@ -118,6 +127,7 @@ PARTS = {
         records,
         ("ripple, open", "stribeck, open", "backlash, open", "joint, PID", "outside, open", "drag, gap"),
     ),
+    "ladder": (ladder, ("two, ladder",)),
     "refit": (refit, ("stribeck, open", "spring, open", "backlash, open", "joint, PID")),
     "horizons": (horizons, ("ripple, open", "stribeck, open", "joint, PID")),
     "tables": (tables, ("drag", "delay", "breakaway", "gap")),

@@ -117,7 +117,7 @@ away."""
 CONFIRMED, CONFIRMED_FORCED = 6, 10
 """Most candidates that are refitted at the full rate: two, and all that screening left near the best; where
 disturbance forces let it distinguish little. Each costs as much as the whole screening of several effects;
-half and twice were not tried."""
+half and twice change nothing on three rigs."""
 
 REFUTED_MOST = 2
 """Candidates that long horizons refute, after each of which the search is repeated without it: a
