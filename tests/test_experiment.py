@@ -34,7 +34,7 @@ def play(rig, plan, seed):
 
 
 CASES = [
-    # seeds 16 to 18 are all told as stiction, by 38 to 167 nats
+    # of seeds 16 to 18 the first and the last are told as stiction, by 38 to 167 nats
     ("stiction", "stribeck", 18, True),
     ("linear_spring", "cubic_spring", 3, False),
 ]
