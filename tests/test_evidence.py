@@ -155,5 +155,7 @@ def candidate(id, fitted, held, same=()):
 )
 def test_a_rival_that_the_held_out_data_favour(rival, favoured):
     first = candidate("backlash", 500.0, 50.0, same=("bristle",) if rival.equivalents else ())
-    search = SimpleNamespace(significant_validation=5.0, represents=lambda _, other: other == "alike")
+    search = SimpleNamespace(
+        significant_validation=5.0, acting_as=lambda _, other: other if other == "alike" else None
+    )
     assert [c.id for c in favoured_held_out([first, rival], search)] == favoured

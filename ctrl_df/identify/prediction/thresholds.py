@@ -39,11 +39,11 @@ RESTORING = 0.1
 """Force between two rms positions to either side, over the typical one, with which free runs do not drift: a
 force that the model lacks of one per cent then moves its rest by 0.4 rms positions at most."""
 
-STEPS_PER_SAMPLE, STEPS_AT_LEAST = 10, 500
-"""Steps of a run at most, a sample and besides. A step of fifth order covers a good part of a radian: a run
-that takes ten a sample moves several times faster than the record can show (chatter, laws far stiffer than
-it), is of no use to a fit, and would hold up the others. The best fits of nine rigs take 4 at most, 14 on
-their way; 60 let a gap of a micrometre that bounces without loss take an hour."""
+STEPS_PER_SAMPLE, STEPS_AT_LEAST = 30, 5_000
+"""Steps of a run at most, a sample and besides: a run that takes more moves far faster than the record can
+show (chatter, laws far stiffer than it), is of no use to a fit, and would hold up the others. The best fits
+of nine rigs take 4 a sample at most, 14 on their way; a joint in presliding sampled slowly is lost at 10 and
+found at 20. 60 let a gap of a micrometre that bounces without loss take an hour."""
 
 TURNS_SAMPLES = 2000
 """Samples among which turning points are counted: a record of a hundred swings has twenty in each."""

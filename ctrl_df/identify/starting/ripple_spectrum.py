@@ -40,8 +40,8 @@ from .thresholds import (
     SPECTRUM_SAMPLES,
 )
 
-_FORCES = ("dry", "linear", "constant", "unequal to both sides", "elastic", "drag")
-_PLAIN, _ELASTIC = _FORCES[:3], "elastic"
+_FORCES = {"dry": True, "linear": True, "constant": True, "unequal": False, "elastic": False, "drag": False}
+"""Forces that a drive may have, and whether every drive has them."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class RippleSpectrum:
         waves = [np.exp(1j * k * x) for x in self.places]
         pairs = self._apart(self._response(waves))
         # what a drive may have besides blurs the parameters of what it does have
-        has = [True, *(name in _PLAIN or (self.elastic and name == _ELASTIC) for name in _FORCES)]
+        has = [True, *(_FORCES | {"elastic": self.elastic}).values()]
         plain = [column for column, there in zip(self._base, has, strict=False) if there]
         columns = [[part(p) for p in pair] for pair in pairs for part in (np.imag, np.real)]
         w = self._regressed([*plain, *columns])
