@@ -43,7 +43,7 @@ STEPS_PER_SAMPLE, STEPS_AT_LEAST = 30, 5_000
 """Steps of a run at most, a sample and besides: a run that takes more moves far faster than the record can
 show (chatter, laws far stiffer than it), is of no use to a fit, and would hold up the others. The best fits
 of nine rigs take 4 a sample at most, 14 on their way; a joint in presliding sampled slowly is lost at 10 and
-found at 20. 60 let a gap of a micrometre that bounces without loss take an hour."""
+found at 20. 60 let a gap of a micrometre that bounces without loss take over a quarter of an hour."""
 
 TURNS_SAMPLES = 2000
 """Samples among which turning points are counted: a record of a hundred swings has twenty in each."""
