@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 import ctrl_df as cdf
 from ctrl_df.identify.estimation.multistart import no_worse_than
@@ -12,16 +13,18 @@ from ctrl_df.identify.estimation.segmented import CandidateFit, prepare
 from ctrl_df.identify.estimation.sigma_points import sigma_points
 from ctrl_df.identify.prediction.simulator import free_run
 from ctrl_df.identify.selection.evidence import ranked
+from ctrl_df.identify.selection.predictive import held_out, power_of
 from ctrl_df.identify.selection.verdict import favoured_held_out, is_significant
+from ctrl_df.identify.shooting.noise_model import NoiseModel
 from ctrl_df.identify.shooting.variables import Variable
 
 PLAIN = cdf.Mass(2.0).with_effect(cdf.Coulomb(0.4)).with_effect(cdf.Viscous(3.0))
 
 
-def made(block, seed, n=2500, dt=2e-3):
+def made(block, seed, size=1.0, n=2500, dt=2e-3):
     """Return a record of a block with noise."""
     rng, t = np.random.default_rng(seed), dt * np.arange(n)
-    u = 5 * np.sin((9 + seed) * t) + 3 * np.sin((31 - seed) * t)
+    u = size * (5 * np.sin((9 + seed) * t) + 3 * np.sin((31 - seed) * t))
     blank = cdf.Measurement(t, u, np.sin(t))
     return cdf.Measurement(t, u, free_run(block, blank) + 1e-4 * rng.normal(size=n))
 
@@ -85,6 +88,47 @@ def test_evidence_is_the_least_of_those_without_one_segment(fitted):
     whole = 0.5 * len(total[0]) * np.log(np.sum(total[0] ** 2) / np.sum(total[1] ** 2))
     count = sum(map(len, (data.train.segments[0], data.validation.segments[0])))
     assert 0.6 * (1 - 1 / count) * whole < ranking.evidence < whole
+
+
+def test_held_out_residuals_have_the_covariance_of_noise_and_of_what_parameters_are_uncertain_by():
+    rng, white = np.random.default_rng(0), NoiseModel(np.zeros(0), 1.0)
+    fitted, held = rng.normal(size=(40, 3)), 5 * rng.normal(size=(25, 3))
+    residual = 4 * rng.normal(size=25)
+
+    def at(pieces, residual):
+        return SimpleNamespace(response_pieces=[pieces], residual_pieces=[residual], slopes=np.ones(3))
+
+    tried = SimpleNamespace(
+        train=at(fitted, np.zeros(40)), validation=at(held, residual), validation_slopes=at(held, residual)
+    )
+    found = held_out(tried, white)
+    power = power_of(found.white[0], found.changes[0])
+    covariance = np.eye(25) + held @ np.linalg.solve(fitted.T @ fitted, held.T)
+    expected = multivariate_normal(np.zeros(25), covariance).logpdf(residual)
+    assert -0.5 * (power.squares + 25 * np.log(2 * np.pi)) - power.widening == pytest.approx(
+        expected, rel=1e-9
+    )
+    # which is the error of a fit to both
+    both, error = np.vstack((fitted, held)), np.concatenate((np.zeros(40), residual))
+    assert power.squares == pytest.approx(np.linalg.lstsq(both, error)[1][0], rel=1e-9)
+
+
+def test_a_parameter_that_is_off_by_two_standard_errors_speaks_for_no_effect():
+    # on a record that moves ten times as far it makes more than the noise
+    true = cdf.Mass(2.0).with_effect(cdf.Viscous(3.0)).with_effect(cdf.LinearSpring(20.0))
+    data = prepare(true, [made(true, 0, 0.1)], [made(true, 1)]).segmentations[1].fine
+    stiffness, names = "linear_spring.stiffness", tuple(true.parameters)
+    fit = data.fit(true, names)
+    there = fit.parameters[stiffness] + 2 * fit.standard_errors[stiffness]
+    near = data.fit(
+        fit.model.with_parameters({stiffness: there}), [n for n in names if n != stiffness], starts=fit.starts
+    )
+    off = data.fit(near.model, names, starts=near.starts, iterations=0)
+    least, moved = (data.validate(CandidateFit(key, f)) for key, f in (("", fit), ("off", off)))
+    held = least.validation.count
+    assert held * np.log(moved.validation_rmse / least.validation_rmse) > 50  # of noise alone
+    fitted = fit.count * np.log(off.rmse / fit.rmse)  # 2.5
+    assert ranked(least, [moved])[0][0].evidence == pytest.approx(-fitted, abs=5.0)
 
 
 def test_sigma_points_are_a_standard_deviation_off():

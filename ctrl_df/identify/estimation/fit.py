@@ -148,6 +148,13 @@ class FitResult:
         return self._pieces(self.simulated)
 
     @property
+    def response_pieces(self) -> list[np.ndarray]:
+        """Derivatives of the output by the parameters, as `residual_pieces`; none without parameters."""
+        if self.sensitivity is None:
+            return []
+        return self._pieces([columns / self.slopes for columns in self.sensitivity.responses])
+
+    @property
     def squares(self) -> list[float]:
         """Per record, the sum of squares of what the cost sees."""
         seen = self.residual

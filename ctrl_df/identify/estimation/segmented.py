@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,12 @@ class CandidateFit:
     evidence: float = 0.0
     evidence_validation: float = 0.0  # of the segments held out alone
     confirmed: bool = False
+    linear: Callable[[], FitResult] | None = field(repr=False, default=None)
+
+    @property
+    def validation_slopes(self) -> FitResult | None:
+        """The model as it is over the segments held out, with its derivatives there by what was fitted."""
+        return self.linear() if self.linear is not None else None
 
     @property
     def block(self):
@@ -330,7 +337,13 @@ class SegmentedData:
 
         These are not sought to the last where the error would stay above `give_up`.
         """
-        return replace(tried, validation=self._ran(tried.block, "validation", give_up))
+        held, names = self._ran(tried.block, "validation", give_up), tried.train.names
+
+        @cache
+        def linear() -> FitResult:
+            return self.fit(held.model, names, view=self.validation, starts=held.starts, iterations=0)
+
+        return replace(tried, validation=held, linear=linear)
 
     def starts_as(self, block, records, other: FitResult) -> list[np.ndarray]:
         """Return where segments of records begin for a model as they do for another."""

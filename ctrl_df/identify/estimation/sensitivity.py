@@ -26,11 +26,19 @@ class OutputSensitivity:
         Precision of what is known of the initial states beforehand, in units of one sample.
     error_filter : NoiseModel or None
         What fits see of the output, where that is not the output itself.
+
+    Attributes
+    ----------
+    responses : list of (n, p) arrays
+        Per record, derivatives of the output where initial states are refitted as parameters move.
+    parameters : list of (n, p) arrays
+        What fits see of these.
     """
 
     def __init__(self, parameters, states, segments, ridge, error_filter=None):
         self.states, self.segments, self.ridge, self.error_filter = states, segments, ridge, error_filter
-        self.parameters = [self._without_starts(k, j) for k, j in enumerate(parameters)]
+        self.responses = [self._without_starts(k, j) for k, j in enumerate(parameters)]
+        self.parameters = [self._as_seen(k, r) for k, r in enumerate(self.responses)]
         stacked = np.concatenate(self.parameters)
         norms = np.linalg.norm(stacked, axis=0)
         stacked = stacked[:, norms > 0] / norms[norms > 0]
@@ -40,15 +48,19 @@ class OutputSensitivity:
     def _without_starts(self, k, columns):
         """Remove from the columns (n, m) of one record what its initial states can explain."""
         out = np.array(columns, dtype=float)
-        if self.error_filter is not None:
-            return self.error_filter.filtered(out, self.segments[k].slices)
         states, segments = self.states[k], self.segments[k]
-        if states.shape[1]:
+        if self.error_filter is None and states.shape[1]:
             solved = states_for(products_of(states, out, None, segments), self.ridge[k])
             for i, column in enumerate(states.T):
                 for j in range(out.shape[1]):
                     out[:, j] -= column * segments.spread(solved[:, i, j])
         return out
+
+    def _as_seen(self, k, columns):
+        """Return what fits see of the columns (n, m) of one record."""
+        if self.error_filter is None:
+            return columns
+        return self.error_filter.filtered(columns, self.segments[k].slices)
 
     def absorbed_by_starts(self, k) -> np.ndarray:
         """Return columns B (n, m) of one record whose ``B @ B.T`` is what its initial states take away."""
@@ -132,7 +144,10 @@ class OutputSensitivity:
     def project(self, signals: Sequence[np.ndarray]) -> np.ndarray:
         """Return what fits see of signals, one array for all records, less what refitting could explain."""
         joined = np.concatenate(
-            [self._without_starts(k, np.reshape(e, (-1, 1)))[:, 0] for k, e in enumerate(signals)]
+            [
+                self._as_seen(k, self._without_starts(k, np.reshape(e, (-1, 1))))[:, 0]
+                for k, e in enumerate(signals)
+            ]
         )
         return joined - self._basis @ (self._basis.T @ joined)
 

@@ -20,6 +20,7 @@ from ..residuals.rounding import rounding_evidence
 from ..residuals.thresholds import COARSE
 from ..shooting.noise_model import NoiseModel, prediction_error_filter, whitened_power
 from ..thresholds import NOTHING
+from .predictive import Power, held_out, power_of
 from .thresholds import FINE, REFUTED, SAME_STEP
 
 
@@ -36,7 +37,7 @@ def ranked(base: CandidateFit, trials) -> tuple[list[CandidateFit], NoiseModel]:
     for t in trials:
         gain, gain_held = _rounded_gains(base, t) if rounds(t) else _gains(before, _powers(t, noise))
         # hardly more than initial states is fitted to validation segments: their gain also counts by itself
-        price = 0.5 * t.extra * math.log(before.fitted[1] + before.held[1])
+        price = 0.5 * t.extra * math.log(before.fitted.number + before.held)
         found.append(replace(t, evidence=gain - price, evidence_validation=gain_held))
     return sorted(found, key=lambda t: (t.evidence_validation < -REFUTED, -t.evidence)), noise
 
@@ -80,47 +81,51 @@ def _step(tried: CandidateFit) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Powers:
-    """Power and number of whitened residuals: (power, number) each.
+    """Power of whitened residuals.
 
     Attributes
     ----------
-    fitted, held : tuple
-        Of the segments fitted, and of those held out.
-    without : list of tuple
+    fitted : Power
+        Of the segments fitted.
+    without : list of Power
         Of those held out but one: each of them in turn. Where there is but one: of that one.
+    held : int
+        Number of residuals held out.
     """
 
-    fitted: tuple[float, int]
-    held: tuple[float, int]
-    without: list[tuple[float, int]]
+    fitted: Power
+    without: list[Power]
+    held: int
 
 
 def _powers(tried: CandidateFit, noise: NoiseModel) -> _Powers:
-    fitted = whitened_power(tried.train.residual_pieces, noise)
+    fitted = Power(*whitened_power(tried.train.residual_pieces, noise))
     if tried.validation is None:
-        return _Powers(fitted, (0.0, 0), [(0.0, 0)])
-    white = [noise.weighed(r, i) for i, r in enumerate(tried.validation.residual_pieces)]
-    squares = np.concatenate([r * r for r in white])
-    owners = list(zip(tried.validation.segment_of, white, strict=True))
+        return _Powers(fitted, [Power(0.0, 0)], 0)
+    held = held_out(tried, noise)
+    owners = list(zip(tried.validation.segment_of, held.white, strict=True))
     # a whitened value sees samples before it, too: across the bounds of segments it is of both
     last = np.concatenate([o[len(o) - len(r) :] for o, r in owners])
     first = np.concatenate([o[: len(r)] for o, r in owners])
-    held, number = (float(squares.sum()), len(squares)), 1 + int(np.max(last, initial=0))
-    others = [(last != i) & (first != i) for i in range(number)]
-    without = [(float(squares[o].sum()), int(o.sum())) for o in others]
-    return _Powers(fitted, held, without if number > 1 else [held])
+    white, changes = np.concatenate(held.white), np.concatenate(held.changes)
+    number = 1 + int(np.max(last, initial=0))
+    some = [(last != i) & (first != i) for i in range(number)] if number > 1 else [np.full(len(last), True)]
+    return _Powers(fitted, [power_of(white[o], changes[o]) for o in some], len(white))
 
 
 def _gains(before: _Powers, after: _Powers) -> tuple[float, float]:
     """Return the log likelihood ratio of all segments, and of those held out, less the one most for it.
 
     Held out a model may follow, or fail, in a single segment by luck, with an error that outweighs all
-    others: no effect may rest on one.
+    others: no effect may rest on one. What parameters are uncertain by is priced in that of all segments.
     """
-    (power, n), (power_t, _) = before.fitted, after.fitted
+    fitted, fitted_t = before.fitted, after.fitted
     return min(
-        (_gain(power + p, n + k, power_t + q), _gain(p, k, q))
-        for (p, k), (q, _) in zip(before.without, after.without, strict=True)
+        (
+            _gain(fitted.squares + p.squares, fitted.number + p.number, fitted_t.squares + q.squares),
+            _gain(p.squares, p.number, q.squares) + p.widening - q.widening,
+        )
+        for p, q in zip(before.without, after.without, strict=True)
     )
 
 
@@ -129,18 +134,22 @@ def _gain(power: float, number: int, power_t: float) -> float:
 
 
 def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, float]:
-    """Return the same for a sensor that rounds: against the baseline's residual under its own noise model."""
+    """Return the same for a sensor that rounds: against the baseline's residual under its own noise model.
+
+    Parameters count as they are, those of the baseline too.
+    """
     step = _step(tried)
-    powers = _powers(base, prediction_error_filter(base.residuals, None, base.train.outputs))
+    noise = prediction_error_filter(base.residuals, None, base.train.outputs)
+    powers = _powers(replace(base, linear=None), noise)
     # where a model errs by more than a step a sample counts as stray: luck is where the baseline errs most
-    lucky = min(range(len(powers.without)), key=lambda i: powers.without[i][0])
+    lucky = min(range(len(powers.without)), key=lambda i: powers.without[i].squares)
     left_out = lucky if len(powers.without) > 1 else -1
     gains = []
     for fit, plain, out in (
         (base.train, powers.fitted, -1),
         (base.validation, powers.without[lucky], left_out),
     ):
-        if fit is None or not plain[1]:
+        if fit is None or not plain.number:
             gains.append(0.0)
             continue
         kept = [segment != out for segment in fit.segment_of]
@@ -148,6 +157,7 @@ def _rounded_gains(base: CandidateFit, tried: CandidateFit) -> tuple[float, floa
         measured = [y + e[k] for y, e, k in zip(simulated, fit.residual_pieces, kept, strict=True)]
         # over the samples of the rounding's likelihood: a density has a unit, a ratio of two has none
         samples = sum(map(len, measured))
-        likelihood = -0.5 * samples * math.log(2 * math.pi * math.e * max(plain[0], NOTHING) / plain[1])
-        gains.append(rounding_evidence(measured, simulated, step) - likelihood)
+        variance = max(plain.squares, NOTHING) / plain.number
+        gauss = -0.5 * samples * math.log(2 * math.pi * math.e * variance)
+        gains.append(rounding_evidence(measured, simulated, step) - gauss)
     return sum(gains), gains[1]

@@ -75,7 +75,7 @@ def remainder(
     # the floors see what is fast: of two records with slow noise neither counts as the quieter one
     expected = _noisier(best, coloured) * spread * max(1.0, floors[1] / floors[0])
     if best.validation.rmse > expected:
-        expected = _at_most(expected, best, data, coloured)
+        expected = _at_most(expected, best, coloured)
     outside = math.sqrt(max(best.validation.rmse**2 - expected**2, 0.0))
     there_outside = math.sqrt(max(base.validation.rmse**2 - expected**2, outside**2, NOTHING))
     share = max(structure / there, outside / there_outside)
@@ -110,18 +110,19 @@ def _noisier(best: CandidateFit, coloured: NoiseModel) -> float:
     return by_chance(min(2 / sum(shares), INDEPENDENT_MOST))
 
 
-def _at_most(expected: float, best: CandidateFit, data: SegmentedData, coloured: NoiseModel) -> float:
+def _at_most(expected: float, best: CandidateFit, coloured: NoiseModel) -> float:
     """Return the error held out that noise makes, and parameters that are off by as much as may be chance.
 
     `expected`: of noise that initial states take as much of as on the segments fitted.
     """
-    names, covariance, held = best.train.names, best.train.covariance, best.validation
-    assert held is not None
-    there = data.fit(held.model, names, view=data.validation, starts=held.starts, iterations=0)
-    if there.sensitivity is None or best.train.sensitivity is None or len(there.slopes) != len(covariance):
+    covariance, there = best.train.covariance, best.validation_slopes
+    if there is None or len(there.slopes) != len(covariance):
         return expected
-    left = there.sensitivity.left_by_starts(coloured) / best.train.sensitivity.left_by_starts(coloured)
-    columns = np.concatenate(there.sensitivity.parameters) / there.slopes
+    known, known_held = best.train.sensitivity, there.sensitivity
+    if known is None or known_held is None:
+        return expected
+    left = known_held.left_by_starts(coloured) / known.left_by_starts(coloured)
+    columns = np.concatenate(known_held.parameters) / there.slopes
     if not (np.all(np.isfinite(covariance)) and np.all(np.isfinite(columns))):
         return math.inf  # nothing is known of some: they may be off by anything
     power = float(np.sum((columns @ covariance) * columns)) / len(columns) / there.unit**2
