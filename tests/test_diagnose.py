@@ -228,6 +228,20 @@ def test_a_time_in_another_unit_is_no_missing_effect(forced):
     assert found.verdict == "unknown" and "units" in found.explanation
 
 
+def test_a_spring_with_a_preload_is_one_effect(forced):
+    # its zero is not that of the encoder; alone, neither spring nor constant force explains half of it
+    t, force, _ = forced
+    machine = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(150.0, center=-0.1))
+    (x,) = np.asarray(cdf.event_response(machine, t, force + 18, initial_state=[0.02, 0.0]).outputs)[:1]
+    record = Measurement(t, force + 18, x + 1e-4 * np.random.default_rng(0).standard_normal(t.size))
+    found = diagnose(FORCED, record)
+    assert found.verdict == "effect" and found.best.id == "linear_spring"
+    assert found.best.parameters["center"] == pytest.approx(-0.1, rel=0.02)
+    assert found.best.parameters["stiffness"] == pytest.approx(150.0, rel=0.02)
+    # one that a model states stays where it is: what moves it is a force of its own
+    assert "linear_spring.center" not in cdf.refit(machine, record).parameters
+
+
 def test_a_joint_that_is_found_says_which_side_the_sensor_sees():
     axis = cdf.Inertia(0.1).with_effect(cdf.Coulomb(0.2))
     for side, other in (("load", "motor"), ("motor", "load")):

@@ -38,6 +38,10 @@ class Parameter:
         not lie below the kinetic one.
     per_record : bool
         Whether it is an angle that every record has anew (an encoder counts from another zero).
+    origin : bool
+        Whether it is where a law counts from, one zero of the encoder as good as another. A model that
+        states it keeps it, unless told otherwise; a diagnosis estimates that of an effect it adds, where that
+        explains more than a parameter costs.
     stepped : bool
         Whether outputs change in steps with it: no least squares moves it, it is read off the record.
     known_as : str
@@ -61,6 +65,7 @@ class Parameter:
     meaning: str = ""
     threshold: bool = False
     per_record: bool = False
+    origin: bool = False
     stepped: bool = False
     known_as: str = ""
     line_unit: str = ""
@@ -73,6 +78,11 @@ class Parameter:
     def one_sign(self) -> bool:
         """Whether a value may have any size but not change its sign."""
         return self.strict and self.lower in (0.0, -math.inf) and math.isinf(self.upper)
+
+    @property
+    def estimated(self) -> bool:
+        """Whether a fit moves it that has added its effect to a model: an origin only once it is off zero."""
+        return self.free or (self.origin and self.value != 0)
 
     def __float__(self) -> float:
         return self.value
@@ -89,6 +99,7 @@ def parameter(
     meaning="",
     threshold=False,
     per_record=False,
+    origin=False,
     stepped=False,
     known_as="",
 ) -> Any:
@@ -123,7 +134,7 @@ def parameter(
         )
     stated = dict(
         unit=unit, lower=lower, upper=upper, strict=strict, free=free, meaning=meaning, threshold=threshold,
-        per_record=per_record, stepped=stepped, known_as=known_as,
+        per_record=per_record, origin=origin, stepped=stepped, known_as=known_as,
     )  # fmt: skip
     return dataclasses.field(default=default, metadata={"parameter": stated})
 

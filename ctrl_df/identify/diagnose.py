@@ -120,7 +120,7 @@ def diagnose(
     kept = frozenset(block.parameters) - set(names)
 
     def search_with(model):
-        return dataset.search(model, [k for k in dataset.free_parameters(model) if k not in kept])
+        return dataset.search(model, dataset.estimated_parameters(model, kept))
 
     def work():
         monitor.stage("the model refitted")

@@ -93,7 +93,7 @@ def improve(
     start = dataset.with_own(start, own)
 
     def free_of(block) -> list[str]:
-        return [k for k in dataset.free_parameters(block) if k not in kept]
+        return dataset.estimated_parameters(block, kept)
 
     selection = StepwiseSelection(dataset, start, classes, free_of, max_effects, executor, monitor)
     return monitor.run(selection.run)

@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from ..effect import Effect, register_effect
 from ..parameter import parameter
 
@@ -28,13 +30,25 @@ class LinearSpring(Effect):
     """
 
     stiffness: float = parameter("N/m", lower=-math.inf, meaning="spring stiffness")
-    center: float = parameter("m", lower=-math.inf, default=0.0, free=False, meaning="position of zero force")
+    center: float = parameter(
+        "m", lower=-math.inf, default=0.0, free=False, origin=True, meaning="position of zero force"
+    )
 
     role: ClassVar[str] = "force"
     proportional: ClassVar[bool] = True
     affine: ClassVar[bool] = True
     shows: ClassVar[str] = "error proportional to position"
     source: ClassVar[str] = "Hooke"
+
+    @classmethod
+    def regress(cls, screen):
+        """Yield the springs that the slope of the force over the place says, without preload and with it."""
+        x = screen.motion.x
+        for columns in ([x], [x, np.ones(len(x))]):
+            fit = screen.force_fit(columns)
+            stiffness, preload = fit.weights[0], sum(fit.weights[1:])
+            if fit.sensible and stiffness:
+                yield cls(stiffness, -preload / stiffness), fit.values
 
     @staticmethod
     def law(t, x, v, z, p, dz):

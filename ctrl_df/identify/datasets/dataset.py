@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -74,6 +74,12 @@ class Dataset(ABC):
     def free_parameters(self, block, free=None) -> tuple[str, ...]:
         """Return the parameters that a fit to these data moves (see `arguments.free_parameters`)."""
         return free_parameters(block, free)
+
+    def estimated_parameters(self, block, kept: Collection[str]) -> list[str]:
+        """Return the parameters of a model with effects added that a fit moves, but those `kept`."""
+        added = {k for k, p in block.parameters.items() if p.estimated and not p.free}
+        names = added.union(self.free_parameters(block)).difference(kept)
+        return [k for k in block.parameters if k in names]
 
     def check_segments(self, mode, window) -> None:
         """Check how records are to be cut; tables are not."""

@@ -71,7 +71,7 @@ def exchanged(block, effect: Effect):
 
 def parameters_of(effect: Effect) -> int:
     """Return how many parameters of an effect a fit may move."""
-    return sum(p.free for p in effect.parameters.values())
+    return sum(p.estimated for p in effect.parameters.values())
 
 
 def plainness(effect: Effect) -> tuple:

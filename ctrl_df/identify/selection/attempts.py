@@ -77,9 +77,8 @@ class Attempt:
 
     @property
     def error(self) -> float:
-        """Error of the fit so far."""
-        assert self.fit is not None
-        return self.fit.rmse
+        """Error of the fit so far, by as much more as its parameters cost."""
+        return priced(self.trial)
 
     @property
     def multimodal(self) -> bool:
@@ -251,7 +250,7 @@ class _Rounds:
         fits = dict(best.fits)
         for t in found:
             known = fits.get(t.key)
-            if distinct(t, self.span) and (known is None or t.train.rmse < known.train.rmse):
+            if distinct(t, self.span) and (known is None or priced(t) < priced(known)):
                 fits[t.key] = t
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
@@ -276,6 +275,12 @@ def _ranked_starts(begun, screen: Screen) -> list[CandidateFit]:
         evidence = -samples * math.log(left) - 0.5 * extra * math.log(samples)
         found.append(CandidateFit(best.effect.id, fit, extra=extra, evidence=evidence))
     return sorted(found, key=lambda t: -t.evidence)
+
+
+def priced(tried: CandidateFit) -> float:
+    """Return the error at which a fit without further parameters would be as good as this one (Schwarz)."""
+    count = max(tried.train.count, 1)
+    return tried.train.rmse * count ** (0.5 * tried.extra / count)
 
 
 def distinct(fitted: CandidateFit, span) -> bool:
@@ -432,4 +437,4 @@ def _spread(effects, count):
 def own_names(block) -> tuple[str, ...]:
     """Return the parameters of a block's newest effect that a fit may move."""
     key = block.newest + "."
-    return tuple(k for k, p in block.parameters.items() if k.startswith(key) and p.free)
+    return tuple(k for k, p in block.parameters.items() if k.startswith(key) and p.estimated)

@@ -28,7 +28,7 @@ def like_another(effect: Effect, other: Effect, x: np.ndarray, v: np.ndarray) ->
     Effect or None
         None where it cannot do what the other does, or where the motion alone does not determine one.
     """
-    names = [k for k, p in effect.parameters.items() if p.free and not p.stepped]
+    names = [k for k, p in effect.parameters.items() if p.estimated and not p.stepped]
     if not (names and tells(effect) and tells(other)):
         return None
     every = max(len(x) // LIKE_SAMPLES, 1)

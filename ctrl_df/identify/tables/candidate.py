@@ -19,7 +19,7 @@ def try_effect(job) -> tuple[str, FittedTable, int] | None:
     grown, promising = best_starts(cls, block, points, slopes, free, scales, cls.table_starts, work)
     if not grown:
         return None
-    own = tuple(k for k in grown[0].parameters if k not in block.parameters and grown[0].parameters[k].free)
+    own = tuple(k for k, p in grown[0].parameters.items() if k not in block.parameters and p.estimated)
 
     def fitted(begin, iterations):
         return fit_either(

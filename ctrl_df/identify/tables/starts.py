@@ -177,9 +177,8 @@ def best_starts(
     common = START_COMMON * float(np.mean(size)) + NEARLY_NOTHING
     scored, unanswered = [], int(np.isnan(before).sum())
     begins = list(proposals(cls, block, points))
-    own = (
-        [k for k, p in begins[0].parameters.items() if k not in block.parameters and p.free] if begins else []
-    )
+    table = begins[0].parameters if begins else {}
+    own = [k for k, p in table.items() if k not in block.parameters and p.estimated]
     for grown in [*balanced(begins, (*free, *own), points, scales), *begins]:
         try:
             table = simulate_table(grown, points, work)
