@@ -270,6 +270,18 @@ def test_plain_friction_begins_at_the_regression_of_the_model_that_has_it():
     assert values["viscous.coefficient"] == pytest.approx(3, rel=0.05)
 
 
+def test_a_dead_zone_begins_with_friction_that_is_less_by_it():
+    # where a damped machine moves the two are one: the model without a dead zone has both for its friction
+    damped = PLAIN.with_parameters({"mass": 0.1, "viscous.coefficient": 60.0})
+    zone = damped.with_effect(cdf.InputDeadZone(0.3))
+    data = prepare(damped, [record(zone, steps=False)])
+    screen = Screen(data.fit(damped, default_free(damped)), data)
+    starts = list(regressed(cdf.InputDeadZone, screen))
+    assert len(starts) == 3
+    for start in starts:
+        assert start.effect.threshold + dict(start.values)["coulomb.level"] == pytest.approx(0.7, rel=0.1)
+
+
 def test_a_general_law_begins_as_its_special_case():
     bristle = cdf.Bristle(4000.0, 30.0)
     assert cdf.MaxwellSlip.from_special(bristle) == cdf.MaxwellSlip(4000.0, 3.0, 30.0)

@@ -84,6 +84,14 @@ class InputDeadZone(Effect):
         return (PiecewiseAffine.from_corners((-d, d), (1, 0, 1), (d, 0, -d)),)
 
     @classmethod
+    def regress(cls, screen):
+        """Yield shares of the dry friction, taken from it: where the machine moves the two are one."""
+        fit = screen.force_fit([])
+        if fit.sensible and fit.friction > 0:
+            for share in (0.25, 0.5, 0.75):
+                yield cls(share * fit.friction), fit.with_friction(1 - share)
+
+    @classmethod
     def suggest_on_plane(cls, plane):
         """Return shares of the model's friction, taken from it."""
         return plane.taken_from_friction(cls)

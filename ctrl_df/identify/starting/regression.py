@@ -76,6 +76,8 @@ class ForceFit:
         The model's own parameters; empty where they make no sense.
     sensible : bool
         Whether they do.
+    dry : str or None
+        Name of the level of dry friction among them.
     """
 
     weights: tuple[float, ...]
@@ -83,6 +85,11 @@ class ForceFit:
     friction: float
     values: dict[str, float]
     sensible: bool
+    dry: str | None = None
+
+    def with_friction(self, share: float) -> dict[str, float]:
+        """Return the model's own parameters with a share of the dry friction."""
+        return {k: share * v if k == self.dry else v for k, v in self.values.items()}
 
 
 def regressed(cls, screen) -> Iterator[Start]:
@@ -130,7 +137,7 @@ def force_fit(motion: Motion, scales: Scales, block, columns) -> ForceFit:
     sensible = values is not None
     return ForceFit(
         tuple(map(float, weights)), left, (values or {}).get(dry or "", 0.0),
-        {**values, **own} if sensible else {}, sensible,
+        {**values, **own} if sensible else {}, sensible, dry,
     )  # fmt: skip
 
 
