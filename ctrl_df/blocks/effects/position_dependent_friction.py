@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from ..effect import Effect, register_effect
 from ..parameter import parameter
 
@@ -55,49 +53,11 @@ class PositionDependentFriction(Effect):
 
     @classmethod
     def suggest(cls, screen):
-        """Yield long waves by what they change in the output, and those that explain most of the force."""
-        for amplitude, wavelength, phase in screen.long_waves(cls)[:2]:
-            yield cls(min(amplitude, 2.0 * screen.scales.force), wavelength, phase)
-        for turns, pair in _waves(screen)[:4]:
-            size = min(float(np.hypot(*pair)), 2.0 * screen.scales.force)
-            for factor in (1.0, 0.5):
-                yield cls(factor * size, float(np.ptp(screen.motion.x)) / turns, math.atan2(pair[1], pair[0]))
+        """Yield the long waves that explain most; `regress` finds the short ones."""
+        yield from screen.long_waves(cls)
 
     @classmethod
     def regress(cls, screen):
-        """Yield the waves that explain most, with the friction that the model keeps beside."""
-        m = screen.motion
-        for turns, _ in _waves(screen)[:2]:
-            wavelength = float(np.ptp(m.x)) / turns
-            angle, sense = 2.0 * math.pi * m.x / wavelength, np.sign(m.v)
-            fit = screen.force_fit([sense * np.sin(angle), sense * np.cos(angle)])
-            if fit.sensible:
-                a, b = fit.weights
-                yield cls(math.hypot(a, b), wavelength, math.atan2(b, a)), fit.values
-
-
-TURNS = np.concatenate([np.geomspace(0.25, 1.0, 6), np.arange(1.25, 80.0, 0.25)])
-"""Waves tried, over the stroke: a quarter of a turn apart they are the same."""
-
-
-def _waves(screen):
-    """Return the waves that explain most of the force, the best first: turns, (sine, cosine) [N]."""
-    m = screen.motion
-    sense = np.sign(m.v) * (np.abs(m.v) > 0.03 * screen.scales.speed)
-    plain = np.column_stack([m.a, m.v, sense, np.ones(len(m.v)), m.x])
-    basis, _ = np.linalg.qr(plain / (np.linalg.norm(plain, axis=0) + 1e-300))
-    left = m.u - basis @ (basis.T @ m.u)
-    span, found = float(np.ptp(m.x)) or 1.0, []
-    for turns in TURNS:
-        angle = 2.0 * math.pi * turns * m.x / span
-        pair = np.column_stack([sense * np.sin(angle), sense * np.cos(angle)])
-        pair -= basis @ (basis.T @ pair)
-        square = pair.T @ pair + 1e-9 * len(left) * np.eye(2)
-        with_it = pair.T @ left
-        weights = np.linalg.solve(square, with_it)
-        found.append((float(weights @ with_it), float(turns), weights))
-    best: list = []
-    for _, turns, weights in sorted(found, key=lambda f: -f[0]):
-        if all(abs(turns - other) > max(0.1 * turns, 0.6) for other, _ in best):
-            best.append((turns, weights))
-    return best
+        """Yield the waves of any length that explain most of the motion."""
+        for wave, values in screen.waves(reversing=True):
+            yield cls(wave.amplitude, wave.wavelength, wave.phase), values

@@ -51,9 +51,7 @@ class PositionRipple(Effect):
     @classmethod
     def suggest(cls, screen):
         """Yield the long waves that explain most; `regress` finds the short ones."""
-        for amplitude, wavelength, phase in screen.long_waves(cls):
-            for factor in (1.0, 0.5):
-                yield cls(min(amplitude * factor, 2 * screen.scales.force), wavelength, phase)
+        yield from screen.long_waves(cls)
 
     @classmethod
     def regress(cls, screen):

@@ -1,4 +1,4 @@
-"""The wavelength of a force ripple, sought in the motion as it was measured.
+"""The wavelength of a ripple of force or friction, sought in the motion as it was measured.
 
 A simulation that does not know the ripple yet is soon a wavelength away from the place where the mass
 really is: short ripples are lost in it. Here the measured place stands in the ripple's argument, and the
@@ -6,11 +6,12 @@ equation of motion is integrated twice,
 
     y = x0 + v0 t + 1/m (u - friction + a sin kx + b cos kx), integrated twice,
 
-which is linear in all but k. Of several records each has a and b of its own. Second differences take x0 and
-v0 out. What is left over has noise of two kinds, of the sensor and of forces; each frequency weighs by what
-is left at and around it (Whittle's likelihood), so that either may prevail. Pauses do not count: friction is
-whatever the drive is there, and would pass for noise of forces. Then k is scanned, from the
-stroke down to what the smoothed position resolves.
+which is linear in all but k; friction that differs from place to place is a wave that reverses with the
+motion. Of several records each has a and b of its own. Second differences take x0 and v0 out. What is left
+over has noise of two kinds, of the sensor and of forces; each frequency weighs by what is left at and around
+it (Whittle's likelihood), so that either may prevail. Pauses do not count: friction is whatever the drive is
+there, and would pass for noise of forces. Then k is scanned, from the stroke down to what the smoothed
+position resolves.
 """
 
 from __future__ import annotations
@@ -71,13 +72,21 @@ class RippleSpectrum:
         Wave numbers [rad/m] of ripples that the model has already.
     elastic : bool
         Whether the model has a force that depends on the place.
+    reversing : bool
+        Whether the wave sought is of friction, which acts against the motion.
     """
 
     def __init__(
-        self, records: Sequence, segments: Sequence, known: Sequence[float] = (), elastic: bool = False
+        self,
+        records: Sequence,
+        segments: Sequence,
+        known: Sequence[float] = (),
+        elastic: bool = False,
+        reversing: bool = False,
     ):
         self.records, self.elastic = records, elastic
         self.places = [_smoothed(r) for r in records]
+        self._senses = [-np.sign(facts(r).velocity) if reversing else 1.0 for r in records]
         self.span = max(float(np.ptp(x)) for x in self.places)
         # the band of the motion and some of the noise above it
         band = min(facts(r).half for r in records) // RIPPLE_BAND
@@ -126,7 +135,7 @@ class RippleSpectrum:
 
     def wave(self, k: float) -> Wave | None:
         """Return the ripple of wave number `k` [rad/m], fitted; None where the mass would be negative."""
-        waves = [np.exp(1j * k * x) for x in self.places]
+        waves = self._waves(k)
         pairs = self._apart(self._response(waves))
         # what a drive may have besides blurs the parameters of what it does have
         has = [True, *(_FORCES | {"elastic": self.elastic}).values()]
@@ -148,10 +157,14 @@ class RippleSpectrum:
             float(mass * w[2]),
         )
 
+    def _waves(self, k: float) -> list[np.ndarray]:
+        """Return the forces of a ripple of wave number `k`, sine and cosine in one, of each record."""
+        return [sense * np.exp(1j * k * x) for sense, x in zip(self._senses, self.places, strict=True)]
+
     def _scan(self, turns) -> np.ndarray:
         """Return the gains at evenly spaced numbers of wavelengths to the stroke."""
         k = 2 * math.pi * turns / self.span
-        waves = [np.exp(1j * k[0] * x) for x in self.places]
+        waves = self._waves(k[0])
         steps = [np.exp(1j * (k[1] - k[0]) * x) for x in self.places]
         gains = []
         for _ in turns:

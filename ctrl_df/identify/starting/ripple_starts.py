@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from ...blocks.effect import Effect
 from ...values.per_record import PerRecord
 from .extend import extended
 from .regression import own_values
@@ -14,8 +15,8 @@ from .ripple_spectrum import RippleSpectrum, Wave, apart
 from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, RIPPLES, WAVE_TRIED
 
 
-def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
-    """Return amplitude, wavelength and phase of the long waves that explain most of the residual.
+def long_waves(screen, make: Callable[..., Effect]) -> Iterator[Effect]:
+    """Yield the long waves that explain most of the residual, and half of each.
 
     Sine and cosine are two small changes, fitted together. Of two bodies shorter waves are sought here, too:
     what the motion shows (`waves`) is that of one.
@@ -35,7 +36,10 @@ def long_waves(screen, make: Callable) -> list[tuple[float, float, float]]:
         # nearer than a turn it is the same wave
         if len(best) < LONG_WAVES and all(abs(turn - b) > 1.0 for b in best):
             best.append(turn)
-    return [(amplitude, span / turn, phase) for turn in best for _, amplitude, phase in (found[turn],)]
+    for turn in best:
+        _, amplitude, phase = found[turn]
+        for factor in (1.0, 0.5):
+            yield make(min(amplitude * factor, 2 * screen.scales.force), span / turn, phase)
 
 
 def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, float] | None:
@@ -62,16 +66,17 @@ def long_wave(screen, make: Callable, wavelength: float) -> tuple[float, float, 
     return left, size * float(np.mean(np.hypot(*each.T))), phase
 
 
-def waves(screen, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
+def waves(screen, known: Sequence[float], reversing: bool) -> Iterator[tuple[Wave, dict[str, float]]]:
     """Yield the waves of any length that explain most, and values of the model's parameters beside them.
 
-    `known`: wavelengths [m] that the model has already.
+    `known`: wavelengths [m] that the model has already; `reversing`: whether of friction.
     """
     view, _ = screen.data.whole or (screen.view, None)
     if not all(r.regular for r in view.records):
         return
     has = [2 * math.pi / length for length in known]
-    search = RippleSpectrum(view.records, view.segments, has, screen.block.core.position_dependent)
+    elastic = screen.block.core.position_dependent
+    search = RippleSpectrum(view.records, view.segments, has, elastic, reversing)
     # where friction drifts the fit over segments knows the mass better than whitened forces do
     plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
     for wave in search.best(RIPPLES):

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from ...blocks.core import kinetic_level
+from ...blocks.effect import Effect
 from ...cached import cached_property
 from ...checks import above
 from ..estimation.fit import FitResult
@@ -87,17 +88,22 @@ class Screen:
         """Regress the force on the motion, by the model's own laws and further columns over `motion`."""
         return force_fit(self.motion, self.scales, self.block, columns)
 
-    def long_waves(self, make: Callable) -> list[tuple[float, float, float]]:
-        """Return amplitude [N], wavelength [m] and phase of the long ripples that explain most."""
+    def long_waves(self, make: Callable[..., Effect]) -> Iterator[Effect]:
+        """Yield ripples ``make(amplitude [N], wavelength [m], phase)``, the long ones that explain most."""
         return long_waves(self, make)
 
     def long_wave(self, make: Callable, wavelength: float) -> tuple[float, float, float] | None:
         """Return what a ripple of this length leaves of the residual, its amplitude [N] and its phase."""
         return long_wave(self, make, wavelength)
 
-    def waves(self, known: Sequence[float]) -> Iterator[tuple[Wave, dict[str, float]]]:
-        """Yield ripples of any length that explain most, with values of the model's parameters beside."""
-        return waves(self, known)
+    def waves(
+        self, known: Sequence[float] = (), reversing: bool = False
+    ) -> Iterator[tuple[Wave, dict[str, float]]]:
+        """Yield ripples of any length that explain most, with values of the model's parameters beside.
+
+        `known`: wavelengths [m] that the model has already; `reversing`: ripples of friction.
+        """
+        return waves(self, known, reversing)
 
     @cached_property
     def dead_times(self) -> tuple[tuple[float, dict[str, float]], ...]:
