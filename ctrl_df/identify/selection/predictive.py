@@ -66,7 +66,7 @@ def held_out(tried: CandidateFit, noise: NoiseModel) -> HeldOut:
     if there is not None and len(there.slopes) == len(tried.train.slopes):
         fitted = _whitened(tried.train.response_pieces, noise)
         held = _whitened(there.response_pieces, noise)
-        if fitted and held:
+        if fitted and held and all(np.all(np.isfinite(p)) for p in (*fitted, *held)):
             root = _standard_errors(np.concatenate(fitted))
             return HeldOut(white, [h @ root for h in held])
     return HeldOut(white, [np.zeros((len(w), 0)) for w in white])
@@ -79,10 +79,10 @@ def power_of(white, changes) -> Power:
     ----------
     Gelman et al. (2013), sec. 14.3: the predictive distribution of linear regression.
     """
-    moved = np.eye(changes.shape[1]) + changes.T @ changes
-    along = changes.T @ white
-    squares = float(white @ white - along @ np.linalg.solve(moved, along))
-    return Power(squares, len(white), 0.5 * float(np.linalg.slogdet(moved)[1]))
+    along, size, _ = np.linalg.svd(changes, full_matrices=False)
+    wider = 1 + size**2
+    taken = (along.T @ white) ** 2 * (1 - 1 / wider)
+    return Power(float(white @ white - np.sum(taken)), len(white), 0.5 * float(np.sum(np.log(wider))))
 
 
 def _standard_errors(slopes) -> np.ndarray:
