@@ -47,7 +47,8 @@ class LinearSpring(Effect):
         for columns in ([x], [x, np.ones(len(x))]):
             fit = screen.force_fit(columns)
             stiffness, preload = fit.weights[0], sum(fit.weights[1:])
-            if fit.sensible and stiffness:
+            # what pushes away about a place of its own is a body that falls over: gravity
+            if fit.sensible and (stiffness > 0 or (stiffness and len(columns) == 1)):
                 yield cls(stiffness, -preload / stiffness), fit.values
 
     @staticmethod
