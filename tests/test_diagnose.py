@@ -281,10 +281,10 @@ def test_errors_are_clear():
         diagnose(3.0, data)
 
 
-@pytest.mark.parametrize("second, verdict", [("constant_force", "effect"), ("quadratic_drag", "unknown")])
+@pytest.mark.parametrize("second, verdict", [("quadratic_drag", "effect"), ("constant_force", "unknown")])
 def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
-    """A spring and a constant force: the spring is named, and that something else is missing, too."""
-    true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60)).with_effect(cdf.ConstantForce(0.4))
+    """A spring and a drag: the spring is named, and that something else is missing, too."""
+    true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60)).with_effect(cdf.QuadraticDrag(40))
     t = 2e-3 * np.arange(2000)
 
     def recorded(seed):
@@ -299,7 +299,7 @@ def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
     assert found.verdict == verdict and found.best.id == "linear_spring"
     told = " ".join(found.doubts)
     assert "The residual with linear spring is more than noise" in told
-    assert ("constant force is missing as well" in told) == (verdict == "effect")
+    assert ("quadratic drag is missing as well" in told) == (verdict == "effect")
 
 
 @pytest.mark.parametrize(
