@@ -58,6 +58,7 @@ def judged(kind, number, peers):
 def _one(rig):
     found = cdf.diagnose(rig.baseline, rig.train, holdout=rig.held, free=list(rig.free))
     row = dict(verdict=found.verdict, regions=list(found.regions), hidden=rig.hidden, facts=rig.facts)
+    row["doubts"] = list(found.doubts)
     row["ranking"] = [
         dict(
             id=c.id, same=list(c.equivalents), p=c.probability, evidence=c.evidence, held=c.evidence_holdout,

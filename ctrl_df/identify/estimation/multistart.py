@@ -137,6 +137,26 @@ def _begun(model, names, starts, data: SegmentedData, give_up: float) -> FitResu
     return data.fit(model, names, starts=near.starts, iterations=NEAR, give_up=give_up)
 
 
+def with_values_of(block, other, like: Any = None):
+    """Return a model with what it has in common with another one, or None: their effects have nothing.
+
+    Both end with the effect that was added. `like`: that of the model such that it acts like the other one's
+    (see `like_another`); None: it cannot.
+    """
+    table, mine, its = block.parameters, block.newest, other.newest
+    values = {}
+    for name, p in other.parameters.items():
+        name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
+        if name in table and table[name].unit == p.unit:
+            values[name] = p.value
+    frictions = {m.effects[-1].role for m in (block, other)} == {"friction"}
+    if like is not None:
+        values |= {f"{mine}.{k}": p.value for k, p in like.parameters.items()}
+    elif not frictions or not any(name.startswith(f"{mine}.") for name in values):
+        return None
+    return with_values(block, values)
+
+
 def cross_started(
     tried: CandidateFit, best: CandidateFit, data: SegmentedData, like: Any = None
 ) -> FitResult | None:
@@ -146,18 +166,9 @@ def cross_started(
     law each may end in its own minimum. `like`: the effect of the candidate such that it acts like the best
     one's (see `like_another`); None: it cannot.
     """
-    table, mine, its = tried.block.parameters, tried.block.newest, best.block.newest
-    values = {}
-    for name, p in best.block.parameters.items():
-        name = f"{mine}.{name.partition('.')[2]}" if name.partition(".")[0] == its else name
-        if name in table and table[name].unit == p.unit:
-            values[name] = p.value
-    frictions = {t.block.effects[-1].role for t in (tried, best)} == {"friction"}
-    if like is not None:
-        values |= {f"{mine}.{k}": p.value for k, p in like.parameters.items()}
-    elif not frictions or not any(name.startswith(f"{mine}.") for name in values):
+    block = with_values_of(tried.block, best.block, like)
+    if block is None:
         return None
-    block = with_values(tried.block, values)
     near = data.fit(block, (), starts=best.train.starts, iterations=NEAR_STATES)
     if near.rmse > GIVE_UP * best.train.rmse:
         return None

@@ -15,7 +15,6 @@ from ..estimation.multistart import (
     all_restarted,
     begun_as,
     beyond,
-    cross_started,
     no_worse_than,
     own,
     restarted,
@@ -27,7 +26,7 @@ from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
-from .equivalence import matching_along, restarted_from_better
+from .equivalence import best_of_each, fitted_from, restarted_from_better
 from .evidence import misses_lines, ranked, rounds
 from .reference import Reference
 from .thresholds import (
@@ -370,18 +369,9 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
 
 def _cross_started(at: Reference, chosen, those) -> list[CandidateFit]:
     """Restart candidates from the fit of each of `those`; keep the best of every effect, best first."""
-    fine = at.data.fine
-    matching = matching_along(fine, at.base.block)
-
-    def started_there(pair):
-        tried, best = pair
-        fit = cross_started(tried, best, fine, matching(tried.block.effects[-1], best.block.effects[-1]))
-        return fit and thresholds_refined(fine.validate(replace(tried, train=fit)), fine)
-
     pairs = [(t, best) for best in those for t in chosen if t is not best]
-    begun = side_by_side(started_there, pairs)
-    validated, _ = ranked(at.base, [*chosen, *(t for t in begun if t is not None)])
-    return [next(t for t in validated if t.key == key) for key in dict.fromkeys(t.key for t in validated)]
+    begun = fitted_from(pairs, at.data.fine, at.base.block)
+    return best_of_each(ranked(at.base, [*chosen, *begun])[0])
 
 
 def _promising(found, most=CONFIRMED, share=PROMISING) -> list[CandidateFit]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from ...blocks.core import level
 from ...blocks.stated import static_levels
 from ...simulate.parallel import side_by_side
-from ..estimation.multistart import cross_started
+from ..estimation.multistart import cross_started, thresholds_refined, with_values_of
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..shooting.noise_model import NoiseModel, whitened_power
 from ..shooting.thresholds import BETTER
@@ -71,10 +71,63 @@ def restarted_from_better(
     return list(nearest.values())
 
 
+def fitted_from(
+    pairs: Sequence[tuple[CandidateFit, CandidateFit]], data: SegmentedData, block
+) -> list[CandidateFit]:
+    """Return those candidates whose law can represent another's, fitted from that one's fit and validated.
+
+    `pairs`: a candidate, and the other; `data`, `block`: see `matching_along`.
+    """
+    matching = matching_along(data, block)
+
+    def started_there(pair):
+        tried, other = pair
+        fit = cross_started(tried, other, data, matching(tried.block.effects[-1], other.block.effects[-1]))
+        return fit and thresholds_refined(data.validate(replace(tried, train=fit)), data)
+
+    return [t for t in side_by_side(started_there, pairs) if t is not None]
+
+
+def best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Return the first fit of every candidate, in their order."""
+    first: dict[str, CandidateFit] = {}
+    for fit in fits:
+        first.setdefault(fit.key, fit)
+    return list(first.values())
+
+
 def _breaks_away(tried: CandidateFit) -> bool:
     """Whether the newest effect of a candidate is friction with a static level."""
     effect = tried.block.effects[-1]
     return effect.role == "friction" and bool(static_levels(type(effect)))
+
+
+def acts_as(tried: CandidateFit, other: CandidateFit, data: SegmentedData, block, noise: NoiseModel) -> bool:
+    """Whether a candidate, with values that make it act as another, has the output of that one within noise.
+
+    Two fits of laws that do the same along a motion may have ended in minima of their own, as impacts and dry
+    friction have many.
+
+    Parameters
+    ----------
+    tried, other : CandidateFit
+        Confirmed.
+    data : SegmentedData
+        The data that they are fitted to.
+    block : Mechanism
+        The model without them.
+    noise : NoiseModel
+        Of the other one's residual.
+    """
+    like = matching_along(data, block)(tried.block.effects[-1], other.block.effects[-1])
+    if like is None:
+        return False
+    views = [(data.train, other.train), (data.validation, other.validation)]
+    pieces = []
+    for view, fit in ((v, f) for v, f in views if f is not None):
+        model = with_values_of(tried.block, fit.model, like)
+        pieces += data.fit(model, (), view=view, starts=fit.starts, iterations=0).simulated_pieces
+    return indistinguishable(pieces, other.outputs, noise)
 
 
 def indistinguishable(first, second, noise: NoiseModel, *, nats: float = DISTINGUISHED) -> bool:

@@ -9,7 +9,8 @@ from ...simulate.parallel import side_by_side
 from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import with_values
-from ..thresholds import FLOOR, GROWTH, RULED_OUT
+from ..thresholds import DISTINGUISHED, FLOOR, GROWTH, RULED_OUT
+from .equivalence import best_of_each, fitted_from
 from .evidence import ranked
 from .reference import Reference
 from .thresholds import ON_LIMIT, REFIT_MOST, REFIT_PROMISES
@@ -22,7 +23,8 @@ def refitted(
 
     Candidates are compared over segments that show what is missing, with the same effort for all. Parameters
     are estimated best over segments as long as the model can predict: those of candidates that may be named
-    are fitted over these until they converge, and the evidence is that of these fits.
+    are fitted over these until they converge, and the evidence is that of these fits. One that can act as the
+    first does is fitted from its values, too: the cost of impacts and of dry friction has many minima.
 
     Parameters
     ----------
@@ -41,6 +43,17 @@ def refitted(
             break
         known |= {t.key: f for t, f in zip(there, side_by_side(lambda t: refit(at, t), there), strict=True)}
         chosen, noise = ranked(at.base, [known.get(t.key, t) for t in chosen])
+    for _ in known:
+        first = chosen[0]
+        behind = [t for t in chosen if t.key in known and first.evidence - t.evidence > DISTINGUISHED]
+        begun = fitted_from([(t, first) for t in behind], at.data.fine, at.base.block)
+        if not begun:
+            break
+        again = side_by_side(lambda t: refit(at, t), begun)
+        chosen, noise = ranked(at.base, [*chosen, *again])
+        chosen = best_of_each(chosen)
+        if chosen[0].train is first.train:
+            break
     return replace(at, noise=noise), chosen
 
 

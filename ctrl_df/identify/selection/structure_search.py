@@ -20,7 +20,7 @@ from ..starting.dead_times import lead
 from ..thresholds import PROCESS_NOISE, SIGNIFICANT
 from .attempts import own_names
 from .confirmation import confirmed, stages
-from .equivalence import breaks_away_only, indistinguishable, matching_along
+from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
 from .evidence import ranked, step_as_recorded
 from .named import beyond_range, refitted, whole_refit
 from .reference import Reference, reference_of
@@ -140,7 +140,10 @@ class StructureSearch(Search):
         """Whether two candidates are equivalent on these data, within noise or as a limit of each other."""
         if all(breaks_away_only(t, self.at.data.scales.speed) for t in (a, b)):
             return True
-        return indistinguishable(a.outputs, b.outputs, self.at.noise)
+        if indistinguishable(a.outputs, b.outputs, self.at.noise):
+            return True
+        better, other = sorted((a, b), key=lambda t: t.size)
+        return acts_as(other, better, self.at.data.fine, self.at.base.block, self.at.noise)
 
     def acting_as(self, effect, other):
         """Return an effect with the values with which it acts as another one along the motion; or None."""
