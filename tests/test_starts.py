@@ -13,7 +13,8 @@ from ctrl_df.identify.prediction.simulator import Simulator, free_run
 from ctrl_df.identify.residuals.rounding import rounding_evidence
 from ctrl_df.identify.selection import confirmation
 from ctrl_df.identify.selection.attempts import _attempts_of, _Places
-from ctrl_df.identify.selection.equivalence import restarted_from_better
+from ctrl_df.identify.selection.equivalence import acts_as, indistinguishable, restarted_from_better
+from ctrl_df.identify.selection.evidence import ranked
 from ctrl_df.identify.selection.reference import refitted_from
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.noise_model import prediction_errors
@@ -183,6 +184,22 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
     assert second.rmse == pytest.approx(again["stiction"].rmse, rel=1e-9)
     # 26 times the noise as it was lost, 0.95 begun again
     assert again["stiction"].rmse < 1.1 * data.noise < found[1].train.rmse / 10
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_laws_that_do_the_same_are_equal_although_their_fits_are_not(wide):
+    """A spring is a pendulum over a small angle, also where one fit has ended farther off than noise tells."""
+    scale, t = 1.0 if wide else 1e-3, 4e-3 * np.arange(1000)
+    block = cdf.Inertia(2.0).with_effect(cdf.Coulomb(0.4 * scale)).with_effect(cdf.Viscous(3.0))
+    force = scale * (6 * np.sin(2 * t) + 3 * np.sin(5.3 * t))
+    spring, pendulum = (block.with_effect(e) for e in (cdf.LinearSpring(8.0), cdf.Gravity(8.1, 0.0)))
+    x = free_run(spring, cdf.Measurement(t, force, np.sin(t), input_unit="N m", output_unit="rad"))
+    noise = 1e-4 * scale * np.random.default_rng(1).normal(size=t.size)
+    data = prepare(block, [cdf.Measurement(t, force, x + noise, input_unit="N m", output_unit="rad")]).fine
+    first, other = (data.validate(CandidateFit(b.newest, data.fit(b, ()))) for b in (spring, pendulum))
+    sigma = ranked(first, [other])[1]
+    assert not indistinguishable(first.outputs, other.outputs, sigma)
+    assert acts_as(other, first, data, block, sigma) != wide
 
 
 def test_what_drove_a_lag_before_the_record_is_found():
