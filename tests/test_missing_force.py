@@ -210,7 +210,7 @@ def test_text_and_picture_of_a_comparison_say_what_is_missing():
     assert told.places[0].startswith(f"{share} of") and "a function of the position" in told.places[0]
     assert f"{share} is a function of the position" in missing.summary() and "rms" in missing.summary()
     assert f"{missing.shares['position']:.1%}" in told.stands_out.table()
-    bars = told.plot().axes[-1, -1] if np.ndim(told.plot().axes) == 2 else told.plot().axes[-1]
+    bars = told.plot().axes.flat[-1]
     assert bars.get_title() == "what the missing force is"
     plt.close("all")
 
