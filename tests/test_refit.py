@@ -26,7 +26,7 @@ def test_standard_errors_hold_for_wrong_parameters():
             excitation=rigs.EXCITATIONS[seed % 3],
             snr_db=[60.0, 40.0][seed % 2],
             noise=NOISES[(seed // 2) % 3],
-            n=4000,
+            n=2000,
         )
         fit = fit_records(rig.baseline, [rig.train[0].measurement()])
         errors = fit.standard_errors
