@@ -68,7 +68,7 @@ def test_free_forces_tell_what_a_model_misses_and_where():
 
 @pytest.mark.parametrize("effect", ["linear_spring", "input_delay"])
 def test_a_single_effect_is_named_first(effect):
-    rig = rigs.draw(effect, 11, snr_db=60, n=4000)
+    rig = rigs.draw(effect, 11, snr_db=60, n=2000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert found.verdict == "effect"
@@ -165,7 +165,7 @@ def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
 
 @pytest.mark.parametrize("hidden", [None, cdf.Backlash(0.005, 0.3, 0.4)])
 def test_simulated_records_without_noise(hidden):
-    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(2000)
+    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(1200)
     tones, phases = rng.uniform(0.3, 4, 8), rng.uniform(0, 6, 8)
     u = sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
     true = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0)])
@@ -186,7 +186,7 @@ def test_simulated_records_without_noise(hidden):
 
 
 def test_equal_maps_are_one_class():
-    rig = rigs.draw("constant_force", 12, snr_db=60, n=4000)
+    rig = rigs.draw("constant_force", 12, snr_db=60, n=2000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert {found.best.id, *found.best.equivalents} == {"constant_force", "asymmetric_coulomb"}
@@ -194,7 +194,7 @@ def test_equal_maps_are_one_class():
 
 @pytest.mark.parametrize("draw", [rigs.draw_none, rigs.draw_wrong_parameters])
 def test_nothing_hidden_is_none(draw):
-    rig = draw(13, snr_db=60, n=4000)
+    rig = draw(13, snr_db=60, n=2000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert found.verdict == "none"
@@ -312,7 +312,7 @@ def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
 )  # fmt: skip
 def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
     force = sum(6 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
     record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
@@ -327,7 +327,7 @@ def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
 def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
     """Driven by current, torque constant, inertia and friction have a common factor: it is told."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.TorqueConstant(0.8)).with_effect(cdf.LinearSpring(60))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
     current = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, current, input_hold="zoh").outputs)[0]
     noise = 1e-5 * np.random.default_rng(1).standard_normal(t.size)
@@ -347,7 +347,7 @@ def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
     base = cdf.friction_mass(2, 1.0, 6).with_effect(cdf.LinearSpring(60))
     true = cdf.Mass(2.2).with_effect(cdf.Viscous(6)).with_effect(cdf.LinearSpring(60))
     true = true.with_effect(cdf.LoadDependentFriction(0.3))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
     force = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
     record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))

@@ -116,7 +116,7 @@ def test_what_leaves_no_trace_is_named():
 def test_a_hidden_effect_is_named_from_its_print(name, added, rivals):
     known = []
     found = diagnose(
-        user_block(), table(grid=MIDDLE, **added), candidates=(name, *rivals), callback=known.append
+        user_block(), table(grid=SMALL, **added), candidates=(name, *rivals), callback=known.append
     )
     assert known and {d.status for d in known} == {"under way"} and found.status == "complete"
     assert found.verdict == "effect", found.explanation
@@ -181,7 +181,7 @@ def test_outside_the_candidates_is_unknown():
 
 
 def test_a_table_held_out():
-    data, held = (table(grid=MIDDLE, DRAG=60.0, seed=seed) for seed in (0, 9))
+    data, held = (table(grid=SMALL, DRAG=60.0, seed=seed) for seed in (0, 9))
     found = diagnose(user_block(), data, holdout=held, candidates=("quadratic_drag", "stribeck"))
     assert found.verdict == "effect" and found.best.id == "quadratic_drag" and found.best.determined
     assert found.best.parameters["coefficient"] == pytest.approx(60.0, rel=0.05)

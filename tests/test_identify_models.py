@@ -26,7 +26,7 @@ def rig():
 
 @pytest.fixture(scope="module")
 def records(rig):
-    return tuple(record[0].measurement().slice(0, 2) for record in (rig.train, rig.holdout))
+    return tuple(record[0].measurement().slice(0, 2).decimate(2) for record in (rig.train, rig.holdout))
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def eddy_brake(monkeypatch):
     del sys.modules["own_effect"]
 
 
-def brake_record(seed, dt=2e-3, n=2500):
+def brake_record(seed, dt=4e-3, n=1250):
     """Return a run of mass, viscous drag and brake, integrated here, with white noise."""
     rng = np.random.default_rng(seed)
     t = dt * np.arange(n)

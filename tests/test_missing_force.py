@@ -149,7 +149,7 @@ SPRUNG, HEAVIER = PLAIN.with_effect(cdf.LinearSpring(60.0)), PLAIN.with_paramete
 @functools.cache
 def beside_plain(true, drive=(), gain=1.0, unit="N"):
     """Return plain terms, driven so, compared with a record of `true`."""
-    rng, t = np.random.default_rng(1), np.arange(2500) * 5e-3
+    rng, t = np.random.default_rng(1), np.arange(1250) * 1e-2
     u = (8 * np.sin(4.4 * t) + 4 * np.sin(12 * t + 1) + 2 * np.sin(1.1 * t + 2)) / gain
     model = PLAIN.with_effects([*PLAIN.effects, *drive])
     true = true.with_effects([*true.effects, *drive])

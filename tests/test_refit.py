@@ -41,7 +41,8 @@ def test_standard_errors_hold_for_wrong_parameters():
     "hidden", ["stribeck", "bristle", "input_delay", "backlash", "compliance", "hard_stop"]
 )
 def test_true_structure_reaches_the_noise(hidden):
-    rig = rigs.draw(hidden, 3, n=5000)
+    # impacts are few: in half of the record they leave a wrong minimum
+    rig = rigs.draw(hidden, 3, n=5000 if hidden == "backlash" else 2500)
     block, record = rig.true_block, rig.train[0]
     shift = np.random.default_rng(0)
     free = [k for k, p in block.parameters.items() if p.free]
