@@ -327,7 +327,7 @@ def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
 def test_a_scale_that_no_record_tells_leaves_the_effect_determined():
     """Driven by current, torque constant, inertia and friction have a common factor: it is told."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.TorqueConstant(0.8)).with_effect(cdf.LinearSpring(60))
-    t = 4e-3 * np.arange(1000)
+    t = 2e-3 * np.arange(2000)
     current = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, current, input_hold="zoh").outputs)[0]
     noise = 1e-5 * np.random.default_rng(1).standard_normal(t.size)
@@ -347,7 +347,7 @@ def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
     base = cdf.friction_mass(2, 1.0, 6).with_effect(cdf.LinearSpring(60))
     true = cdf.Mass(2.2).with_effect(cdf.Viscous(6)).with_effect(cdf.LinearSpring(60))
     true = true.with_effect(cdf.LoadDependentFriction(0.3))
-    t = 4e-3 * np.arange(1000)
+    t = 2e-3 * np.arange(2000)
     force = sum(8 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
     record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
