@@ -165,7 +165,7 @@ def test_parameters_are_found_within_their_errors(kind):
     ("effect", "id"), [(cdf.QuadraticDrag(3.0), "quadratic_drag"), (cdf.LinearSpring(20.0), "linear_spring")]
 )
 def test_a_tachometer_shows_what_is_missing(effect, id):
-    record = records(TRUE.with_effect(effect))["velocity"]
+    record = records(TRUE.with_effect(effect), every=2)["velocity"]
     found = cdf.diagnose(START, record, candidates=["quadratic_drag", "linear_spring", "sensor_delay"])
     assert found.verdict == "effect" and found.best.id == id
     assert all(c.id != "sensor_delay" for c in found.ranking)  # of a sensor that was not there
@@ -203,7 +203,7 @@ def test_the_place_of_a_velocity_record_is_found_where_a_law_knows_it():
 def test_the_missing_force_is_seen_through_a_tachometer():
     machine = TRUE.with_effect(cdf.ConstantForce(0.5))
     for kind in ("velocity", "both"):
-        missing = cdf.compare(TRUE, records(machine)[kind]).missing_force
+        missing = cdf.compare(TRUE, records(machine, every=2)[kind]).missing_force
         assert np.median(missing.force) == pytest.approx(0.5, abs=0.05)
         assert missing.units["position"] == "m"
 

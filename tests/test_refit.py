@@ -75,7 +75,7 @@ def test_directions_that_cannot_be_told_apart_are_named():
 
 
 def test_parameter_at_its_bound_is_named():
-    rig = rigs.draw_none(4)
+    rig = rigs.draw_none(4, n=5000)
     record = rig.train[0]
     measured = record.measurement()
     fit = refit(rig.baseline.with_parameters({"coulomb.level": 0.0}), measured, ["mass", "viscous"])
