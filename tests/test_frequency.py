@@ -168,7 +168,7 @@ def test_a_gap_is_named_although_one_point_is_of_another_motion():
 
 
 def test_nothing_hidden_is_none():
-    found = diagnose(user_block(), table(grid=MIDDLE, seed=3), candidates=FEW[:1])
+    found = diagnose(user_block(), table(seed=3), candidates=FEW[:1])
     assert found.verdict == "none" and found.best is None
     assert "Nothing is missing" in found.explanation
     assert found.next_experiment is None

@@ -177,7 +177,8 @@ DELAYS = ["input_delay", "sensor_delay"]
 
 
 def test_position_alone_does_not_tell_whose_delay_it_is():
-    first, second = (records(TRUE.with_effect(cls(0.01)), every=2) for cls in (cdf.InputDelay, cdf.SensorDelay))
+    pair = (cdf.InputDelay(0.01), cdf.SensorDelay(0.01))
+    first, second = (records(TRUE.with_effect(delay), every=2) for delay in pair)
     assert np.allclose(first["position"].y, second["position"].y, rtol=0, atol=1e-9)  # one record
     assert cdf.diagnose(START, first["position"], candidates=DELAYS).best.equivalents
 
