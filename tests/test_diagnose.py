@@ -68,7 +68,7 @@ def test_free_forces_tell_what_a_model_misses_and_where():
 
 @pytest.mark.parametrize("effect", ["linear_spring", "input_delay"])
 def test_a_single_effect_is_named_first(effect):
-    rig = rigs.draw(effect, 11, snr_db=60, n=4000)
+    rig = rigs.draw(effect, 11, snr_db=60, n=2000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert found.verdict == "effect"
@@ -81,7 +81,7 @@ def test_a_single_effect_is_named_first(effect):
 
 def test_a_bump_passed_within_a_sample_is_stiction():
     rig = rigs.draw("stiction", 1005, excitation="multisine", snr_db=40, noise="coloured", n=4000)
-    train, held = (record.decimate(2) for record in of(rig))
+    train, held = (record.slice(0, 2).decimate(2) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("stiction", "stribeck"))
     assert found.verdict == "effect"
     assert {found.best.id, *found.best.equivalents} == {"stiction", "stribeck"}
@@ -91,7 +91,7 @@ def test_a_bump_passed_within_a_sample_is_stiction():
 def test_what_only_long_segments_show_is_unknown():
     # a notch in the force at one place: short segments begin anew beyond it
     rig = rigs.draw_outside(1005, kind="detent", excitation="multisine", snr_db=40, noise="coloured")
-    train, held = (record.decimate(4) for record in of(rig))
+    train, held = (record.decimate(8) for record in of(rig))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("linear_spring",))
     assert found.verdict == "unknown"
     assert found.structure > 2 * found.noise
@@ -142,11 +142,12 @@ def test_static_levels_are_chosen_before_what_is_held_out_counts_as_luck():
 def test_a_joint_with_nothing_behind_it_is_no_joint():
     rig = rigs.draw_outside(1008, kind="friction_zone", excitation="multisine", snr_db=60, n=5000)
     train, held = of(rig)
-    found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance",))
+    coarse = [record.decimate(4) for record in (train, held)]
+    found = diagnose(rig.baseline, coarse[0], holdout=coarse[1], candidates=("compliance",))
     assert found.verdict == "unknown" and found.regions[0] == "position"
     # over short segments, each with a stretch of its own, it follows more of the motion; in so little of
     # the record, place and time explain the rest alike
-    train, held = (record.slice(0, 2).decimate(2) for record in (train, held))
+    train, held = (record.slice(0, 2).decimate(5) for record in (train, held))
     found = diagnose(rig.baseline, train, holdout=held, candidates=("compliance",))
     assert found.verdict == "unknown" and "position" in found.regions
     assert found.best.nrmse < found.baseline.nrmse and not found.best.determined
@@ -164,7 +165,7 @@ def test_hidden_states_of_many_segments_do_not_pass_for_a_hum():
 
 @pytest.mark.parametrize("hidden", [None, cdf.Backlash(0.005, 0.3, 0.4)])
 def test_simulated_records_without_noise(hidden):
-    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(2000)
+    rng, t = np.random.default_rng(0), 2.5e-3 * np.arange(1200)
     tones, phases = rng.uniform(0.3, 4, 8), rng.uniform(0, 6, 8)
     u = sum(3 * np.sin(2 * np.pi * f * t + p) for f, p in zip(tones, phases, strict=True))
     true = cdf.Mass(3.0, [cdf.Coulomb(2.0), cdf.Viscous(6.0)])
@@ -185,7 +186,7 @@ def test_simulated_records_without_noise(hidden):
 
 
 def test_equal_maps_are_one_class():
-    rig = rigs.draw("constant_force", 12, snr_db=60, n=4000)
+    rig = rigs.draw("constant_force", 12, snr_db=60, n=2000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert {found.best.id, *found.best.equivalents} == {"constant_force", "asymmetric_coulomb"}
@@ -193,7 +194,7 @@ def test_equal_maps_are_one_class():
 
 @pytest.mark.parametrize("draw", [rigs.draw_none, rigs.draw_wrong_parameters])
 def test_nothing_hidden_is_none(draw):
-    rig = draw(13, snr_db=60, n=4000)
+    rig = draw(13, snr_db=60, n=2000)
     train, held = of(rig)
     found = diagnose(rig.baseline, train, holdout=held, candidates=FEW)
     assert found.verdict == "none"
@@ -285,7 +286,7 @@ def test_errors_are_clear():
 def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
     """A spring and a drag: the spring is named, and that something else is missing, too."""
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60)).with_effect(cdf.QuadraticDrag(40))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
 
     def recorded(seed):
         rng = np.random.default_rng(seed)
@@ -311,7 +312,7 @@ def test_what_the_best_effect_leaves_is_asked_for_too(second, verdict):
 )  # fmt: skip
 def test_a_model_that_cannot_move_is_never_complete(stated, free, told):
     true = cdf.friction_mass(2.2, 3, 6).with_effect(cdf.LinearSpring(60))
-    t = 2e-3 * np.arange(2000)
+    t = 4e-3 * np.arange(1000)
     force = sum(6 * np.sin(w * t + w**2) for w in (1.3, 3.1, 5.3, 8.9, 14, 23))
     x = np.asarray(cdf.event_response(true, t, force, input_hold="zoh").outputs)[0]
     record = Measurement(t, force, x + 1e-5 * np.random.default_rng(1).standard_normal(t.size))
@@ -355,6 +356,9 @@ def test_an_effect_that_leaves_nothing_of_stated_friction_is_ambiguous():
     assert found.verdict == "ambiguous" and "coulomb.level" in found.explanation
 
 
+GAINS = ("input_gain", "backlash", "compliance", "asymmetric_coulomb")
+
+
 def record_of(force, place):
     """A mass with friction, its force and place times these factors, and a model that is right to 20 %."""
     rng, t = np.random.default_rng(1), 0.01 * np.arange(600)
@@ -367,15 +371,15 @@ def record_of(force, place):
 
 def test_what_a_drive_gain_would_make_up_for_is_a_matter_of_units():
     record, model = record_of(1.0, 1e3)
-    found = diagnose(model, record)
+    found = diagnose(model, record, candidates=GAINS)
     # a gain far from one was called missing with p > 0.999: the range of the mass ended before
     assert found.verdict == "unknown" and "mass 0.0022 kg in place of 2" in found.explanation
 
 
-@pytest.mark.parametrize("signs", [(-1, 1), (1, -1)])
-def test_a_force_or_a_place_of_the_other_sign_is_said(signs):
+@pytest.mark.parametrize(("signs", "candidates"), [((-1, 1), None), ((1, -1), GAINS)])
+def test_a_force_or_a_place_of_the_other_sign_is_said(signs, candidates):
     record, model = record_of(*signs)
-    found = diagnose(model, record)
+    found = diagnose(model, record, candidates=candidates)
     # with the force reversed friction drives: a gap behind a joint was called missing with p > 0.999
     assert found.verdict == "effect" and found.best.id == "input_gain"
     assert found.best.parameters["gain"] < 0 and "the force is reversed" in found.explanation

@@ -41,7 +41,7 @@ def test_an_effect_that_stood_in_for_two_gives_way():
     train, held = (record[0].measurement().slice(0, 4).decimate(5) for record in (rig.train, rig.holdout))
     found = improve(
         rig.baseline, train, held, free=free,
-        candidates=("coulomb", "stribeck", "quadratic_drag"), max_effects=3,
+        candidates=("coulomb", "stribeck", "quadratic_drag"), max_effects=2,
     )  # fmt: skip
     first, last = found.steps[1], found.steps[-1]
     # one Stribeck curve looks most like Coulomb friction and drag together, until drag is there

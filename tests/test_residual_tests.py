@@ -111,7 +111,7 @@ def motion(rng):
 def test_noise_alone_has_no_region(pole):
     rng = np.random.default_rng(6)
     alarms = []
-    for _ in range(40):
+    for _ in range(25):
         regions = where.error_regions(T, coloured(rng, pole), **motion(rng))
         alarms.append(min(r.p_value for r in regions))
         assert {r.kind for r in regions} == set(where.KINDS)

@@ -107,7 +107,7 @@ def test_no_waves():
 
 def test_other_phase_of_the_record_held_out():
     """The encoder began elsewhere: the ripple is the same but for its phase, and is confirmed."""
-    run, held = (drive(seed, 4.0, 8e-3, phase, 2e-4, 4.0) for seed, phase in ((5, 0.3), (6, 2.0)))
+    run, held = (drive(seed, 4.0, 8e-3, phase, 2e-4, 2.5) for seed, phase in ((5, 0.3), (6, 2.0)))
     model = cdf.Mass(6.0, [cdf.Coulomb(0.6), cdf.Viscous(17.0)])
     found = cdf.diagnose(model, run, holdout=held, candidates=["position_ripple", "constant_force"])
     assert found.verdict == "effect"

@@ -137,7 +137,7 @@ def test_a_pendulum_starts_from_its_own_inertia():
 def test_a_true_model_follows_what_is_held_out():
     """Past many teeth of a ripple the error of a long segment has many minima over where it begins."""
     true, noise = cdf.Mass(0.5, [cdf.Viscous(2.0), cdf.PositionRipple(3.0, wavelength=0.02)]), 2e-5
-    for seed in (6, 8, 10):
+    for seed in (6, 10):
         records = []
         for which in (seed, seed + 1):
             rng, t = np.random.default_rng(which), 2e-3 * np.arange(2400)
@@ -147,7 +147,7 @@ def test_a_true_model_follows_what_is_held_out():
             records.append(cdf.Measurement(t, u, x + noise * rng.standard_normal(t.size)))
         data = prepare(true, records[:1], records[1:]).segmentations[-1].fine
         found = data.validate(CandidateFit("", data.fit(true, (), iterations=1)))
-        # 1.2, 1.1, 1.6 times the noise; with one damping for all segments 15, 5, 52
+        # 1.2, 1.6 times the noise; with one damping for all segments 15, 52
         assert found.validation_rmse < 3 * noise
 
 

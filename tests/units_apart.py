@@ -30,7 +30,7 @@ NEARLY, OF_AN_ERROR, OPEN = 1.0, 0.3, 0.005
 
 SEEDS = {"position_ripple": 6001, "bristle": 22}  # ripple of seed 21: none that fits can follow
 LENGTHS = {
-    "hard_stop": 5000,
+    "hard_stop": 3000,
     "sensor_offset": 2000,
     **dict.fromkeys(("backlash", "compliance", "hysteresis", "sensor_quantization", "stiction"), 1200),
 }  # samples until they have been met, or are told well enough; 800 else
@@ -78,7 +78,7 @@ def drawn(hidden):
 
 def driven(seed):
     """Return a record of voltage and motion of a motor against a spring."""
-    rng, t = np.random.default_rng(seed), 2e-3 * np.arange(1500)
+    rng, t = np.random.default_rng(seed), 4e-3 * np.arange(800)
     volts = 3.0 * np.sin(4.0 * t + seed) + 2.0 * np.sin(11.0 * t) + np.sin(23.0 * t)
     x, _ = np.asarray(
         cdf.event_response(MOTOR.with_effect(cdf.LinearSpring(40.0)), t, volts, input_hold="zoh").outputs
