@@ -131,10 +131,11 @@ def test_a_law_that_raises_inside_verify_is_told():
             raise ZeroDivisionError("beyond the table")
         return min(max(u, -1.0), 1.0)
 
-    response = cdf.describing_function_response(ct.tf([12], [1, 2, 2, 1]), law, np.linspace(1.5, 5.5, 5))
+    H = ct.tf([12], [1, 2, 2, 1])
+    response = cdf.describing_function_response(H, cdf.saturation(1.0), np.linspace(1.5, 5.5, 5))
     assert response.limit_cycles
     with pytest.raises(RuntimeError, match="user-written law.*beyond the table"):
-        cdf.verify(response)
+        cdf.verify(response, loop=cdf.closed_loop(H, law))
 
 
 def test_a_law_that_raises_is_told_by_event_response():
