@@ -69,7 +69,7 @@ def test_the_search_for_crossings_needs_little_more_memory_than_the_family(H, bl
 
 def test_a_fine_grid_finds_the_same_crossings_as_a_coarse_one():
     coarse = cdf.describing_function_response(PID, FRICTION, *box(30))
-    fine = cdf.describing_function_response(PID, FRICTION, *box(1000))
+    fine = cdf.describing_function_response(PID, FRICTION, *box(500))
     places = [[(c.amplitude, c.omega) for c in r.limit_cycles] for r in (coarse, fine)]
     assert len(places[0]) == 2 and np.allclose(*places, rtol=1e-11, atol=0)
 
