@@ -33,7 +33,7 @@ import ctrl_df as cdf
 bare = cdf.Inertia(0.08).with_effect(cdf.Coulomb(0.3)).with_effect(cdf.Viscous(0.1))
 joint = bare.with_effect(cdf.Gravity(2.5, angle0=0.2))  # 0.85 kg at 0.3 m
 
-t = np.arange(0, 8, 0.01)
+t = np.arange(0, 8, 0.02)
 torque = 1.6 * np.sin(2 * np.pi * 0.35 * t) + 1.2 * np.sin(2 * np.pi * 0.9 * t + 1)
 start = [0.2, 0.0]  # it hangs
 angle = np.asarray(cdf.event_response(joint, t, torque, start, input_hold="zoh").outputs)[0]
@@ -50,7 +50,7 @@ cdf.compare(model, record).missing_force.plot(against="position")
 # %%
 # The diagnosis sets it beside other forces that a joint may have:
 
-forces = ["gravity", "linear_spring", "cubic_spring", "constant_force", "stribeck"]
+forces = ["gravity", "linear_spring", "constant_force", "stribeck"]
 diagnosis = cdf.diagnose(model, record, candidates=forces)
 print(diagnosis.explanation)
 print(diagnosis.table(rows=4))

@@ -31,7 +31,7 @@ motor = cdf.Inertia(0.01).with_effect(cdf.Coulomb(0.05)).with_effect(cdf.Viscous
 cogging = motor.with_effect(cdf.PositionRipple(0.04, wavelength=notch))
 print({name: p.unit for name, p in cogging.parameters.items()})
 
-t = np.arange(0, 6, 0.005)
+t = np.arange(0, 6, 0.01)
 torque = 0.16 * np.sin(2 * np.pi * 0.4 * t) + 0.1 * np.sin(2 * np.pi * 1.1 * t + 1)
 angle = np.degrees(np.asarray(cdf.event_response(cogging, t, torque, input_hold="zoh").outputs)[0])
 angle += 0.02 * np.random.default_rng(24).standard_normal(t.size)
@@ -42,7 +42,7 @@ print(record)
 # **Result.**
 
 model = cdf.Inertia(0.012).with_effect(cdf.Coulomb(0.06)).with_effect(cdf.Viscous(0.015))
-diagnosis = cdf.diagnose(model, record, candidates=["position_ripple", "stribeck", "linear_spring", "drift"])
+diagnosis = cdf.diagnose(model, record, candidates=["position_ripple", "stribeck", "drift"])
 print(diagnosis.explanation)
 found = diagnosis.best
 print(f"{2 * np.pi / found.parameters['wavelength']:.2f} notches a turn")

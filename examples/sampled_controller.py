@@ -15,8 +15,8 @@ holds its output in between. What does the sample time change?
 v. A hold delays by half a sample on average: :math:`\Delta t / 2`.
 
 **Method.** ``closed_loop(pid, axis, dt=...)``. The ticks and the period of the oscillation have no common
-measure, so the motion never repeats exactly: ``find_limit_cycle`` gives averages over many swings, and
-``stable`` is None.
+measure, so the motion never repeats exactly: ``find_limit_cycle``, begun at the continuous orbit, gives
+averages over many swings, and ``stable`` is None.
 """
 
 import matplotlib.pyplot as plt
@@ -29,9 +29,9 @@ pid = cdf.pid(2000, 44250, 130)
 continuous = cdf.find_limit_cycle(cdf.closed_loop(pid, axis))
 print(f"continuous: {continuous.omega:.4f} rad/s, {1e3 * continuous.output_amplitude:.3f} mm")
 
-sampled = {}
+sampled, about = {}, (continuous.amplitude, continuous.omega)  # where to begin: N, rad/s
 for dt in (0.001, 0.004):
-    sampled[dt] = orbit = cdf.find_limit_cycle(cdf.closed_loop(pid, axis, dt=dt))
+    sampled[dt] = orbit = cdf.find_limit_cycle(cdf.closed_loop(pid, axis, dt=dt), guess=about)
     print(
         f"{1e3 * dt:8.0f} ms: {orbit.omega:.4f} rad/s, {1e3 * orbit.output_amplitude:.3f} mm, "
         f"stable: {orbit.stable}"

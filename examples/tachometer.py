@@ -29,7 +29,7 @@ import ctrl_df as cdf
 
 motor = cdf.TorqueConstant(0.05, resistance=1.2)
 machine = cdf.Inertia(2e-4, [motor, cdf.Coulomb(4e-3), cdf.Viscous(2e-5), cdf.QuadraticDrag(2e-7)])
-t = np.arange(0, 8, 2e-3)
+t = np.arange(0, 8, 8e-3)
 volts = 12 * np.sin(2 * np.pi * 0.25 * t) + 6 * np.sin(2 * np.pi * 0.9 * t + 1)
 speed = np.asarray(cdf.event_response(machine, t, volts, input_hold="zoh").outputs)[1] * 60 / (2 * np.pi)
 speed += 2.0 * np.random.default_rng(7).standard_normal(t.size)

@@ -77,7 +77,7 @@ def test_many_runs_and_orbits_of_such_laws():
         alone = cdf.event_response(block.with_parameters({"rough.slope": slope}), T, push(T))
         assert np.max(np.abs(y - alone.outputs[0])) < 1e-9
     # the fundamental of a brute-force run that has forgotten its start
-    w, a, laps = 5.0, 12.0, 40
+    w, a, laps = 5.0, 12.0, 24
     t = np.linspace(0, laps * 2 * np.pi / w, laps * 400 + 1)
     level, static = shapes((1.5, 4.0, 0.2))
     x = Dry(level, static, lambda x, v: -0.8 * v - 30.0 * x, 1.5, lambda t: a * np.cos(w * t)).run(t)

@@ -20,9 +20,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 PID = cdf.pid(1800, 19500, 100)
-BOXES = [
-    (np.geomspace(3, 60, n), np.geomspace(8, 200, m)) for n, m in ((40, 60), (30, 40), (60, 80), (15, 20))
-]
+BOXES = [(np.geomspace(3, 60, n), np.geomspace(8, 200, m)) for n, m in ((30, 40), (24, 36), (15, 20))]
 
 
 def drive(restitution, motor=1.0, load=8.0, gap=0.018):
@@ -225,7 +223,7 @@ def test_the_motion_listed_is_the_motion_of_the_masses(seed):
     assert cycle.stable is False or cycle.forced_multiplier < 1
 
 
-@pytest.mark.parametrize("box", BOXES[::3], ids=lambda b: f"{b[0].size}x{b[1].size}")
+@pytest.mark.parametrize("box", BOXES[1:], ids=lambda b: f"{b[0].size}x{b[1].size}")
 def test_the_loop_with_restitution_08(box):
     """Whatever the grid: a rattle, a motion of three periods beside another, a motion that repels."""
     response = cdf.describing_function_response(PID, drive(0.8), *box)
@@ -252,7 +250,7 @@ def test_the_loop_with_restitution_02_is_as_before():
 def test_velocity_output_has_the_same_cycles():
     """N of the velocity is j omega times N: the PID on it is divided by s."""
     onto_velocity = PID * ct.tf([1], [1, 0])
-    response = cdf.describing_function_response(onto_velocity, drive(0.8), *BOXES[1], output="v")
+    response = cdf.describing_function_response(onto_velocity, drive(0.8), *BOXES[2], output="v")
     places = [(c.amplitude, c.omega) for c in response.limit_cycles if c.branch]
     assert places == [pytest.approx((5.5174685, 14.8580540), rel=1e-6)]
 

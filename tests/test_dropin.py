@@ -60,7 +60,7 @@ def test_python_controls_own_tests_pass(tmp_path):
         [sys.executable, "-m", "pytest", "-q", "-p", "dropin_plugin", "-p", "no:cacheprovider"]
         + ["-c", str(tmp_path / "pytest.ini"), "--pyargs", "control.tests.descfcn_test"],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
         capture_output=True,
         text=True,
         timeout=300,

@@ -253,7 +253,7 @@ def test_a_saturated_loop_is_tuned_below_its_limits():
     assert tuned.bandwidth == pytest.approx(ct.margin(L)[3], rel=1e-3)
     assert tuned.feasible and tuned.verdict == "rests"
     limited = cdf.Mass(9).with_effect(cdf.Viscous(3)).with_effect(cdf.InputSaturation(50))
-    found = cdf.tune_pid(limited, bandwidth=12, ki=0)
+    found = cdf.tune_pid(limited, bandwidth=12, ki=0, kd=89)
     assert found.feasible and found.verdict == "rests" and 12 <= found.bandwidth <= 18
 
 

@@ -59,13 +59,19 @@ CASES = {
     "find_limit_cycle": find,
     "find_limit_cycle, law of the user's": find_in_a_law_of_the_users,
     "verify": search,
+    "many runs": lambda: cdf.batch_response(L, [0, 10], 0, np.full((10**6, 3), 1e-3)),
+    "one long run of many": lambda: cdf.batch_response(L, [0, 1e7], 0, [0, 1e-3, 0]),
+    "many runs of a law of the user's": lambda: cdf.batch_response(user, [0, 1e3], 1, np.ones((10**4, 2))),
 }
+LATER = {"many runs": 0.6, "one long run of many": 0.6, "many runs of a law of the user's": 0.6}  # [s]
+cdf.batch_response(L, [0, 1])
+cdf.batch_response(user, [0, 1])
 cdf.event_response(L, [0, 1], 0, [0, 1e-3, 0])
 cdf.event_response(user, [0, 1], 0, [1, 0])
 cdf.find_limit_cycle(L)
 answers = {}
 for name in CASES:
-    delay = 0.2
+    delay = LATER.get(name, 0.2)
     sent = time.time() + delay
     child = subprocess.Popen(["/bin/sh", "-c", f"sleep {delay}; kill -INT {os.getpid()}"])
     outcome = "returned"
@@ -88,7 +94,7 @@ def test_ctrl_c_ends_compiled_work_within_a_second():
     assert done.returncode == 0, done.stderr
     assert "Exception ignored" not in done.stderr, done.stderr
     answers = json.loads(done.stdout)
-    assert len(answers) == 8
+    assert len(answers) == 11
     for name, (outcome, late) in answers.items():
         assert outcome == "interrupted", f"{name}: {outcome}"
         assert late < 1.0, f"{name}: {late:.2f} s"  # measured 0.03 at worst
@@ -125,10 +131,11 @@ def test_a_law_that_raises_inside_verify_is_told():
             raise ZeroDivisionError("beyond the table")
         return min(max(u, -1.0), 1.0)
 
-    response = cdf.describing_function_response(ct.tf([12], [1, 2, 2, 1]), law, np.linspace(1.5, 5.5, 5))
+    H = ct.tf([12], [1, 2, 2, 1])
+    response = cdf.describing_function_response(H, cdf.saturation(1.0), np.linspace(1.5, 5.5, 5))
     assert response.limit_cycles
     with pytest.raises(RuntimeError, match="user-written law.*beyond the table"):
-        cdf.verify(response)
+        cdf.verify(response, loop=cdf.closed_loop(H, law))
 
 
 def test_a_law_that_raises_is_told_by_event_response():

@@ -5,7 +5,7 @@ import pytest
 
 import ctrl_df as cdf
 
-T = np.arange(0.0, 6.0, 0.004)
+T = np.arange(0.0, 6.0, 0.01)
 FORCE = 9 * np.sin(3 * T) + 5 * np.sin(8 * T)
 TRUE = cdf.friction_mass(2.2, 3.0, 6.0)
 

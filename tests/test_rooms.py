@@ -1,6 +1,7 @@
 """Rooms keep their privacy and their size, and docs/architecture.md names the files there are."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -14,6 +15,12 @@ MOST_FILES = 15
 
 ALIKE = {"blocks/effects", "demo", "plot", "plot/identification", "plot/parts"}
 """Folders whose files are of one kind: an effect, a picture; no page names them one by one."""
+
+
+@functools.cache
+def trees():
+    """Return the files of the package, read."""
+    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))}
 
 
 def room(path):
@@ -46,14 +53,13 @@ def read(tree):
 
 
 def test_no_private_attribute_is_read_from_outside_its_package():
-    trees = {path: ast.parse(path.read_text()) for path in sorted(ROOT.rglob("*.py"))}
     owners: dict[str, set] = {}
-    for path, tree in trees.items():
+    for path, tree in trees().items():
         for name in filter(private, defined(tree)):
             owners.setdefault(name, set()).add(room(path))
     found = [
         f"{path.relative_to(ROOT)}:{line}: {name}, of {', '.join(sorted(owners[name]))}"
-        for path, tree in trees.items()
+        for path, tree in trees().items()
         for line, name in read(tree)
         if name in owners and room(path) not in owners[name] and name not in OF_PYTHON_CONTROL
     ]
@@ -63,8 +69,8 @@ def test_no_private_attribute_is_read_from_outside_its_package():
 def test_no_private_name_is_imported_from_another_package():
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}: {alias.name}"
-        for path in sorted(ROOT.rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text()))
+        for path, tree in trees().items()
+        for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and node.level != 1
         for alias in node.names
         if private(alias.name)

@@ -226,16 +226,18 @@ STABLE = """
 """
 
 
-def test_the_fingerprint_is_the_same_in_every_process():
-    seen = set()
-    for seed in ("1", "2"):
-        environment = {**os.environ, "PYTHONHASHSEED": seed}
-        done = subprocess.run(
-            [sys.executable, "-c", textwrap.dedent(STABLE)], env=environment, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        seen.add(done.stdout.strip())
-    assert len(seen) == 1 and len(seen.pop()) == 64
+def test_the_fingerprint_is_the_same_in_every_process(capsys):
+    """Here and in one that orders sets otherwise."""
+    code, other = textwrap.dedent(STABLE), "2" if os.environ.get("PYTHONHASHSEED") == "1" else "1"
+    exec(code, {"__name__": "__main__"})
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONHASHSEED": other},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == capsys.readouterr().out and len(done.stdout.strip()) == 64
 
 
 def _opaque():

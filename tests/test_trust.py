@@ -129,10 +129,10 @@ def test_van_der_pol_at_five():
     response = cdf.describing_function_response(
         ct.tf([5.0, 0], [1, -5.0, 1]),
         lambda u: u**3 / 3,
-        np.geomspace(0.1, 10, 30),
-        np.geomspace(0.1, 10, 30),
+        np.geomspace(0.5, 5, 10),
+        np.geomspace(0.3, 3, 12),
     )
-    (row,) = cdf.verify(response)
+    (row,) = cdf.verify(response, search=False)
     assert row.exact.omega == pytest.approx(0.5410834, rel=1e-6) and row.verdict == "shifted"
 
 
