@@ -16,7 +16,7 @@ from ..thresholds import LEVEL
 from .errors import rms
 from .points import Points, counted, points_of
 from .simulated import relative_error, simulate_table
-from .thresholds import REGION_BANDS
+from .thresholds import PAIRS_LEAST, REGION_BANDS
 
 
 @dataclass(frozen=True)
@@ -152,22 +152,33 @@ def inner_block(model):
 
 
 def scatter(tables) -> Scatter:
-    """Correlate the errors of neighbouring grid points."""
-    product, power, pairs, count = 0.0, 0.0, 0, 0
-    for e in tables:
-        good = np.isfinite(e)
-        power += float(np.sum(np.abs(e[good]) ** 2))
-        count += int(good.sum())
-        for a, b in ((e[1:], e[:-1]), (e[:, 1:], e[:, :-1])):
-            both = np.isfinite(a) & np.isfinite(b)
-            product += float(np.sum((a[both] * b[both].conj()).real))
-            pairs += int(both.sum())
-    if pairs < 3 or power == 0:
+    """Correlate the errors of neighbouring grid points, over amplitude and over frequency apart.
+
+    Where errors are independent the phase of each pair's product is any: of the sum of the real parts the
+    variance is half the sum of the squares, however much larger errors are at one end of the plane. The
+    direction that tells more counts: a print may be smooth over amplitude and change from one frequency to
+    the next.
+    """
+    found = []
+    for axis in (0, 1):
+        pairs = [_neighbours(e, axis) for e in tables]
+        a, b = (np.concatenate(side) for side in zip(*pairs, strict=True))
+        size = np.abs(a) * np.abs(b)
+        if len(size) >= PAIRS_LEAST and size.any():
+            product = float(np.sum(np.real(a * b.conj())))
+            power = math.sqrt(float(np.sum(np.abs(a) ** 2)) * float(np.sum(np.abs(b) ** 2)))
+            found.append((abs(product) / math.sqrt(0.5 * float(np.sum(size**2))), product / power))
+    if not found:
         return Scatter(0.0, 1.0)
-    correlation = product / pairs / (power / count)
-    # each complex pair is two products of unit variance under independence
-    z = abs(correlation) * math.sqrt(2 * pairs)
-    return Scatter(correlation, math.erfc(z / math.sqrt(2)))
+    z, correlation = max(found)
+    return Scatter(correlation, min(len(found) * math.erfc(z / math.sqrt(2)), 1.0))
+
+
+def _neighbours(errors: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors of neighbours along an axis of a grid, where both are known."""
+    lines = np.moveaxis(errors, axis, 0)
+    both = np.isfinite(lines[1:]) & np.isfinite(lines[:-1])
+    return lines[1:][both], lines[:-1][both]
 
 
 def plane_regions(points: Points, error) -> Regions:

@@ -14,12 +14,12 @@ import numpy as np
 from ...numerals import percent
 from ..estimation.common_friction import inertia
 from ..monitor import Monitor
-from ..results.explain import places
+from ..results.explain import explains_nothing, places
 from ..results.table_diagnosis import FrequencyDiagnosis
 from ..selection.search import Located, Remainder, Search, Words
 from ..selection.thresholds import LEFT
 from ..starting.extend import applicable
-from ..thresholds import DISTINGUISHED
+from ..thresholds import DISTINGUISHED, UNMOVED
 from .candidate import fit_either, try_effect
 from .compare import comparison_of_tables, plane_regions, scatter
 from .errors import log_density, outlying, rms
@@ -268,26 +268,20 @@ class TableSearch(Search):
         there = self._split(self.base)[1]
         shown = best if significant else self.base
         unexplained = structure > 2.0 * noise and structure > LEFT * there and not self._scattered(shown)
+        if not (unexplained or significant) and self.errors(self.base)[0] > UNMOVED:
+            # on few points scatter may not be told from structure: no table scatters that much
+            return Remainder(noise, structure, unexplained=True, doubt=explains_nothing())
         return Remainder(noise, structure, unexplained)
 
     def _split(self, t) -> tuple[float, float]:
         """Split the relative error into scatter and what neighbours on the plane have in common."""
         p, e = self.points, np.where(outlying(t.error), 0.0, t.error)
-        differences = []
-        for record in np.unique(p.record):
-            at = np.flatnonzero(p.record == record)
-            for a in np.unique(p.A[at]):
-                line = at[p.A[at] == a]
-                line = line[np.argsort(p.omega[line])]
-                if len(line) >= 3:
-                    # second differences see scatter six times as strong as a smooth print
-                    differences.append(e[line[2:]] - 2 * e[line[1:-1]] + e[line[:-2]])
-        total = rms(e)
-        stated = p.stated
-        if not differences:
+        total, stated = rms(e), p.stated
+        # the direction in which a print is smoother tells more of the scatter
+        rough = [r for along, at in ((p.omega, p.A), (p.A, p.omega)) if (r := _rough(e, along, (p.record, at)))]
+        if not rough:
             return (stated, math.sqrt(max(total**2 - stated**2, 0.0))) if stated else (total, 0.0)
-        rough = float(np.median(np.abs(np.concatenate(differences)))) / math.sqrt(6 * math.log(2))
-        noise = min(max(rough, stated), total) if stated == 0 else min(stated, total)
+        noise = min(stated or min(rough), total)
         return noise, math.sqrt(max(total**2 - noise**2, 0.0))
 
     def _scattered(self, t) -> bool:
@@ -322,6 +316,19 @@ class TableSearch(Search):
             "before": before,
             "after": before if best is self.base else comparison_of_tables(best.block, tables),
         }
+
+
+def _rough(error, along, lines) -> float:
+    """Return the scatter of errors by their second differences over `along`; 0 where there are none.
+
+    Second differences see scatter six times as strong as a smooth print. `lines`: values that points of one
+    line have in common.
+    """
+    order = np.lexsort((along, *lines))
+    error, lines = error[order], np.array(lines)[:, order]
+    same = np.all((lines[:, 2:] == lines[:, 1:-1]) & (lines[:, 1:-1] == lines[:, :-2]), axis=0)
+    differences = (error[2:] - 2 * error[1:-1] + error[:-2])[same]
+    return float(np.median(np.abs(differences))) / math.sqrt(6 * math.log(2)) if len(differences) else 0.0
 
 
 def _train_mask(points: Points, records: int, validation: bool) -> np.ndarray:

@@ -28,6 +28,10 @@ GIVE_UP_START = GIVE_UP
 
 # --- errors of points -------------------------------------------------------------------------------
 
+PAIRS_LEAST = 3
+"""Pairs of neighbours at least that tell whether errors of points are independent: of two, nothing is beyond
+chance at one in a hundred."""
+
 GROSS = 0.02
 """Share of the points of a table expected to err by as much as N itself, as motions coexist: one in 50, fewer
 than one of the tables of `tests/test_frequency.py`, so that a second such point has to show itself."""
