@@ -121,6 +121,9 @@ def test_guess_of_the_wrong_kind():
     loop = cdf.closed_loop(FRICTION, cdf.friction_mass(9, 5, 0.5))
     with pytest.raises(TypeError, match="a guess must be"):
         cdf.find_limit_cycle(loop, guess="near 14 rad/s")
+    other = cdf.find_limit_cycle(loop)
+    with pytest.raises(TypeError, match="must have the 5 states of the loop; got one with"):
+        cdf.find_limit_cycle(cdf.closed_loop(BACKLASH, cdf.backlash_masses(1, 8, 0.018, 0.8)), guess=other)
 
 
 def test_a_guess_at_which_nothing_moves_finds_no_orbit():

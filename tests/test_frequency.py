@@ -198,6 +198,13 @@ def test_a_table_held_out():
     plt.close(drawn.figure)
 
 
+def test_a_ladder_ends_where_points_are_too_few_for_another_parameter():
+    grid = ((9.0, 60.0), (2.0, 40.0))
+    study = improve(user_block(), table(grid=grid, SPRING=150.0), candidates=("linear_spring",))
+    assert study.verdict == "unknown"
+    assert "Linear spring was not added: a diagnosis needs more points" in str(study)
+
+
 def test_two_effects_are_climbed():
     study = improve(user_block(), table(grid=FEWEST, DRAG=60.0, SPRING=150.0), candidates=FEW[:2])
     assert set(study.effects) == {"quadratic_drag", "linear_spring"}

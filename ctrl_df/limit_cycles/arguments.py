@@ -12,6 +12,12 @@ from ..checks import count, flag, positive, real_array, shown
 
 def checked_guess(loop, guess: Any) -> Any:
     """Return a guess as it is meant: a cycle, a pair (amplitude, omega), or the state as an array."""
+    known = len(getattr(guess, "states", ()))
+    if known and isinstance(loop, ct.NonlinearIOSystem) and known != loop.nstates:
+        raise TypeError(
+            f"an orbit given as a guess must have the {loop.nstates} states of the loop; got one with {known}, of "
+            "another loop. Give its (amplitude, omega) instead."
+        )
     if guess is None or hasattr(guess, "amplitude") or not isinstance(loop, ct.NonlinearIOSystem):
         return guess
     n = loop.nstates or 0

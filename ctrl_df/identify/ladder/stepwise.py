@@ -24,7 +24,7 @@ from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rival
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.long_prediction import LongPrediction, long_prediction
-from ..selection.search import Search
+from ..selection.search import Search, TooFewData
 from ..selection.thresholds import CONFIRMED, SHOWS_HARDLY
 from ..selection.verdict import Diagnosed, diagnosed, is_significant
 from ..thresholds import FLOOR
@@ -191,7 +191,12 @@ class StepwiseSelection:
             if revision.structure.key in self.visited:
                 break
             how = _addition(best) | {"dropped": revision.dropped, "instead": revision.instead}
-            ahead = self._visit(revision.structure, node, how, step)
+            try:
+                ahead = self._visit(revision.structure, node, how, step)
+            except TooFewData as too_few:
+                node = node.refusing(best.id, f"{_named(best)} was not added: {too_few}")
+                self.visited[node.structure.key] = node
+                break
             gain, held = self._compared(_extended_model(ahead), node.structure.block, ahead.search)
             # a step that dropped or replaced others does not need the evidence of an additional effect
             least = node.search.significant * (-1 if revision.dropped or revision.instead else 1)
@@ -348,7 +353,10 @@ class StepwiseSelection:
             "instead": tuple(e for e in new if e not in gone),
             "evidence": effect.evidence - max(node.diagnosis.ranking[0].evidence, 0.0),
         }
-        other = self._visit(structure, end, how, best=best)
+        try:
+            other = self._visit(structure, end, how, best=best)
+        except TooFewData:
+            return None
         return other if self._beats(_extended_model(other), end.structure.block, other.search) else None
 
     def _beats(self, block, end, search: Search) -> bool:
@@ -397,12 +405,15 @@ def _extended_model(node: Node):
 
 def _refusal(effect: CandidateEffect, held: tuple[float, float]) -> str:
     """Return why an effect was not added; `held`: errors on held-out data, with it and without."""
-    name = effect.id.replace("_", " ")
     return (
-        f"{name.capitalize()} was not added: it improves the model on the segments on which the previous "
+        f"{_named(effect)} was not added: it improves the model on the segments on which the previous "
         f"model was validated, but not on those chosen for the model with it (held-out error "
         f"{percent(held[0])} with it, {percent(held[1])} without)."
     )
+
+
+def _named(effect: CandidateEffect) -> str:
+    return effect.id.replace("_", " ").capitalize()
 
 
 def _addition(effect: CandidateEffect) -> dict:

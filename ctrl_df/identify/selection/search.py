@@ -74,6 +74,10 @@ class Words:
     shows: str
 
 
+class TooFewData(ValueError):
+    """Raised where data are too few for a search with the parameters that a model has."""
+
+
 class Search(ABC):
     """The fits of one diagnosis so far: a value, of which `candidates` and `confirm` return the next one.
 

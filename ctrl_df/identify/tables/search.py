@@ -16,7 +16,7 @@ from ..estimation.common_friction import inertia
 from ..monitor import Monitor
 from ..results.explain import explains_nothing, places
 from ..results.table_diagnosis import FrequencyDiagnosis
-from ..selection.search import Located, Remainder, Search, Words
+from ..selection.search import Located, Remainder, Search, TooFewData, Words
 from ..selection.thresholds import LEFT
 from ..starting.extend import applicable
 from ..thresholds import DISTINGUISHED, UNMOVED
@@ -95,7 +95,7 @@ class TableSearch(Search):
         self.points = points_of([*records, *validation])
         self.train = _train_mask(self.points, len(records), bool(validation))
         if np.count_nonzero(self.train) <= len(self.free) // 2 + 1:
-            raise ValueError(
+            raise TooFewData(
                 f"a diagnosis needs more points than parameters; {int(self.train.sum())} points remain to "
                 f"fit {len(self.free)} parameters. Measure more, or name fewer in free."
             )
