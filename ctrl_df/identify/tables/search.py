@@ -278,7 +278,9 @@ class TableSearch(Search):
         p, e = self.points, np.where(outlying(t.error), 0.0, t.error)
         total, stated = rms(e), p.stated
         # the direction in which a print is smoother tells more of the scatter
-        rough = [r for along, at in ((p.omega, p.A), (p.A, p.omega)) if (r := _rough(e, along, (p.record, at)))]
+        rough = [
+            r for along, at in ((p.omega, p.A), (p.A, p.omega)) if (r := _rough(e, along, (p.record, at)))
+        ]
         if not rough:
             return (stated, math.sqrt(max(total**2 - stated**2, 0.0))) if stated else (total, 0.0)
         noise = min(stated or min(rough), total)
