@@ -188,7 +188,7 @@ def test_what_breaks_away_begins_as_the_narrow_bump_that_was_found():
 
 @pytest.mark.parametrize("wide", [False, True])
 def test_laws_that_do_the_same_are_equal_although_their_fits_are_not(wide):
-    """A spring is a pendulum over a small angle, also where one fit has ended farther off than noise tells."""
+    """A spring is a pendulum over a small angle, and where one fit has ended farther off than noise, too."""
     scale, t = 1.0 if wide else 1e-3, 4e-3 * np.arange(1000)
     block = cdf.Inertia(2.0).with_effect(cdf.Coulomb(0.4 * scale)).with_effect(cdf.Viscous(3.0))
     force = scale * (6 * np.sin(2 * t) + 3 * np.sin(5.3 * t))

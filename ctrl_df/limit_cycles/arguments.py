@@ -15,8 +15,8 @@ def checked_guess(loop, guess: Any) -> Any:
     known = len(getattr(guess, "states", ()))
     if known and isinstance(loop, ct.NonlinearIOSystem) and known != loop.nstates:
         raise TypeError(
-            f"an orbit given as a guess must have the {loop.nstates} states of the loop; got one with {known}, of "
-            "another loop. Give its (amplitude, omega) instead."
+            f"an orbit given as a guess must have the {loop.nstates} states of the loop; got one with "
+            f"{known}, of another loop. Give its (amplitude, omega) instead."
         )
     if guess is None or hasattr(guess, "amplitude") or not isinstance(loop, ct.NonlinearIOSystem):
         return guess
