@@ -115,8 +115,7 @@ class _Question:
         search = self.search
         chosen = [t for t in found if t.confirmed]
         judged = chosen or found
-        likely = _probabilities([t.evidence for t in judged], search)
-        weights = dict(zip((t.key for t in judged), likely, strict=True))
+        weights = dict(zip((t.key for t in judged), _probabilities(judged, search), strict=True))
         ranking = [_entry(t, search, weights.get(t.key, 0.0), ()) for t in found]
         significant = bool(ranking) and ranking[0].evidence > search.significant
         verdict = NONE if search.exact() else AMBIGUOUS if significant else UNKNOWN
@@ -144,11 +143,9 @@ class _Question:
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
         ranking = []
-        equals = [[o for o in chosen if o is not t and search.equivalent(t, o)] for t in chosen]
-        # what the data cannot distinguish is as likely as the best of them: fits end where they end
-        evidence = [max(o.evidence for o in (t, *same)) for t, same in zip(chosen, equals, strict=True)]
-        for t, same, weight in zip(chosen, equals, _probabilities(evidence, search), strict=True):
-            ranking.append(_entry(t, search, weight, tuple(o.key for o in same)))
+        for candidate, weight in zip(chosen, _probabilities(chosen, search), strict=True):
+            same = tuple(o.key for o in chosen if o is not candidate and search.equivalent(candidate, o))
+            ranking.append(_entry(candidate, search, weight, same))
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
         recorded = search.as_recorded(chosen[0]) if chosen else ""
         examined = bool(ranking) and not recorded and not search.exact()
@@ -321,15 +318,15 @@ def _errs_more(first: CandidateEffect, search: Search) -> bool:
     return first.nrmse_holdout > FLOOR * search.errors(search.base)[1]
 
 
-def _probabilities(evidence: Sequence[float], search: Search) -> list[float]:
-    """Return those of candidates with this evidence, "nothing missing" being one more, equal before the data.
+def _probabilities(chosen, search: Search) -> list[float]:
+    """Return those of candidates, "nothing missing" being one more, the candidates equal before the data.
 
     Prior odds for nothing are those at which chance makes an effect significant: what is not is less likely
     than nothing.
     """
-    if not evidence:
+    if not chosen:
         return []
-    log_odds = [*evidence, search.significant]
+    log_odds = [*(t.evidence for t in chosen), search.significant]
     weights = np.exp(np.clip(np.array(log_odds) - max(log_odds), -EXPONENT, 0))
     return (weights / weights.sum())[:-1].tolist()
 
