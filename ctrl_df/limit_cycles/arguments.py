@@ -12,15 +12,17 @@ from ..checks import count, flag, positive, real_array, shown
 
 def checked_guess(loop, guess: Any) -> Any:
     """Return a guess as it is meant: a cycle, a pair (amplitude, omega), or the state as an array."""
-    known = len(getattr(guess, "states", ()))
-    if known and isinstance(loop, ct.NonlinearIOSystem) and known != loop.nstates:
-        raise TypeError(
-            f"an orbit given as a guess must have the {loop.nstates} states of the loop; got one with "
-            f"{known}, of another loop. Give its (amplitude, omega) instead."
-        )
-    if guess is None or hasattr(guess, "amplitude") or not isinstance(loop, ct.NonlinearIOSystem):
+    if guess is None or not isinstance(loop, ct.NonlinearIOSystem):
         return guess
     n = loop.nstates or 0
+    if hasattr(guess, "amplitude"):
+        known = len(getattr(guess, "states", ()))
+        if known and known != n:
+            raise TypeError(
+                f"an orbit given as a guess must have the {n} states of the loop; got one with {known}, of "
+                "another loop. Give its (amplitude, omega) instead."
+            )
+        return guess
     wrong = (
         "a guess must be a predicted limit cycle, an orbit, a pair (amplitude, omega), or a state as an "
         f"array of shape ({n},); got {shown(guess)}."

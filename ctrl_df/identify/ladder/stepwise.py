@@ -21,6 +21,7 @@ from ...cached import cached_property
 from ...numerals import percent
 from ..monitor import COMPLETE, UNDER_WAY, Monitor
 from ..results.diagnosis import NONE, UNKNOWN, CandidateEffect, Diagnosis, rivals
+from ..results.explain import named
 from ..results.ladder import Step, Study, last_diagnosis, outcome
 from ..results.neighbours import ADD, Neighbour, Neighbours
 from ..selection.long_prediction import LongPrediction, long_prediction
@@ -194,7 +195,7 @@ class StepwiseSelection:
             try:
                 ahead = self._visit(revision.structure, node, how, step)
             except TooFewData as too_few:
-                node = node.refusing(best.id, f"{_named(best)} was not added: {too_few}")
+                node = node.refusing(best.id, f"{named(best).capitalize()} was not added: {too_few}")
                 self.visited[node.structure.key] = node
                 break
             gain, held = self._compared(_extended_model(ahead), node.structure.block, ahead.search)
@@ -406,14 +407,10 @@ def _extended_model(node: Node):
 def _refusal(effect: CandidateEffect, held: tuple[float, float]) -> str:
     """Return why an effect was not added; `held`: errors on held-out data, with it and without."""
     return (
-        f"{_named(effect)} was not added: it improves the model on the segments on which the previous "
-        f"model was validated, but not on those chosen for the model with it (held-out error "
+        f"{named(effect).capitalize()} was not added: it improves the model on the segments on which the "
+        f"previous model was validated, but not on those chosen for the model with it (held-out error "
         f"{percent(held[0])} with it, {percent(held[1])} without)."
     )
-
-
-def _named(effect: CandidateEffect) -> str:
-    return effect.id.replace("_", " ").capitalize()
 
 
 def _addition(effect: CandidateEffect) -> dict:

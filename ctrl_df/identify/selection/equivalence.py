@@ -122,11 +122,11 @@ def acts_as(tried: CandidateFit, other: CandidateFit, data: SegmentedData, block
     like = matching_along(data, block)(tried.block.effects[-1], other.block.effects[-1])
     if like is None:
         return False
-    views = [(data.train, other.train), (data.validation, other.validation)]
     pieces = []
-    for view, fit in ((v, f) for v, f in views if f is not None):
-        model = with_values_of(tried.block, fit.model, like)
-        pieces += data.fit(model, (), view=view, starts=fit.starts, iterations=0).simulated_pieces
+    for view, fit in ((data.train, other.train), (data.validation, other.validation)):
+        if fit is not None:
+            model = with_values_of(tried.block, fit.model, like)
+            pieces += data.fit(model, (), view=view, starts=fit.starts, iterations=0).simulated_pieces
     return indistinguishable(pieces, other.outputs, noise)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -142,10 +143,13 @@ class _Question:
         search = self.search
         best = chosen[0] if chosen else search.base
         keys = {c.key for c in chosen}
-        ranking = []
-        for candidate, weight in zip(chosen, _probabilities(chosen, search), strict=True):
-            same = tuple(o.key for o in chosen if o is not candidate and search.equivalent(candidate, o))
-            ranking.append(_entry(candidate, search, weight, same))
+        same: dict[str, tuple[str, ...]] = dict.fromkeys((c.key for c in chosen), ())
+        for a, b in itertools.combinations(chosen, 2):
+            if search.equivalent(a, b):
+                same[a.key] += (b.key,)
+                same[b.key] += (a.key,)
+        weights = _probabilities(chosen, search)
+        ranking = [_entry(t, search, w, same[t.key]) for t, w in zip(chosen, weights, strict=True)]
         ranking += [_entry(t, search, 0.0, ()) for t in found if t.key not in keys]
         recorded = search.as_recorded(chosen[0]) if chosen else ""
         examined = bool(ranking) and not recorded and not search.exact()

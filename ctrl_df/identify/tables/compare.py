@@ -26,7 +26,8 @@ class Scatter:
     Attributes
     ----------
     correlation : float
-        Of the relative errors of neighbouring points; 0 for mere scatter, near 1 for an effect's print.
+        Of the relative errors of neighbours over amplitude or over frequency, whichever tells more; 0 for
+        mere scatter, near 1 for an effect's print.
     p_value : float
         Probability of a correlation this far from none by chance.
     """
