@@ -138,6 +138,16 @@ def test_what_records_are_rounded_to_is_their_noise(step, noise, verdict):
         assert found.ranking[0].probability > 0.99
 
 
+def test_a_sensor_is_fine_for_the_largest_motion():
+    # of the motion held out, a sixth as large, the grid is coarse: it is that of the same sensor
+    t = TIMES[:1500]
+    runs = [noisy(seed, size, 0.0, SPRUNG, t)[:2] for seed, size in ((0, 9.0), (1, 1.5))]
+    step = 0.09 * np.std(runs[0][1])
+    records = [cdf.Measurement(t, u, step * np.round(x / step)) for u, x in runs]
+    found = cdf.diagnose(SPRUNG, records[0], holdout=records[1], candidates=["sensor_quantization"])
+    assert found.verdict == "none" and f"rounded to {step:.3g} m" in found.explanation
+
+
 def test_a_larger_motion_held_out_errs_by_what_the_parameters_are_known_to():
     t = TIMES[:1500]
     (u, x, errors), (v, z, more) = noisy(0, 0.4, 0.002, SPRUNG, t), noisy(1, 30.0, 0.002, SPRUNG, t)

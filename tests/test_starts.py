@@ -1,6 +1,7 @@
 """Where windows begin, what drives them, what a rounding sensor tells: parts of the measurement half."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,8 @@ from ctrl_df.identify.selection import confirmation
 from ctrl_df.identify.selection.attempts import _attempts_of, _Places
 from ctrl_df.identify.selection.equivalence import acts_as, indistinguishable, restarted_from_better
 from ctrl_df.identify.selection.evidence import ranked
-from ctrl_df.identify.selection.reference import refitted_from
+from ctrl_df.identify.selection.reference import input_steps, refitted_from
+from ctrl_df.identify.selection.structure_search import StructureSearch
 from ctrl_df.identify.selection.thresholds import LOAD_SHARES
 from ctrl_df.identify.shooting.noise_model import prediction_errors
 from ctrl_df.identify.shooting.variables import default_free
@@ -76,6 +78,24 @@ def test_an_input_of_steps_is_decimated_without_loss():
         data = record(PLAIN, steps)
         error = np.max(np.abs(free_run(PLAIN, data, decimation=4) - free_run(PLAIN, data)))
         assert error < bound * np.ptp(data.y)
+
+
+def test_a_step_of_the_input_is_as_long_as_the_noise_lets_it_be():
+    # a drive under a stiff controller, whose force changes at every sample: 6,000 of them
+    data = record(PLAIN, steps=False, n=6000)
+    rng, size = np.random.default_rng(1), np.std(data.y)
+    steps = []
+    for noise in (1e-3, 1e-6):
+        noisy = cdf.Measurement(data.t, data.u, data.y + noise * size * rng.standard_normal(len(data)))
+        search = StructureSearch(PLAIN, [noisy], (), default_free(PLAIN))
+        assert input_steps(search.at) == search.at.data.decimation
+        steps.append(search.at.data.decimation)
+        far, near = (
+            replace(search.at.data, decimation=k).fit(PLAIN, (), iterations=0) for k in (steps[-1], 1)
+        )
+        off = np.std(np.concatenate(far.simulated) - np.concatenate(near.simulated))
+        assert off < 0.25 * search.at.nearest.rmse
+    assert steps == [2, 1]
 
 
 def test_rounding_is_told_from_noise_of_the_same_size():

@@ -24,7 +24,7 @@ from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import is_joint, resonating
 from ..starting.screen import Screen, starts_for
-from ..thresholds import GIVE_UP
+from ..thresholds import DISTINGUISHED, GIVE_UP, GROWTH
 from .thresholds import (
     ANOTHER_START,
     BEGUN,
@@ -141,7 +141,8 @@ def fit_effects(
     resonating = run(_joint_attempts, [(c, s, screen, free) for c in joints for s in LOAD_SHARES])
     attempts = _best([a for found in resonating for a in found], JOINTS)
     attempts += [a for _, found in begun for a in found]
-    rounds = _Rounds(run, screen, span, 1 if known else KEPT, GIVE_UP * reached)
+    kept, within = (1, 0.0) if known else (KEPT, GROWTH)
+    rounds = _Rounds(run, screen, span, kept, within, GIVE_UP * reached)
     later = {c.id: c for c in kinds if c.generalizes in kinds}
     best = rounds.fitted(
         [a for a in attempts if a.key not in later], _Best({}, min(screen.base.rmse, reached))
@@ -221,6 +222,8 @@ class _Rounds:
         Stroke of the records [m].
     kept : int
         Fits of an effect that are continued after the first steps.
+    within : float
+        Those within so many times the error of the best are continued, too.
     near : float
         Error above which a fit is given up.
     """
@@ -229,6 +232,7 @@ class _Rounds:
     screen: Screen
     span: float
     kept: int
+    within: float
     near: float
 
     def fitted(self, attempts: list[Attempt], best: _Best) -> _Best:
@@ -238,7 +242,7 @@ class _Rounds:
         least = min([best.least, *(a.error for a in begun)])
         begun += self.run(_first_steps, [(a, GIVE_UP * least) for a in attempts if a.multimodal])
         begun = [a for a in begun if distinct(a.trial, self.span)]
-        kept = _best(begun, self.kept)
+        kept = _best(begun, self.kept, self.within)
         # a few steps from the user's values show little: the baseline may have ended in another minimum
         own = _best([a for a in begun if a.nominal], 1)
         begun = [*kept, *(a for a in own if not any(a is o for o in kept))]
@@ -250,9 +254,19 @@ class _Rounds:
         fits = dict(best.fits)
         for t in found:
             known = fits.get(t.key)
-            if distinct(t, self.span) and (known is None or priced(t) < priced(known)):
-                fits[t.key] = t
+            if distinct(t, self.span):
+                fits[t.key] = t if known is None else self._better(t, known)
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
+
+    def _better(self, one: CandidateFit, other: CandidateFit) -> CandidateFit:
+        """Return the better of two fits of an effect: the data held out decide between equals.
+
+        Over a few segments, waves of many lengths may look the same.
+        """
+        nats = max(one.train.count, 1) * abs(math.log(priced(one) / priced(other)))
+        if nats > DISTINGUISHED:
+            return min(one, other, key=priced)
+        return min(one, other, key=lambda t: self.screen.data.validate(t).validation_rmse)
 
 
 def _ranked_starts(begun, screen: Screen) -> list[CandidateFit]:
@@ -290,11 +304,12 @@ def distinct(fitted: CandidateFit, span) -> bool:
     return fitted.block.effects[-1].distinct(span, at_bound)
 
 
-def _best(attempts, count) -> list[Attempt]:
-    """Return the best of each effect, so many, the best first."""
-    ordered, kept = sorted(attempts, key=lambda a: a.error), []
-    for a in ordered:
-        if sum(a.key == o.key for o in kept) < count:
+def _best(attempts, count, within=0.0) -> list[Attempt]:
+    """Return the best of each effect, the best first: so many, and all within so many times its error."""
+    kept = []
+    for a in sorted(attempts, key=lambda a: a.error):
+        same = [o for o in kept if o.key == a.key]
+        if len(same) < count or a.error <= within * same[0].error:
             kept.append(a)
     return kept
 

@@ -52,15 +52,15 @@ def step_as_recorded(tried: CandidateFit, records: Sequence[Measurement]) -> flo
 
     All values lie on the grid, which shows without a model: rounding is then noise, and nothing is missing.
     Values that only cluster about the lines of a grid have a noise of their own; a coarse grid changes the
-    measurement itself.
+    measurement itself. A sensor is fine for the largest motion of all records: it is the same in the others.
     """
     step = _step(tried) if rounds(tried) else 0.0
-    for known in map(sensed, records):
-        for y, column in zip(known.values, known.columns, strict=True):
-            fine = step <= FINE * float(np.std(y)) and abs(step_of(y) - step) <= SAME_STEP * step
-            if column == POSITION and not fine:
-                return 0.0
-    return step
+    outputs = [
+        pair for known in map(sensed, records) for pair in zip(known.values, known.columns, strict=True)
+    ]
+    places = [y for y, column in outputs if column == POSITION]
+    fine = step <= FINE * max((float(np.std(y)) for y in places), default=math.inf)
+    return step if fine and all(abs(step_of(y) - step) <= SAME_STEP * step for y in places) else 0.0
 
 
 def misses_lines(tried: CandidateFit) -> bool:

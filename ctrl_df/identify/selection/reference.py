@@ -149,6 +149,23 @@ def reference_of(block, segmentations: Sequence[SegmentedData], free: tuple[str,
     return Reference(segmentations, data, base, shortest.moved(base.train), noise, regressed=guess)
 
 
+def input_steps(at: Reference) -> int:
+    """Return how many samples a step of the input may take: longer ones move the model as every sample does.
+
+    That is, within what its error over the shortest segments hides.
+    """
+    longest, hides = at.segmentations[-1], at.nearest.rmse
+
+    def motion(step) -> np.ndarray:
+        fit = replace(longest, decimation=step).fit(at.base.block, (), iterations=0)
+        return np.concatenate(fit.simulated)
+
+    step, exact = longest.decimation, motion(1)
+    while step > 1 and math.hypot(hides, np.std(motion(step) - exact)) > FLOOR * hides:
+        step //= 2
+    return step
+
+
 def _past_events(found: FitResult, shortest: SegmentedData, data: SegmentedData) -> list[FitResult]:
     """Return a model refitted past events; none where short segments leave noise alone.
 

@@ -23,7 +23,7 @@ from .confirmation import confirmed, stages
 from .equivalence import acts_as, breaks_away_only, indistinguishable, matching_along
 from .evidence import ranked, step_as_recorded
 from .named import beyond_range, refitted, whole_refit
-from .reference import Reference, reference_of
+from .reference import Reference, input_steps, reference_of
 from .remaining import located, remainder
 from .screening import Screening
 from .search import Remainder, Search, Words
@@ -59,6 +59,9 @@ class StructureSearch(Search):
         self.block, self.free, self.prior = block, tuple(free), prior
         data = prepare(block, records, validation, prior)
         self.at = reference_of(block, self.segmentations(data), self.free)
+        if (step := input_steps(self.at)) < data.decimation:
+            data = replace(data, decimation=step)
+            self.at = reference_of(block, self.segmentations(data), self.free)
 
     @property
     def base(self):
