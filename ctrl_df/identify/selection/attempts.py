@@ -259,14 +259,17 @@ class _Rounds:
         return _Best(fits, min([least, *(t.train.rmse for t in found)]))
 
     def _better(self, one: CandidateFit, other: CandidateFit) -> CandidateFit:
-        """Return the better of two fits of an effect: the data held out decide between equals.
+        """Return the better of two fits of an effect: the data held out decide where those fitted do not.
 
-        Over a few segments, waves of many lengths may look the same.
+        Over a few segments, waves of many lengths may err by the same. Fits in one minimum, with the same
+        output within what the noise hides, are not two.
         """
-        nats = max(one.train.count, 1) * abs(math.log(priced(one) / priced(other)))
-        if nats > DISTINGUISHED:
-            return min(one, other, key=priced)
-        return min(one, other, key=lambda t: self.screen.data.validate(t).validation_rmse)
+        better, worse = sorted((one, other), key=priced)
+        behind = max(better.train.count, 1) * math.log(priced(worse) / priced(better))
+        apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.outputs, other.outputs, strict=True))
+        if behind > DISTINGUISHED or apart < 2 * DISTINGUISHED * better.train.rmse**2:
+            return better
+        return min(better, worse, key=lambda t: self.screen.data.validate(t).validation_rmse)
 
 
 def _ranked_starts(begun, screen: Screen) -> list[CandidateFit]:
