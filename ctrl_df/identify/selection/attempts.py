@@ -19,12 +19,14 @@ from ..estimation.fit import FitResult
 from ..estimation.per_record import begun_with_angles
 from ..estimation.segmented import CandidateFit, SegmentedData
 from ..prediction.values import with_values
+from ..shooting.noise_model import NoiseModel
 from ..starting.extend import applicable, extended
 from ..starting.proposals import proposals
 from ..starting.regression import Start
 from ..starting.resonance_grid import is_joint, resonating
 from ..starting.screen import Screen, starts_for
 from ..thresholds import DISTINGUISHED, GIVE_UP, GROWTH
+from .equivalence import indistinguishable
 from .thresholds import (
     ANOTHER_START,
     BEGUN,
@@ -266,8 +268,8 @@ class _Rounds:
         """
         better, worse = sorted((one, other), key=priced)
         behind = max(better.train.count, 1) * math.log(priced(worse) / priced(better))
-        apart = sum(float(np.sum((a - b) ** 2)) for a, b in zip(one.outputs, other.outputs, strict=True))
-        if behind > DISTINGUISHED or apart < 2 * DISTINGUISHED * better.train.rmse**2:
+        noise = NoiseModel(np.zeros(0), better.train.rmse)
+        if behind > DISTINGUISHED or indistinguishable(better.outputs, worse.outputs, noise):
             return better
         return min(better, worse, key=lambda t: self.screen.data.validate(t).validation_rmse)
 

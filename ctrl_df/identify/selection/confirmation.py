@@ -26,7 +26,7 @@ from ..prediction.segments import facts
 from ..prediction.values import with_values
 from ..thresholds import FLOOR, GIVE_UP, GROWTH, NOTHING, STILL_POSSIBLE
 from .attempts import distinct
-from .equivalence import best_of_each, fitted_from, restarted_from_better
+from .equivalence import best_of_each, restarted_from_better, validated_from
 from .evidence import misses_lines, ranked, rounds
 from .reference import Reference
 from .thresholds import (
@@ -370,7 +370,7 @@ def _in_best_minimum(at: Reference, tried: CandidateFit, exactly: bool, least: f
 def _cross_started(at: Reference, chosen, those) -> list[CandidateFit]:
     """Restart candidates from the fit of each of `those`; keep the best of every effect, best first."""
     pairs = [(t, best) for best in those for t in chosen if t is not best]
-    begun = fitted_from(pairs, at.data.fine, at.base.block)
+    begun = validated_from(pairs, at.data.fine, at.base.block)
     return best_of_each(ranked(at.base, [*chosen, *begun])[0])
 
 

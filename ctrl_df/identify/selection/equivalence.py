@@ -55,26 +55,18 @@ def restarted_from_better(
     list of CandidateFit
         In the same order.
     """
-    matching = matching_along(data, block)
     pairs = [(t, best) for i, best in enumerate(found[:best_ones]) for t in found[i + 1 :]]
-    matches = side_by_side(lambda pair: matching(*(t.block.effects[-1] for t in pair)), pairs)
-    able = [
-        (*pair, match)
-        for pair, match in zip(pairs, matches, strict=True)
-        if match is not None or all(_breaks_away(t) for t in pair)
-    ]
-    fits = side_by_side(lambda a: cross_started(a[0], a[1], data, a[2]), able)
     nearest = {t.key: t for t in found}
-    for (tried, *_), fit in zip(able, fits, strict=True):
-        if fit is not None and fit.rmse < BETTER * nearest[tried.key].train.rmse:
-            nearest[tried.key] = replace(tried, train=fit)
+    for again in fitted_from(pairs, data, block):
+        if again.train.rmse < BETTER * nearest[again.key].train.rmse:
+            nearest[again.key] = again
     return list(nearest.values())
 
 
 def fitted_from(
     pairs: Sequence[tuple[CandidateFit, CandidateFit]], data: SegmentedData, block
 ) -> list[CandidateFit]:
-    """Return those candidates whose law can represent another's, fitted from that one's fit and validated.
+    """Return those candidates whose law can represent another's, fitted from that one's fit.
 
     `pairs`: a candidate, and the other; `data`, `block`: see `matching_along`.
     """
@@ -83,9 +75,17 @@ def fitted_from(
     def started_there(pair):
         tried, other = pair
         fit = cross_started(tried, other, data, matching(tried.block.effects[-1], other.block.effects[-1]))
-        return fit and thresholds_refined(data.validate(replace(tried, train=fit)), data)
+        return fit and replace(tried, train=fit)
 
     return [t for t in side_by_side(started_there, pairs) if t is not None]
+
+
+def validated_from(
+    pairs: Sequence[tuple[CandidateFit, CandidateFit]], data: SegmentedData, block
+) -> list[CandidateFit]:
+    """Return what `fitted_from` does, validated."""
+    found = fitted_from(pairs, data, block)
+    return side_by_side(lambda t: thresholds_refined(data.validate(t), data), found)
 
 
 def best_of_each(fits: Sequence[CandidateFit]) -> list[CandidateFit]:

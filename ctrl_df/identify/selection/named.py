@@ -10,7 +10,7 @@ from ..estimation.refit_records import refit_records, undetermined
 from ..estimation.segmented import CandidateFit
 from ..prediction.values import with_values
 from ..thresholds import DISTINGUISHED, FLOOR, GROWTH, RULED_OUT
-from .equivalence import best_of_each, fitted_from
+from .equivalence import best_of_each, validated_from
 from .evidence import ranked
 from .reference import Reference
 from .thresholds import ON_LIMIT, REFIT_MOST, REFIT_PROMISES
@@ -46,7 +46,7 @@ def refitted(
     for _ in known:
         first = chosen[0]
         behind = [t for t in chosen if t.key in known and first.evidence - t.evidence > DISTINGUISHED]
-        begun = fitted_from([(t, first) for t in behind], at.data.fine, at.base.block)
+        begun = validated_from([(t, first) for t in behind], at.data.fine, at.base.block)
         if not begun:
             break
         again = side_by_side(lambda t: refit(at, t), begun)
