@@ -17,11 +17,12 @@ import numpy as np
 
 from ...simulate.parallel import side_by_side
 from ..prediction.values import block_of, with_values
-from ..shooting.thresholds import BETTER
+from ..shooting.thresholds import BETTER, EFFORT_ALONE
 from ..thresholds import GIVE_UP, GROWTH, STILL_POSSIBLE
 from .common_friction import dry_level
 from .fit import FitResult
 from .segmented import CandidateFit, SegmentedData
+from .starts import same_begins
 from .thresholds import (
     GLANCE,
     GLANCED_ON,
@@ -227,13 +228,15 @@ def thresholds_refined(tried: CandidateFit, data: SegmentedData) -> CandidateFit
     table = tried.block.parameters
     for name in [n for n in tried.train.names if table[n].threshold]:
         low, high = left_open = _open_range(tried.train, data.fit, name)
+        best = tried
         for _ in range(2 if high > low else 0):
             values = np.geomspace(low, high, LEVELS_BETWEEN)
             runs = side_by_side(functools.partial(_with_level, tried, name, data=data), values)
             i = min(range(len(runs)), key=lambda k: runs[k].validation_rmse)
-            if runs[i].validation_rmse < tried.validation_rmse:
-                tried = runs[i]
+            best = min(best, runs[i], key=lambda t: t.validation_rmse)
             low, high = values[max(i - 1, 0)], values[min(i + 1, len(values) - 1)]
+        if best is not tried:
+            tried = min(tried, data.validate(best), key=lambda t: t.validation_rmse)
         train = data.fit(tried.block, tried.train.names, starts=tried.train.starts, iterations=1)
         error = _uniform(tried.block.parameters[name].value, *left_open)
         tried = replace(tried, train=train.with_errors({name: error}))
@@ -259,8 +262,14 @@ def _uniform(value: float, low: float, high: float) -> float:
 
 
 def _with_level(tried: CandidateFit, name, value, data: SegmentedData) -> CandidateFit:
-    block = _moved(tried.block, name, value)
-    return data.validate(replace(tried, train=replace(tried.train, model=block)))
+    """Return a validated model with another level, run over the same segments from where that one begins."""
+    held = tried.validation
+    assert held is not None
+    near = data.states_of(
+        _moved(held.model, name, value), view=data.validation,
+        starts=same_begins(held, data.validation.segments), effort=EFFORT_ALONE,
+    )  # fmt: skip
+    return replace(tried, train=replace(tried.train, model=_moved(tried.block, name, value)), validation=near)
 
 
 def _open_range(found: FitResult, fit: Callable[..., FitResult], name: str) -> tuple[float, float]:
