@@ -4,6 +4,7 @@ Every case is a call, the type of its error, and words that the message must hol
 it takes less than two seconds, is one readable sentence or two, and comes from no inner part by accident.
 """
 
+import copy
 import dataclasses
 import inspect
 import os
@@ -32,9 +33,13 @@ def refused(call, error, *words):
         warnings.simplefilter("ignore")
         call()
     text = str(caught.value)
-    assert type(caught.value) in (ValueError, TypeError, FileNotFoundError, RuntimeError) or isinstance(
-        caught.value, OSError
-    )
+    assert type(caught.value) in (
+        ValueError,
+        TypeError,
+        AttributeError,
+        FileNotFoundError,
+        RuntimeError,
+    ) or isinstance(caught.value, OSError)
     assert time.perf_counter() - began < 2.0, "an error that comes late"
     for word in words:
         assert word in text, f"{word!r} is not in {text!r}"
@@ -130,6 +135,43 @@ PID = cdf.pid(2000, 44250, 130)
 )  # fmt: skip
 def test_blocks(case):
     refused(*case[1:])
+
+
+@pytest.mark.parametrize(
+    "block", [DRIVE, cdf.Inertia(2.0), cdf.play(1), cdf.relay(1), cdf.Massless(cdf.Coulomb(1))]
+)
+def test_a_block_is_a_value_for_python_control_too(block):
+    name, before = next(iter(block.params)), dict(block.params)
+
+    def assign():
+        block.params[name] = 30.0
+
+    refused(assign, TypeError, "params['", "= 30.0", "with_parameters")
+    refused(lambda: block.params.update({name: 30.0}), TypeError, "with_parameters")
+    for attribute in ("params", "updfcn", "outfcn"):
+        refused(
+            lambda a=attribute: setattr(block, a, {}), AttributeError, f"{attribute}={{}}", "Make another"
+        )
+    assert block.params == before
+    again = pickle.loads(pickle.dumps(block)), copy.deepcopy(block), block.copy(name="second")
+    assert all(other == block and other.params == before for other in again)
+    block.params.copy()[name] = 30.0  # as python-control does
+    renamed = copy.deepcopy(block)
+    renamed.name = "third"
+    assert pickle.loads(pickle.dumps(block.params)) == before
+
+
+def test_blocks_whose_parameters_stay_run_in_python_control():
+    loop = cdf.closed_loop(cdf.pid(20, 0, 13), cdf.Mass(3.7))
+    assert type(loop.params) is dict and loop.params["mass"] == 3.7
+    for params, mass in ((None, 3.7), ({"mass": 30.0}, 30.0)):
+        own = ct.input_output_response(loop, [0, 0.1, 0.2], 1.0, params=params).outputs[0]
+        alone = ct.input_output_response(
+            cdf.closed_loop(cdf.pid(20, 0, 13), cdf.Mass(mass)), [0, 0.1, 0.2], 1.0
+        ).outputs[0]
+        assert own == pytest.approx(alone, rel=1e-9)
+    slope = ct.linearize(cdf.Mass(3.7), [0, 0], [0], params={"mass": 2.0}).B
+    assert slope[1, 0] == pytest.approx(0.5)
 
 
 def test_every_effect_refuses_text_truth_and_nan():

@@ -8,7 +8,6 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..cached import cached_property
@@ -19,6 +18,7 @@ from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Viscous
+from .immutable import Immutable
 from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
 from .stated import share_name, stated_parameters, static_levels
@@ -26,7 +26,7 @@ from .stated import share_name, stated_parameters, static_levels
 _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
 
 
-class Mechanism(ct.NonlinearIOSystem):
+class Mechanism(Immutable):
     """An inertia plus a tuple of effects; a value, and a pure function of ``(t, x, u, params)``.
 
     Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form of `ctrl_df.blocks.compliant`; the event engine
