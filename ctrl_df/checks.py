@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 import os
+import sys
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,14 @@ from .values.per_record import PerRecord
 
 CHECK_VALUE = "Check the value and its unit (SI)."
 _SHOWN = 60  # characters of a value that an error repeats
+
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Warn at the line of the user's that led here: the nearest that is not of this package."""
+    package, level, frame = os.path.dirname(__file__) + os.sep, 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def shown(value) -> str:
@@ -217,6 +227,11 @@ def path_of(owner: str, name: str, value) -> Path:
     if not os.fspath(value) or "\0" in str(value):
         raise ValueError(f"{owner} needs {name} as the path of a file; got {shown(value)}. Give it a name.")
     return Path(value)
+
+
+def no_file(owner: str, name: str, path) -> FileNotFoundError:
+    """Return the error that there is no such file; the remedy is in its words."""
+    return FileNotFoundError(f"{owner} needs {name} as a file that exists; got {path}. Check the path.")
 
 
 def place_to_write(owner: str, name: str, value) -> Path:

@@ -359,6 +359,7 @@ SQUARE = ct.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
 
 
 SMALL = FAMILY(DRIVE, [9.0], [2.0])
+STATIC = cdf.describing_function_family(cdf.relay(1), [1.0, 2.0])
 
 
 def family(**keywords):
@@ -407,6 +408,8 @@ def family(**keywords):
         ("response H True", lambda: RESPONSE(True, DRIVE, [9, 10], [1, 2]), TypeError, "linear system"),
         ("frd text", lambda: SMALL.frd("9"), TypeError, "amplitude", "'9'"),
         ("frd outside", lambda: SMALL.frd(99), ValueError, "the family's grid", "99"),
+        ("harmonics outside", lambda: SMALL.plot_harmonics(omega=99), ValueError, "<= omega <=", "99"),
+        ("harmonics without", lambda: STATIC.plot_harmonics(omega=9), ValueError, "omega", "Leave it out"),
         ("save(5)", lambda: SMALL.save(5), TypeError, "path", "5"),
         ("load_family(1)", lambda: cdf.load_family(1), TypeError, "path", "1"),
         ("response save", lambda: RESPONSE(H, DRIVE, [9, 10], [1, 2], save=3), TypeError, "save", "path"),

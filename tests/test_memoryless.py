@@ -26,6 +26,7 @@ from ctrl_df.blocks.primitives import PiecewiseAffine
 from ctrl_df.df import work
 from ctrl_df.df.describing import describing_function, describing_function_family
 from ctrl_df.df.family import load_family
+from ctrl_df.df.warning import DescribingFunctionWarning
 
 STATIC = [
     saturation(2),
@@ -271,14 +272,21 @@ def test_family_saves_loads_and_makes_frd(tmp_path):
     )
     assert np.allclose(family.frd(11.0).frdata[0, 0], describing_function(block, 11.0, family.omega))
     assert np.array_equal(back.frd(8.0).frdata[0, 0], family.N[1])
-    assert back.frd(11.0).frdata[0, 0, 0] == pytest.approx(
-        family.frd(11.0).frdata[0, 0, 0], rel=0.02
-    )  # interpolated
+    with pytest.warns(DescribingFunctionWarning, match="at 11 is interpolated from 10 and 12.*load_family"):
+        between = back.frd(11.0).frdata[0, 0, 0]
+    assert between == pytest.approx(family.frd(11.0).frdata[0, 0, 0], rel=0.02)
+    with_block = load_family(tmp_path / "f.npz", block)
+    assert np.array_equal(with_block.frd(11.0).frdata, family.frd(11.0).frdata)  # no warning
+    with pytest.raises(ValueError, match="the block that the family was computed of.*mass=9.1"):
+        load_family(tmp_path / "f.npz", friction_mass(9.1, 5, 0.5))
+    with pytest.warns(DescribingFunctionWarning, match="stuck at 3 of 3 points, first A=4, omega=5"):
+        family.frd(4.0)
     with pytest.raises(ValueError, match="<= amplitude <="):
         family.frd(40.0)
     np.savez(tmp_path / "bad.npz", a=np.array([{}], dtype=object))
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="written by Family.save") as refused:
         load_family(tmp_path / "bad.npz")
+    assert "allow_pickle" not in str(refused.value)  # numpy's advice would run what the file holds
 
 
 def test_interrupted_work_resumes(tmp_path, monkeypatch):

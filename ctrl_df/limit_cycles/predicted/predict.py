@@ -9,7 +9,7 @@ import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
 from ...df.arguments import amplitudes_of
-from ...df.describing import describing_function_family, quiet_describing_function
+from ...df.describing import quiet_describing_function, quiet_family
 from ...df.dispatch import method_for
 from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
@@ -204,9 +204,7 @@ def describing_function_response(
         output=output, try_method=try_method, num_points=num_points, **(options or {})
     )
     zeros = (amplitudes == 0).any() or (omega is not None and np.any(np.asarray(omega) == 0))
-    family = describing_function_family(
-        F, positive, frequencies, orders, executor, save=save, progress=progress, **given
-    )
+    family = quiet_family(F, positive, frequencies, orders, executor, save=save, progress=progress, **given)
     if method.needs_omega:
         N_vals = family.minus_inverse
     else:
