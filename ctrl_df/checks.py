@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from .nearest import did_you_mean
 from .values.column import Column
 from .values.per_record import PerRecord
 
@@ -37,6 +38,12 @@ def shown(value) -> str:
         return f"an array of shape {value.shape}"
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 4]} ..."
+
+
+def kind_of(value) -> str:
+    """Return what a value is, with the module of its class where that is another package."""
+    cls = type(value)
+    return cls.__name__ if cls.__module__ == "builtins" else f"{cls.__module__}.{cls.__name__}"
 
 
 def is_number(value) -> bool:
@@ -130,6 +137,7 @@ def choice(owner: str, name: str, value, allowed) -> Any:
         words = " or ".join(repr(a) for a in allowed)
         raise (ValueError if isinstance(value, str) else TypeError)(
             f"{owner} needs {name}={words}; got {name}={shown(value)}."
+            f"{did_you_mean(value, allowed, 'Give one of these.')}"
         )
     return value
 
@@ -177,6 +185,7 @@ def known_name(owner: str, name: str, value, known) -> str:
     if not isinstance(value, str) or value not in known:
         raise (ValueError if isinstance(value, str) else TypeError)(
             f"{owner} needs {name} out of {', '.join(known) or 'none'}; got {shown(value)}."
+            f"{did_you_mean(value, known, 'Give one of these.' if known else '')}"
         )
     return value
 

@@ -9,12 +9,14 @@ import dataclasses
 import inspect
 import os
 import pickle
+import re
 import time
 import types
 import warnings
 from dataclasses import dataclass
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -44,7 +46,7 @@ def refused(call, error, *words):
     for word in words:
         assert word in text, f"{word!r} is not in {text!r}"
     assert 20 < len(text) < 1000 and "\n" not in text, text
-    assert text[-1] in ".)" or ("unrecognized keyword" in text and text[-1] == "?"), text
+    assert text[-1] in ".)" or re.search(r"Did you mean [^?]+\?$", text), text
     return text
 
 
@@ -195,6 +197,64 @@ def test_every_public_call_names_a_wrong_keyword(name):
     if any(p.kind is p.VAR_KEYWORD for p in stated) or not stated:
         return
     refused(lambda: public(wrong_word=1), TypeError, public.__name__, "unrecognized keyword: wrong_word=1")
+
+
+@table(
+    [
+        ("with_parameters", lambda: MASS.with_parameters(mass=2), TypeError, "mass=2", "Give values"),
+        ("with_effect()", lambda: MASS.with_effect(), TypeError, "with_effect needs effect", "Add"),
+        ("with_effect, two", lambda: MASS.with_effect(cdf.Coulomb(1), cdf.Viscous(1)), TypeError, "got 2"),
+        ("without_effect()", lambda: DRIVE.without_effect(), TypeError, "without_effect needs id"),
+        ("of an element", lambda: cdf.relay(1).with_parameters(level=2), TypeError, "level=2", "values"),
+        ("of an effect", lambda: cdf.Coulomb(1).replace(2), TypeError, "replace", "got 1"),
+        ("of a family", lambda: SMALL.frd(), TypeError, "frd needs amplitude"),
+        ("of a result", lambda: cdf.verify(CHECKED).table(foo=1), TypeError, "foo=1", "no keywords"),
+    ]
+)  # fmt: skip
+def test_methods_name_what_is_wrong_with_a_call_as_functions_do(case):
+    refused(*case[1:])
+
+
+@table(
+    [
+        ("part", lambda: DRIVE.with_parameters({"coulomb": 1}), "Did you mean coulomb.level?"),
+        ("letter", lambda: DRIVE.with_parameters({"coulomb.levl": 1}), "Did you mean coulomb.level?"),
+        ("effect", lambda: DRIVE.without_effect("colomb"), "Did you mean coulomb?"),
+        ("id", lambda: cdf.effect_class("stribek"), "Did you mean stribeck?"),
+        ("params", lambda: cdf.event_response(DRIVE, T, params={"masss": 1}), "Did you mean mass?"),
+        ("owner", lambda: cdf.event_response(LOOP, T, params={"plant.mass": 1}), "Did you mean mass?"),
+        ("hold", lambda: cdf.event_response(DRIVE, T, input_hold="linaer"), "Did you mean linear?"),
+        ("no hold", lambda: cdf.event_response(DRIVE, T, input_hold="foh"), "Give one of these."),
+        ("unit", lambda: cdf.parameter("mms"), "Did you mean ms? Known are m, "),
+    ]
+)  # fmt: skip
+def test_a_name_that_is_nearly_right_is_recognized(case):
+    refused(case[1], ValueError, case[2])
+
+
+PICTURES = {
+    "family": lambda: SMALL.plot(foo=2),
+    "element": lambda: STATIC.plot(foo=2),
+    "harmonics": lambda: SMALL.plot_harmonics(foo=2),
+    "Nyquist": lambda: cdf.describing_function_plot(CHECKED, foo=2),
+    "run": lambda: cdf.event_response(DRIVE, T, 1.0).plot(foo=2),
+    "orbit": lambda: cdf.find_limit_cycle(LOOP).plot(foo=2),
+}
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_a_picture_names_a_wrong_keyword_before_it_draws(picture):
+    before = plt.get_fignums()
+    with pytest.raises(TypeError, match=r"unrecognized keyword: foo=2; it takes .*title|what ct\.") as caught:
+        PICTURES[picture]()
+    assert isinstance(caught.value, AttributeError)  # as matplotlib's own
+    assert plt.get_fignums() == before
+
+
+def test_python_controls_answer_is_told_from_ours():
+    own = ct.describing_function_response(ct.tf([8], [1, 2, 2, 1]), ct.saturation_nonlinearity(1), [1, 4])
+    for call in (cdf.verify, cdf.describing_function_plot):
+        refused(lambda c=call: c(own), TypeError, "control.descfcn.", "ctrl_df.describing_function_response")
 
 
 def test_a_class_that_is_no_effect_is_not_registered():

@@ -223,7 +223,7 @@ def test_bad_elements(make):
         (lambda: describing_function_family(relay(1), []), ValueError, "at least one"),
         (lambda: describing_function_family(relay(1), [0.0, 1.0]), ValueError, "A > 0"),
         (lambda: describing_function_family(relay(1), [1.0], orders=0), ValueError, "orders"),
-        (lambda: describing_function(friction_mass(9, 5), 7.0, 1.0, output="z"), ValueError, "one of x, v"),
+        (lambda: describing_function(friction_mass(9, 5), 7.0, 1.0, output="z"), ValueError, "out of x, v"),
         (lambda: describing_function(relay(1), 1.0, wrong=2), TypeError, "unrecognized keyword"),
     ],
 )

@@ -19,7 +19,7 @@ class FixedParameters(dict):
             "block.with_parameters({name: value}), or give params={name: value} to the call that simulates."
         )
 
-    __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse
+    __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse  # pyright: ignore
 
     def copy(self) -> dict[str, Any]:
         """Return a dictionary of one's own."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..cached import cached_property
 from ..checks import known_name, mapping, number, shown, system_name
+from ..nearest import did_you_mean
 from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
@@ -182,6 +183,7 @@ class Mechanism(Immutable):
         if id not in self._keys:
             raise ValueError(
                 f"without_effect needs an id the block has ({', '.join(self._keys) or 'none'}); got {id!r}."
+                f"{did_you_mean(id, self._keys, 'Look at the effects of the block.')}"
             )
         kept = [e for k, e in zip(self._keys, self._effects, strict=True) if k != id]
         return self._remade(self._values, kept)

@@ -6,9 +6,11 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..calls import keywords_of
 from ..df.family import within
 from ..numerals import digits
 from .parts.curves import in_brackets, labels_of, log_ticks, memoryless, short, units
+from .parts.keywords import check_keywords
 from .parts.page import page
 
 _HARMONIC_STYLES = (("-", "o"), ("--", "s"), ("-", "^"), ("--", "v"), ("-.", "D"), (":", "x"))
@@ -38,6 +40,7 @@ def plot_harmonics(
     -------
     ControlPlot
     """
+    check_keywords("plot_harmonics", keywords_of(plot_harmonics)[1:], kwargs)
     orders = [k for k in (orders or range(1, 6)) if k <= family.orders]
     force, gain, _ = units(family)
     i = _nearest("amplitude", amplitude, family.amplitudes)
