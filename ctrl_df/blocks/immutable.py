@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 import control as ct
@@ -29,17 +30,27 @@ class FixedParameters(dict):
         return type(self), (dict(self),)
 
 
+class _GivenOnce:
+    """An attribute that is set once; reading it takes no longer than reading any other."""
+
+    def __init__(self, kept: Callable[[Any], Any] = lambda value: value):
+        self.kept = kept
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __set__(self, block: Any, value: Any) -> None:
+        if vars(block).get(self.name) is not None:
+            raise AttributeError(
+                f"a block is a value, whose {self.name} stays; got {self.name}={shown(value)}. Make another: "
+                "with_parameters, with_effect, or ct.nlsys for laws of your own."
+            )
+        vars(block)[self.name] = self.kept(value)
+
+
 class Immutable(ct.NonlinearIOSystem):
     """A system whose laws and parameters are given once; names, its own and of signals, may be changed."""
 
-    _GIVEN_ONCE = ("params", "updfcn", "outfcn")
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name in self._GIVEN_ONCE:
-            if vars(self).get(name) is not None:
-                raise AttributeError(
-                    f"a block is a value, whose {name} stays; got {name}={shown(value)}. Make another: "
-                    "with_parameters, with_effect, or ct.nlsys for laws of your own."
-                )
-            value = FixedParameters(value) if name == "params" else value
-        super().__setattr__(name, value)
+    params: Any = _GivenOnce(FixedParameters)
+    updfcn: Any = _GivenOnce()
+    outfcn: Any = _GivenOnce()
