@@ -55,12 +55,14 @@ _LAZY = {
     "sampled": "simulate.sampled",
     "event_response": "simulate.response",
     "batch_response": "simulate.batch",
+    "BatchResponse": "simulate.batch",
     "imposed_response": "simulate.imposed_response",
     "DescribingFunctionResponse": "limit_cycles.predicted.predict",
     "describing_function_response": "limit_cycles.predicted.predict",
     "LimitCycle": "limit_cycles.predicted.grade",
     "find_limit_cycle": "limit_cycles.finder",
     "Orbit": "limit_cycles.exact.orbit",
+    "NoOrbit": "limit_cycles.exact.orbit",
     "verify": "limit_cycles.verify",
     "limit_cycle_map": "gains.limit_cycle_map",
     "LimitCycleMap": "gains.map",
@@ -94,6 +96,7 @@ if _TYPE_CHECKING:  # the same names for editors and type checkers, which run no
     from .identify.diagnose import diagnose as diagnose
     from .identify.improve import improve as improve
     from .identify.refit import refit as refit
+    from .limit_cycles.exact.orbit import NoOrbit as NoOrbit
     from .limit_cycles.exact.orbit import Orbit as Orbit
     from .limit_cycles.finder import find_limit_cycle as find_limit_cycle
     from .limit_cycles.predicted.grade import LimitCycle as LimitCycle
@@ -102,6 +105,7 @@ if _TYPE_CHECKING:  # the same names for editors and type checkers, which run no
     from .limit_cycles.verify import verify as verify
     from .plot.describing import describing_function_plot as describing_function_plot
     from .plot.explore import explore as explore
+    from .simulate.batch import BatchResponse as BatchResponse
     from .simulate.batch import batch_response as batch_response
     from .simulate.imposed_response import imposed_response as imposed_response
     from .simulate.loop import closed_loop as closed_loop

@@ -8,17 +8,28 @@ from __future__ import annotations
 
 import math
 import os
+import sys
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .nearest import did_you_mean
 from .values.column import Column
 from .values.per_record import PerRecord
 
 CHECK_VALUE = "Check the value and its unit (SI)."
 _SHOWN = 60  # characters of a value that an error repeats
+
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Warn at the line of the user's that led here: the nearest that is not of this package."""
+    package, level, frame = os.path.dirname(__file__) + os.sep, 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def shown(value) -> str:
@@ -27,6 +38,12 @@ def shown(value) -> str:
         return f"an array of shape {value.shape}"
     text = " ".join(repr(value).split())
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 4]} ..."
+
+
+def kind_of(value) -> str:
+    """Return what a value is, with the module of its class where that is another package."""
+    cls = type(value)
+    return cls.__name__ if cls.__module__ == "builtins" else f"{cls.__module__}.{cls.__name__}"
 
 
 def is_number(value) -> bool:
@@ -120,6 +137,7 @@ def choice(owner: str, name: str, value, allowed) -> Any:
         words = " or ".join(repr(a) for a in allowed)
         raise (ValueError if isinstance(value, str) else TypeError)(
             f"{owner} needs {name}={words}; got {name}={shown(value)}."
+            f"{did_you_mean(value, allowed, 'Give one of these.')}"
         )
     return value
 
@@ -167,6 +185,7 @@ def known_name(owner: str, name: str, value, known) -> str:
     if not isinstance(value, str) or value not in known:
         raise (ValueError if isinstance(value, str) else TypeError)(
             f"{owner} needs {name} out of {', '.join(known) or 'none'}; got {shown(value)}."
+            f"{did_you_mean(value, known, 'Give one of these.' if known else '')}"
         )
     return value
 
@@ -217,6 +236,11 @@ def path_of(owner: str, name: str, value) -> Path:
     if not os.fspath(value) or "\0" in str(value):
         raise ValueError(f"{owner} needs {name} as the path of a file; got {shown(value)}. Give it a name.")
     return Path(value)
+
+
+def no_file(owner: str, name: str, path) -> FileNotFoundError:
+    """Return the error that there is no such file; the remedy is in its words."""
+    return FileNotFoundError(f"{owner} needs {name} as a file that exists; got {path}. Check the path.")
 
 
 def place_to_write(owner: str, name: str, value) -> Path:

@@ -189,6 +189,8 @@ def _improve(options) -> int:
     columns = {"time": "t", "input": "r" if model.closed_loop else "F", "output": "x", **model.columns}
     record = Measurement.from_csv(options.data, **columns)
     study = improve(_subject(model), record, budget=options.budget, progress=options.progress)
+    if math.isnan(study.steps[0].nrmse):  # Ctrl-C before anything was known
+        raise KeyboardInterrupt
     if options.report:
         study.report(options.report)
     if options.json:

@@ -17,6 +17,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from .nearest import did_you_mean
+
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
 _SYMBOLS: dict[str, tuple[float, dict[str, int]]] = {}
 
@@ -115,8 +117,13 @@ def _unknown(unit: str) -> ValueError:
             f"a unit must say how large it is; got {unit!r}. Convert counts of an encoder first: "
             "angle = 2 pi counts / (counts a turn), in rad."
         )
-    known = ", ".join(k for k in _SYMBOLS if k and k not in "μ1-")
-    return ValueError(f"a unit must be one of {known}, or made of these (mm/s, N s^2/m^2); got {unit!r}.")
+    known = [k for k in _SYMBOLS if k and k not in "μ1-"]
+    strange = [part for part in re.split(r"[\s/*·()^\d.]+", unit) if part and part not in _SYMBOLS]
+    meant = "".join(did_you_mean(part, known) for part in strange)
+    return ValueError(
+        f"a unit must be one of those known, or made of them (mm/s, N s^2/m^2); got {unit!r}.{meant} "
+        f"Known are {', '.join(known)}."
+    )
 
 
 def dimension(unit: str) -> dict[str, Power]:

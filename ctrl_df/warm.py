@@ -194,9 +194,9 @@ def _general_family():
 
 
 def _family(block):
-    from .df.describing import describing_function_family
+    from .df.describing import quiet_family
 
-    describing_function_family(block, np.array([20.0, 24.0, 30.0]), np.array([9.0, 10.0]))
+    quiet_family(block, np.array([20.0, 24.0, 30.0]), np.array([9.0, 10.0]))
 
 
 def _orbit():

@@ -13,10 +13,8 @@ GROUPS = {
 }
 RESULTS = {
     "limit_cycles.check": ("Check", "Row"),
-    "limit_cycles.exact.orbit": ("NoOrbit",),
     "limit_cycles.exact.basins": ("Fate",),
     "simulate.response": ("EventResponse",),
-    "simulate.batch": ("BatchResponse",),
     "identify.results.comparison": ("Comparison", "RecordComparison"),
     "identify.refit": ("Fit", "FittedParameter"),
     "identify.results.diagnosis": ("Diagnosis", "CandidateEffect"),

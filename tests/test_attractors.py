@@ -9,6 +9,8 @@ from scipy.optimize import brentq
 import ctrl_df as cdf
 from ctrl_df.df.closed_form.backlash import backlash_attractors
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*aperiodic:RuntimeWarning")  # some drives rattle
+
 NODE, WEIGHT = np.polynomial.legendre.leggauss(16)
 LONGEST = 24  # periods
 ONE_PERIOD = ("impact", "contact", "asymmetric")

@@ -4,16 +4,19 @@ Every case is a call, the type of its error, and words that the message must hol
 it takes less than two seconds, is one readable sentence or two, and comes from no inner part by accident.
 """
 
+import copy
 import dataclasses
 import inspect
 import os
 import pickle
+import re
 import time
 import types
 import warnings
 from dataclasses import dataclass
 
 import control as ct
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -32,14 +35,18 @@ def refused(call, error, *words):
         warnings.simplefilter("ignore")
         call()
     text = str(caught.value)
-    assert type(caught.value) in (ValueError, TypeError, FileNotFoundError, RuntimeError) or isinstance(
-        caught.value, OSError
-    )
+    assert type(caught.value) in (
+        ValueError,
+        TypeError,
+        AttributeError,
+        FileNotFoundError,
+        RuntimeError,
+    ) or isinstance(caught.value, OSError)
     assert time.perf_counter() - began < 2.0, "an error that comes late"
     for word in words:
         assert word in text, f"{word!r} is not in {text!r}"
     assert 20 < len(text) < 1000 and "\n" not in text, text
-    assert text[-1] in ".)" or ("unrecognized keyword" in text and text[-1] == "?"), text
+    assert text[-1] in ".)" or re.search(r"Did you mean [^?]+\?$", text), text
     return text
 
 
@@ -132,6 +139,43 @@ def test_blocks(case):
     refused(*case[1:])
 
 
+@pytest.mark.parametrize(
+    "block", [DRIVE, cdf.Inertia(2.0), cdf.play(1), cdf.relay(1), cdf.Massless(cdf.Coulomb(1))]
+)
+def test_a_block_is_a_value_for_python_control_too(block):
+    name, before = next(iter(block.params)), dict(block.params)
+
+    def assign():
+        block.params[name] = 30.0
+
+    refused(assign, TypeError, "params['", "= 30.0", "with_parameters")
+    refused(lambda: block.params.update({name: 30.0}), TypeError, "with_parameters")
+    for attribute in ("params", "updfcn", "outfcn"):
+        refused(
+            lambda a=attribute: setattr(block, a, {}), AttributeError, f"{attribute}={{}}", "Make another"
+        )
+    assert block.params == before
+    again = pickle.loads(pickle.dumps(block)), copy.deepcopy(block), block.copy(name="second")
+    assert all(other == block and other.params == before for other in again)
+    block.params.copy()[name] = 30.0  # as python-control does
+    renamed = copy.deepcopy(block)
+    renamed.name = "third"
+    assert pickle.loads(pickle.dumps(block.params)) == before
+
+
+def test_blocks_whose_parameters_stay_run_in_python_control():
+    loop = cdf.closed_loop(cdf.pid(20, 0, 13), cdf.Mass(3.7))
+    assert type(loop.params) is dict and loop.params["mass"] == 3.7
+    for params, mass in ((None, 3.7), ({"mass": 30.0}, 30.0)):
+        own = ct.input_output_response(loop, [0, 0.1, 0.2], 1.0, params=params).outputs[0]
+        alone = ct.input_output_response(
+            cdf.closed_loop(cdf.pid(20, 0, 13), cdf.Mass(mass)), [0, 0.1, 0.2], 1.0
+        ).outputs[0]
+        assert own == pytest.approx(alone, rel=1e-9)
+    slope = ct.linearize(cdf.Mass(3.7), [0, 0], [0], params={"mass": 2.0}).B
+    assert slope[1, 0] == pytest.approx(0.5)
+
+
 def test_every_effect_refuses_text_truth_and_nan():
     for effect in cdf.effect_library().values():
         fields = effect.__dataclass_fields__
@@ -153,6 +197,64 @@ def test_every_public_call_names_a_wrong_keyword(name):
     if any(p.kind is p.VAR_KEYWORD for p in stated) or not stated:
         return
     refused(lambda: public(wrong_word=1), TypeError, public.__name__, "unrecognized keyword: wrong_word=1")
+
+
+@table(
+    [
+        ("with_parameters", lambda: MASS.with_parameters(mass=2), TypeError, "mass=2", "Give values"),
+        ("with_effect()", lambda: MASS.with_effect(), TypeError, "with_effect needs effect", "Add"),
+        ("with_effect, two", lambda: MASS.with_effect(cdf.Coulomb(1), cdf.Viscous(1)), TypeError, "got 2"),
+        ("without_effect()", lambda: DRIVE.without_effect(), TypeError, "without_effect needs id"),
+        ("of an element", lambda: cdf.relay(1).with_parameters(level=2), TypeError, "level=2", "values"),
+        ("of an effect", lambda: cdf.Coulomb(1).replace(2), TypeError, "replace", "got 1"),
+        ("of a family", lambda: SMALL.frd(), TypeError, "frd needs amplitude"),
+        ("of a result", lambda: cdf.verify(CHECKED).table(foo=1), TypeError, "foo=1", "no keywords"),
+    ]
+)  # fmt: skip
+def test_methods_name_what_is_wrong_with_a_call_as_functions_do(case):
+    refused(*case[1:])
+
+
+@table(
+    [
+        ("part", lambda: DRIVE.with_parameters({"coulomb": 1}), "Did you mean coulomb.level?"),
+        ("letter", lambda: DRIVE.with_parameters({"coulomb.levl": 1}), "Did you mean coulomb.level?"),
+        ("effect", lambda: DRIVE.without_effect("colomb"), "Did you mean coulomb?"),
+        ("id", lambda: cdf.effect_class("stribek"), "Did you mean stribeck?"),
+        ("params", lambda: cdf.event_response(DRIVE, T, params={"masss": 1}), "Did you mean mass?"),
+        ("owner", lambda: cdf.event_response(LOOP, T, params={"plant.mass": 1}), "Did you mean mass?"),
+        ("hold", lambda: cdf.event_response(DRIVE, T, input_hold="linaer"), "Did you mean linear?"),
+        ("no hold", lambda: cdf.event_response(DRIVE, T, input_hold="foh"), "Give one of these."),
+        ("unit", lambda: cdf.parameter("mms"), "Did you mean ms? Known are m, "),
+    ]
+)  # fmt: skip
+def test_a_name_that_is_nearly_right_is_recognized(case):
+    refused(case[1], ValueError, case[2])
+
+
+PICTURES = {
+    "family": lambda: SMALL.plot(foo=2),
+    "element": lambda: STATIC.plot(foo=2),
+    "harmonics": lambda: SMALL.plot_harmonics(foo=2),
+    "Nyquist": lambda: cdf.describing_function_plot(CHECKED, foo=2),
+    "run": lambda: cdf.event_response(DRIVE, T, 1.0).plot(foo=2),
+    "orbit": lambda: cdf.find_limit_cycle(LOOP).plot(foo=2),
+}
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_a_picture_names_a_wrong_keyword_before_it_draws(picture):
+    before = plt.get_fignums()
+    with pytest.raises(TypeError, match=r"unrecognized keyword: foo=2; it takes .*title|what ct\.") as caught:
+        PICTURES[picture]()
+    assert isinstance(caught.value, AttributeError)  # as matplotlib's own
+    assert plt.get_fignums() == before
+
+
+def test_python_controls_answer_is_told_from_ours():
+    own = ct.describing_function_response(ct.tf([8], [1, 2, 2, 1]), ct.saturation_nonlinearity(1), [1, 4])
+    for call in (cdf.verify, cdf.describing_function_plot):
+        refused(lambda c=call: c(own), TypeError, "control.descfcn.", "ctrl_df.describing_function_response")
 
 
 def test_a_class_that_is_no_effect_is_not_registered():
@@ -317,6 +419,7 @@ SQUARE = ct.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
 
 
 SMALL = FAMILY(DRIVE, [9.0], [2.0])
+STATIC = cdf.describing_function_family(cdf.relay(1), [1.0, 2.0])
 
 
 def family(**keywords):
@@ -365,6 +468,8 @@ def family(**keywords):
         ("response H True", lambda: RESPONSE(True, DRIVE, [9, 10], [1, 2]), TypeError, "linear system"),
         ("frd text", lambda: SMALL.frd("9"), TypeError, "amplitude", "'9'"),
         ("frd outside", lambda: SMALL.frd(99), ValueError, "the family's grid", "99"),
+        ("harmonics outside", lambda: SMALL.plot_harmonics(omega=99), ValueError, "<= omega <=", "99"),
+        ("harmonics without", lambda: STATIC.plot_harmonics(omega=9), ValueError, "omega", "Leave it out"),
         ("save(5)", lambda: SMALL.save(5), TypeError, "path", "5"),
         ("load_family(1)", lambda: cdf.load_family(1), TypeError, "path", "1"),
         ("response save", lambda: RESPONSE(H, DRIVE, [9, 10], [1, 2], save=3), TypeError, "save", "path"),

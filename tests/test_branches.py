@@ -161,6 +161,7 @@ def drawn(seed):
 # --- tests ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:.*aperiodic:RuntimeWarning")
 @pytest.mark.parametrize("seed", range(4, 12, 2))
 def test_the_symmetric_motion_is_searched_completely(seed):
     """Solutions listed solve the equation with N computed apart; none that a dense curve holds is missed."""

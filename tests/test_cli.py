@@ -142,12 +142,10 @@ def coarse(loops):
 def test_demo_prints_the_exact_answers_and_draws_the_figures(tmp_path, capsys, monkeypatch):
     """On coarse grids: neither the exact answers nor that pictures can be read depend on them."""
     demo, pictures = sys.modules["ctrl_df.demo.run"], importlib.import_module("ctrl_df.demo.pictures")
-    loops, family = list(coarse(demo.paper_loops())), pictures.describing_function_family
+    loops, family = list(coarse(demo.paper_loops())), pictures.quiet_family
     monkeypatch.setattr(demo, "_study", study_of_few)
     monkeypatch.setattr(demo, "paper_loops", lambda: loops)
-    monkeypatch.setattr(
-        pictures, "describing_function_family", lambda block, A, omega: family(block, A[::3], omega[::3])
-    )
+    monkeypatch.setattr(pictures, "quiet_family", lambda block, A, omega: family(block, A[::3], omega[::3]))
     out = tmp_path / "pictures"
     assert main(["demo", "--out", str(out)]) == 0
     text = capsys.readouterr().out

@@ -5,6 +5,7 @@ import math
 import signal
 import threading
 import time
+import weakref
 
 import matplotlib as mpl
 import numpy as np
@@ -16,6 +17,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 import ctrl_df as cdf
+from ctrl_df.identify.datasets.over_time import TimeDataset
 from ctrl_df.identify.monitor import Monitor
 from ctrl_df.simulate import parallel
 
@@ -115,15 +117,41 @@ def test_ctrl_c_in_a_ladder_keeps_the_steps_made():
     assert study.verdict == "effect" and study.model is study.steps[-1].model
 
 
-def test_ctrl_c_before_anything_is_known_goes_on(monkeypatch):
-    from ctrl_df.identify.datasets.over_time import TimeDataset
-
+def test_ctrl_c_before_anything_is_known_returns_the_model_as_given(monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(TimeDataset, "search", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        ask()
+    found, study = ask(), interrupted_ladder()
+    for result in (found, study):
+        assert (result.status, result.verdict, result.model) == ("interrupted", "unknown", RIG.baseline)
+        assert "Nothing is known yet" in str(result).split("\n")[0]
+        with pytest.raises(ValueError, match="ended before the first was known"):
+            result.plot()
+    assert found.best is None and found.remaining == () and found.next_experiment is None
+    assert found.train == (TRAIN,) and study.effects == () and len(study.steps) == 1
+    with pytest.raises(ValueError, match="ended before the first was known"):
+        study.report("none.html")
+
+
+def test_ctrl_c_where_python_would_drop_it_ends_the_work_all_the_same(monkeypatch, capsys):
+    """The callback of a weak reference: what is raised there is printed and forgotten."""
+
+    heard = {"__name__": "weakref", "signal": signal}
+    exec("def gone(_):\n    signal.raise_signal(signal.SIGINT)\n    return None", heard)
+
+    def interrupted(*_):
+        thing = threading.Event()
+        name = weakref.ref(thing, heard["gone"])
+        del thing
+        assert name() is None
+        parallel.check()
+        raise AssertionError("it was lost")
+
+    monkeypatch.setattr(TimeDataset, "search", interrupted)
+    assert ask().status == "interrupted"
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert "ignored" not in capsys.readouterr().err
 
 
 def test_progress_and_log(told, caplog, capsys):

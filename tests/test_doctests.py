@@ -18,8 +18,6 @@ from ctrl_df.blocks import effect
 # What public functions return, documented as the names that make them are.
 RESULTS = {
     "simulate.response": ("EventResponse",),
-    "simulate.batch": ("BatchResponse",),
-    "limit_cycles.exact.orbit": ("NoOrbit",),
     "limit_cycles.check": ("Check",),
     "identify.results.comparison": ("Comparison",),
     "identify.refit": ("Fit",),

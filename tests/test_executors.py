@@ -17,7 +17,10 @@ from ctrl_df.df import executors, work
 from ctrl_df.df.dispatch import method_for
 from ctrl_df.df.saving.journal import lines_done
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # Python 3.12, with threads about
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning"),  # Python 3.12, with threads about
+    pytest.mark.filterwarnings("ignore:.*aperiodic:RuntimeWarning"),  # backlash rattles somewhere on a grid
+]
 
 A, OMEGA = [6.0, 8.0, 12.0, 20.0], [20.0, 30.0]
 BACKLASH = cdf.backlash_masses(1, 8, 0.018, 0.2)

@@ -16,6 +16,7 @@ HARDENING = cdf.Mass(9.0, [cdf.Coulomb(5), cdf.Viscous(0.5), cdf.LinearSpring(20
 A, OMEGA = np.linspace(8, 60, 5), np.linspace(6, 30, 5)
 
 
+@pytest.mark.filterwarnings("ignore:.*aperiodic:RuntimeWarning")
 @pytest.mark.parametrize("block", [HARDENING, cdf.backlash_masses(1, 8, 0.018, 0.8)])
 def test_a_family_does_not_depend_on_the_number_of_threads(block, monkeypatch):
     families = []

@@ -131,7 +131,7 @@ def ladder_of(data, names=tuple(MADE), most=5, monitor=None):
     classes = [cdf.effect_class(n) for n in names]
     monitor = monitor or Monitor("improve")
     ladder = StepwiseSelection(data, data.start, classes, free, most, None, monitor)
-    return monitor.run(ladder.run)
+    return monitor.run(ladder.run, lambda: None)
 
 
 def test_one_effect_and_its_neighbours():

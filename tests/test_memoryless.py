@@ -26,6 +26,7 @@ from ctrl_df.blocks.primitives import PiecewiseAffine
 from ctrl_df.df import work
 from ctrl_df.df.describing import describing_function, describing_function_family
 from ctrl_df.df.family import load_family
+from ctrl_df.df.warning import DescribingFunctionWarning
 
 STATIC = [
     saturation(2),
@@ -222,7 +223,7 @@ def test_bad_elements(make):
         (lambda: describing_function_family(relay(1), []), ValueError, "at least one"),
         (lambda: describing_function_family(relay(1), [0.0, 1.0]), ValueError, "A > 0"),
         (lambda: describing_function_family(relay(1), [1.0], orders=0), ValueError, "orders"),
-        (lambda: describing_function(friction_mass(9, 5), 7.0, 1.0, output="z"), ValueError, "one of x, v"),
+        (lambda: describing_function(friction_mass(9, 5), 7.0, 1.0, output="z"), ValueError, "out of x, v"),
         (lambda: describing_function(relay(1), 1.0, wrong=2), TypeError, "unrecognized keyword"),
     ],
 )
@@ -271,14 +272,21 @@ def test_family_saves_loads_and_makes_frd(tmp_path):
     )
     assert np.allclose(family.frd(11.0).frdata[0, 0], describing_function(block, 11.0, family.omega))
     assert np.array_equal(back.frd(8.0).frdata[0, 0], family.N[1])
-    assert back.frd(11.0).frdata[0, 0, 0] == pytest.approx(
-        family.frd(11.0).frdata[0, 0, 0], rel=0.02
-    )  # interpolated
+    with pytest.warns(DescribingFunctionWarning, match="at 11 is interpolated from 10 and 12.*load_family"):
+        between = back.frd(11.0).frdata[0, 0, 0]
+    assert between == pytest.approx(family.frd(11.0).frdata[0, 0, 0], rel=0.02)
+    with_block = load_family(tmp_path / "f.npz", block)
+    assert np.array_equal(with_block.frd(11.0).frdata, family.frd(11.0).frdata)  # no warning
+    with pytest.raises(ValueError, match="the block that the family was computed of.*mass=9.1"):
+        load_family(tmp_path / "f.npz", friction_mass(9.1, 5, 0.5))
+    with pytest.warns(DescribingFunctionWarning, match="stuck at 3 of 3 points, first A=4, omega=5"):
+        family.frd(4.0)
     with pytest.raises(ValueError, match="<= amplitude <="):
         family.frd(40.0)
     np.savez(tmp_path / "bad.npz", a=np.array([{}], dtype=object))
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="written by Family.save") as refused:
         load_family(tmp_path / "bad.npz")
+    assert "allow_pickle" not in str(refused.value)  # numpy's advice would run what the file holds
 
 
 def test_interrupted_work_resumes(tmp_path, monkeypatch):

@@ -201,6 +201,9 @@ def test_describing_function_warns_where_n_is_not_that_of_a_settled_motion():
         cdf.describing_function(ct.tf([1], [1, -1]), 1.0, 2.0)
     with pytest.warns(cdf.DescribingFunctionWarning, match="aperiodic"):
         cdf.describing_function(cdf.backlash_masses(1, 1, 1.0, 0.8), 1.0, 1.0)
+    with pytest.warns(cdf.DescribingFunctionWarning, match="aperiodic at 1 of 1 points.*average") as said:
+        cdf.describing_function_family(cdf.backlash_masses(1, 1, 1.0, 0.8), [1.0], [1.0])
+    assert len(said) == 1 and said[0].filename == __file__
     assert issubclass(cdf.DescribingFunctionWarning, RuntimeWarning)
 
 

@@ -23,6 +23,8 @@ from ctrl_df.df.saving.family_file import read_arrays
 from ctrl_df.df.saving.fingerprint import fingerprint
 from ctrl_df.df.saving.journal import MAGIC, Journal, is_journal, lines_done
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*aperiodic:RuntimeWarning")  # backlash rattles somewhere
+
 FRICTION = cdf.friction_mass(9, 5, 0.5)
 GAIN = 2.0
 TABLE = np.array([0.0, 1.0, 4.0])
@@ -327,7 +329,7 @@ def test_a_damaged_file_gives_one_clear_error(name, saved):
 
 
 def test_what_is_no_file_is_said(saved, tmp_path):
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(FileNotFoundError, match="none.npz. Check the path."):
         cdf.load_family(tmp_path / "none.npz")
     with pytest.raises(TypeError, match="path of a file"):
         cdf.load_family(0)  # to open() a number is an open file

@@ -10,7 +10,6 @@ import pytest
 import ctrl_df as cdf
 from ctrl_df.limit_cycles.exact import poincare
 from ctrl_df.limit_cycles.exact.closing import Closing
-from ctrl_df.limit_cycles.exact.orbit import NoOrbit
 from ctrl_df.limit_cycles.exact.poincare import Crossing
 from ctrl_df.limit_cycles.finder import OrbitFinder
 from ctrl_df.limit_cycles.pieces import by_pieces
@@ -148,7 +147,7 @@ def test_strongly_repelling_orbits_are_closed():
 
 def test_no_orbit_is_false_and_says_what_was_tried():
     answer = cdf.find_limit_cycle(cdf.closed_loop(*NEAR_FOLD))
-    assert isinstance(answer, NoOrbit) and not answer
+    assert isinstance(answer, cdf.NoOrbit) and not answer
     assert answer.status is Status.NOT_FOUND and len(answer.tried) == 6
     assert "diverges" in str(answer)
     with pytest.raises(RuntimeError, match="no proof"):

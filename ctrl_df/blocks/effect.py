@@ -42,6 +42,7 @@ from typing import Any, ClassVar, TypeVar
 
 from ..calls import explained
 from ..checks import shown
+from ..nearest import did_you_mean
 from ..units import si_unit
 from . import probing
 from .coordinates import either
@@ -341,6 +342,6 @@ def effect_class(effect_id: str) -> type[Effect]:
         raise (ValueError if isinstance(effect_id, str) else TypeError)(
             f"an effect id must be one of the library's; got {shown(effect_id)}. "
             f"Known: {', '.join(sorted(_LIBRARY))}. "
-            "Register your own with ctrl_df.register_effect."
+            "Register your own with ctrl_df.register_effect." + did_you_mean(effect_id, _LIBRARY)
         )
     return _LIBRARY[effect_id]

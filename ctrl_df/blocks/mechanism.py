@@ -8,17 +8,18 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
-import control as ct
 import numpy as np
 
 from ..cached import cached_property
 from ..checks import known_name, mapping, number, shown, system_name
+from ..nearest import did_you_mean
 from ..table import Table
 from . import compliant
 from .coordinates import LINE, Coordinates
 from .core import Core, build_core, kinetic_level
 from .effect import Effect
 from .effects import Backlash, Coulomb, Stiction, Viscous
+from .immutable import Immutable
 from .linearization import warn_of_mechanism
 from .parameter import Parameter, checked
 from .stated import share_name, stated_parameters, static_levels
@@ -26,7 +27,7 @@ from .stated import share_name, stated_parameters, static_levels
 _MASS = dict(unit="kg", lower=0.0, upper=float("inf"), strict=True, free=True, meaning="inertia")
 
 
-class Mechanism(ct.NonlinearIOSystem):
+class Mechanism(Immutable):
     """An inertia plus a tuple of effects; a value, and a pure function of ``(t, x, u, params)``.
 
     Use `Mass` or `TwoMass`. ``updfcn`` is the compliant form of `ctrl_df.blocks.compliant`; the event engine
@@ -182,6 +183,7 @@ class Mechanism(ct.NonlinearIOSystem):
         if id not in self._keys:
             raise ValueError(
                 f"without_effect needs an id the block has ({', '.join(self._keys) or 'none'}); got {id!r}."
+                f"{did_you_mean(id, self._keys, 'Look at the effects of the block.')}"
             )
         kept = [e for k, e in zip(self._keys, self._effects, strict=True) if k != id]
         return self._remade(self._values, kept)

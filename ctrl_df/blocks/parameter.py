@@ -52,8 +52,8 @@ class Parameter:
     Examples
     --------
     >>> level = cdf.friction_mass(mass=9, coulomb=5).parameters["coulomb.level"]
-    >>> level.value, level.unit, level.lower
-    (5.0, 'N', 0.0)
+    >>> level.value, level.unit, level.bounds
+    (5.0, 'N', (0.0, inf))
     """
 
     value: float
@@ -73,6 +73,11 @@ class Parameter:
     def __post_init__(self):
         if not self.line_unit:
             object.__setattr__(self, "line_unit", self.unit)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Least and greatest value, ``(lower, upper)`` [unit]; `strict`: without the least itself."""
+        return self.lower, self.upper
 
     @property
     def one_sign(self) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..df.describing import describing_function_family
+from ..df.describing import quiet_family
 from ..plot.describing import describing_function_plot
 from ..plot.family import plot_family
 from ..plot.harmonics import plot_harmonics
@@ -46,14 +46,14 @@ def draw_all(findings: Findings, folder: Path) -> list[Path]:
 
 
 def _figure_3(_):
-    family = describing_function_family(friction_plant(), np.geomspace(6, 60, 60), np.geomspace(2, 30, 90))
+    family = quiet_family(friction_plant(), np.geomspace(6, 60, 60), np.geomspace(2, 30, 90))
     figure, ax = plt.subplots(figsize=(6.8, 5), layout="constrained")
     plot_family(family, ax=ax, title="Fig. 3: -1/N(a, ω) of the mass with friction")
     return figure
 
 
 def _figure_4(_):
-    family = describing_function_family(friction_plant(), np.geomspace(5.2, 60, 60), np.geomspace(2, 40, 60))
+    family = quiet_family(friction_plant(), np.geomspace(5.2, 60, 60), np.geomspace(2, 40, 60))
     return plot_harmonics(
         family, title="Fig. 4: harmonic content of x, mass with friction", amplitude=15, omega=14
     ).figure
@@ -78,7 +78,7 @@ def _figure_7(_):
     figure, axes = plt.subplots(1, 2, figsize=(10.5, 4.8), layout="constrained")
     for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
         plant = backlash_plant(restitution)
-        family = describing_function_family(plant, np.geomspace(10, 100, 40), np.geomspace(5, 60, 40))
+        family = quiet_family(plant, np.geomspace(10, 100, 40), np.geomspace(5, 60, 40))
         plot_family(family, ax=ax, title=f"restitution {restitution}")
     figure.suptitle(
         "Fig. 7: -1/N(a, ω) of two masses with backlash (zigzag: averages over irregular motion)",
@@ -91,7 +91,7 @@ def _figure_8(_):
     figure, axes = plt.subplots(1, 2, figsize=(9.8, 4.2), layout="constrained", sharey=True)
     for ax, restitution in zip(axes, (0.2, 0.8), strict=True):
         plant = backlash_plant(restitution)
-        family = describing_function_family(plant, np.array([20.0]), np.geomspace(5, 60, 80))
+        family = quiet_family(plant, np.array([20.0]), np.geomspace(5, 60, 80))
         plot_harmonics(family, ax=ax)
         ax.set_title(f"restitution {restitution}", fontsize="medium")
     axes[0].set_ylabel(r"$|X_k|\,/\,a$ [m/N]")

@@ -65,7 +65,7 @@ def axis_of(name, values, unit) -> np.ndarray:
     if values.ndim != 1 or values.size == 0:
         raise ValueError(
             f"a family needs {name} as a 1-D array with at least one value [{unit}]; got shape "
-            f"{values.shape}."
+            f"{values.shape}. Give the values along one axis of the grid, np.ravel({name})."
         )
     return values
 

@@ -17,7 +17,7 @@ from .arguments import (
 from .dispatch import method_for
 from .family import Family
 from .points import points
-from .warning import warn_of
+from .warning import IRREGULAR, warn_of
 from .work import Work
 
 
@@ -153,6 +153,13 @@ def describing_function_family(
     Returns
     -------
     Family
+        Where the motion has no period its `regime` is ``aperiodic`` and N an average over many turns; where
+        there is no steady answer N is NaN, and `regime` says why.
+
+    Warns
+    -----
+    DescribingFunctionWarning
+        N is such an average somewhere; the number of points and the first of them are said.
 
     Raises
     ------
@@ -176,6 +183,20 @@ def describing_function_family(
     >>> print(family.regime[:, 1])
     ['stuck' 'stick-slip' 'slip']
     """
+    family = quiet_family(
+        F, A, omega, orders, executor, output, save, progress,
+        try_method=try_method, num_points=num_points, **options,
+    )  # fmt: skip
+    at = np.broadcast_arrays(family.amplitudes[:, None], family.omega)
+    warn_of(family.N, family.regime, *at, regimes=IRREGULAR, missing=False, look_at="family")
+    return family
+
+
+def quiet_family(
+    F, A, omega=None, orders=9, executor=None, output=None, save=None, progress=None, *,
+    try_method=True, num_points=100, **options,
+) -> Family:  # fmt: skip
+    """Return the family, for callers that treat its regimes by themselves."""
     A = axis_of("A", amplitudes_of(A), "unit of the input")
     if (A <= 0).any():
         raise ValueError(

@@ -13,6 +13,8 @@ from ..blocks.elements.hysteresis import play, relay_with_hysteresis
 from ..blocks.elements.memoryless import saturation
 from ..blocks.massless import Massless
 from ..blocks.mechanism import Mechanism
+from ..checks import shown
+from ..nearest import did_you_mean
 from .methods import (
     ElementIntegrals,
     ForcedOrbit,
@@ -131,7 +133,10 @@ def _named_output(system, output) -> str:
         return labels[int(output)]
     if output in labels:
         return str(output)
-    raise ValueError(f"output must be one of {', '.join(labels)}; got {output!r}.")
+    raise ValueError(
+        f"a describing function needs output out of {', '.join(labels)}, or a number from 0 to "
+        f"{len(labels) - 1}; got {shown(output)}.{did_you_mean(output, labels, 'Give one of these.')}"
+    )
 
 
 def _static_law(system, index):

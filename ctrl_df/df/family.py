@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import html
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import control as ct
 import numpy as np
 
-from ..checks import number, path_of
+from ..checks import no_file, number, path_of, shown, warn
 from ..drawing import draw
 from ..table import Table
+from .dispatch import method_for
 from .points import AtPairs
 from .saving.family_file import FORMAT, read_arrays, write_arrays
 from .saving.journal import is_journal, lines_done, read_header
-from .thresholds import ON_GRID
+from .thresholds import ON_GRID, PROBED, SAME_BLOCK
+from .warning import IRREGULAR, DescribingFunctionWarning, warn_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,14 +39,14 @@ class Family:
     residual : ndarray, shape (na, nw)
         How well each orbit closes, or the estimated error of a quadrature, relative.
     block : object
-        What was described; None after loading.
+        What was described; None after loading without it.
     description : str
         The block in words.
     output : str
         Name of the output described.
     at : AtPairs or None
         Computes N and regime at further pairs (amplitude, omega) as the family was computed; None after
-        loading.
+        loading without the block.
 
     Examples
     --------
@@ -93,8 +95,13 @@ class Family:
         Parameters
         ----------
         amplitude : float
-            Within the grid. Off its nodes N is computed anew from the block, or, for a loaded family,
-            interpolated linearly over the logarithm of the amplitude.
+            Within the grid. Off its nodes N is computed anew from the block, or, for a family loaded without
+            its block, interpolated linearly over the logarithm of the amplitude.
+
+        Warns
+        -----
+        DescribingFunctionWarning
+            N is interpolated; or NaN, or that of a motion without a period, as `describing_function` warns.
 
         Raises
         ------
@@ -103,26 +110,34 @@ class Family:
         """
         if not np.isfinite(self.omega).all():
             raise ValueError("frd needs frequencies; this family has none. Give omega when computing it.")
-        amplitude = number("frd", "amplitude", amplitude)
-        low, high = self.amplitudes.min(), self.amplitudes.max()
-        if not low * (1 - ON_GRID) <= amplitude <= high * (1 + ON_GRID):
-            raise ValueError(
-                f"frd needs {low:g} <= amplitude <= {high:g} (the family's grid); got {amplitude!r}. "
-                "Compute a family that reaches it."
-            )
+        amplitude = within("frd", "amplitude", amplitude, self.amplitudes)
         row = np.nonzero(np.isclose(self.amplitudes, amplitude, rtol=ON_GRID, atol=0))[0]
         if row.size:
-            response = self.N[row[0]]
+            response, regime = self.N[row[0]], self.regime[row[0]]
         elif self.at is not None:
-            response = self.at(amplitude, self.omega)[0]
+            response, regime = self.at(amplitude, self.omega)
         else:
-            order = np.argsort(self.amplitudes)
-            grid, table = np.log(self.amplitudes[order]), self.N[order]
-            upper = int(np.clip(np.searchsorted(grid, np.log(amplitude)), 1, grid.size - 1))
-            share = (np.log(amplitude) - grid[upper - 1]) / (grid[upper] - grid[upper - 1])
-            response = (1 - share) * table[upper - 1] + share * table[upper]
+            response, regime = self._between(amplitude)
+        warn_of(response, regime, amplitude, self.omega, look_at="family")
         name = f"N({amplitude:g})".replace(".", "_")  # python-control allows no point in a name
         return ct.frd(np.array(response), self.omega, name=name)
+
+    def _between(self, amplitude) -> tuple[np.ndarray, np.ndarray]:
+        """Return N and regime between two amplitudes of the grid, with a warning that N is interpolated."""
+        order = np.argsort(self.amplitudes)
+        a, N, regime = self.amplitudes[order], self.N[order], self.regime[order]
+        upper = int(np.clip(np.searchsorted(a, amplitude), 1, a.size - 1))
+        lower = upper - 1
+        share = np.log(amplitude / a[lower]) / np.log(a[upper] / a[lower])
+        warn(
+            f"between its amplitudes a family that was loaded without its block has no N of its own; that at "
+            f"{amplitude:g} is interpolated from {a[lower]:g} and {a[upper]:g}. Load it with the block, "
+            "load_family(path, block), or ask describing_function for that amplitude.",
+            DescribingFunctionWarning,
+        )
+        lost = np.isnan(N[upper])
+        between = (1 - share) * N[lower] + share * N[upper]
+        return between, np.where(lost, regime[upper], regime[lower])
 
     def plot(self, **kwargs) -> ct.ControlPlot:
         """Draw -1/N in the complex plane, at constant amplitude and at constant frequency."""
@@ -148,8 +163,29 @@ class Family:
         return f"<p>{html.escape(repr(self)[1:-1])}</p>{Table(('regime', 'points'), rows)._repr_html_()}"
 
 
-def load_family(path) -> Family:
+def within(owner: str, name: str, value, grid: np.ndarray) -> float:
+    """Return a value between the ends of a family's grid; ValueError outside."""
+    value = number(owner, name, value)
+    if not np.isfinite(grid).all():
+        raise ValueError(f"{owner} needs {name} only of a family that has one; got {value!r}. Leave it out.")
+    low, high = grid.min(), grid.max()
+    if not low * (1 - ON_GRID) <= value <= high * (1 + ON_GRID):
+        raise ValueError(
+            f"{owner} needs {low:g} <= {name} <= {high:g} (the family's grid); got {value!r}. "
+            "Compute a family that reaches it."
+        )
+    return value
+
+
+def load_family(path, block=None) -> Family:
     """Read a family written by `Family.save`, or by ``save=`` of `describing_function_family`.
+
+    Parameters
+    ----------
+    path : path
+    block : as for `describing_function_family`, optional
+        What the family was computed of. A file does not hold it; with it the family computes N between the
+        amplitudes of its grid as it did before. Options of its solver are those by default.
 
     Raises
     ------
@@ -159,7 +195,7 @@ def load_family(path) -> Family:
         `path` is no path.
     ValueError
         The file is damaged, holds no family or no complete one (interrupted work is finished by the call that
-        began it), or needs pickle.
+        began it), or needs pickle; or `block` has another N than the file.
 
     Examples
     --------
@@ -173,13 +209,15 @@ def load_family(path) -> Family:
     True
     """
     path = path_of("load_family", "path", path)
+    if not path.exists():
+        raise no_file("load_family", "path", path)
     if is_journal(path):
         done, lines = lines_done(path), read_header(path)["lines"]
         raise ValueError(_incomplete(path, done, lines))
     data = read_arrays(path)
     if "done" in data and not data["done"].all():  # format 1
         raise ValueError(_incomplete(path, int(data["done"].sum()), data["done"].size))
-    return Family(
+    family = Family(
         amplitudes=data["amplitudes"],
         omega=data["omega"],
         harmonics=data["harmonics"],
@@ -188,6 +226,25 @@ def load_family(path) -> Family:
         description=str(data["description"]),
         output=str(data["output"]),
     )
+    return family if block is None else _of_block(family, block, path)
+
+
+def _of_block(family: Family, block, path) -> Family:
+    """Return a loaded family with its block, after asking the block for some of the family's values."""
+    method = method_for(block, family.output, largest=float(family.amplitudes.max()))
+    known = np.argwhere(~np.isnan(family.N) & ~np.isin(family.regime, IRREGULAR))
+    i, k = known[:: max(1, len(known) // PROBED)].T
+    agreed = method.needs_omega <= bool(np.isfinite(family.omega).all())
+    if agreed and i.size:
+        at = AtPairs(method)
+        N = at(family.amplitudes[i], family.omega[k])[0]
+        agreed = (abs(N - family.N[i, k]) <= SAME_BLOCK * abs(family.N[i, k])).any()
+    if not agreed:
+        raise ValueError(
+            f"load_family needs the block that the family was computed of; {path} holds {family.description}"
+            f", with another N than {shown(block)}. Give that block, or leave it out."
+        )
+    return replace(family, block=block, at=AtPairs(method))
 
 
 def _incomplete(path, done, lines) -> str:

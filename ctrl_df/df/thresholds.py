@@ -28,6 +28,11 @@ ROOT = 1e-15
 ON_GRID = 1e-12
 """Relative difference within which an amplitude is one of a grid: how users write it."""
 
+PROBED, SAME_BLOCK = 8, 1e-6
+"""Points of a loaded family at which a block is asked whether it is the one that the family was computed of,
+and the relative difference of N up to which it is: orbits close to 1e-9 or so. One point that agrees will do:
+where motions coexist the neighbours of a point decide which of them a family follows."""
+
 # --- memoryless laws --------------------------------------------------------------------------------
 
 EVEN_SEEN = 1e-9

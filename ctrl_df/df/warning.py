@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
+
+from ..checks import warn
 
 
 class DescribingFunctionWarning(RuntimeWarning):
-    """N is NaN, or that of a motion that repels, travels or has no period.
+    """N is NaN, interpolated, or that of a motion that repels, travels or has no period.
 
     Examples
     --------
@@ -32,18 +32,33 @@ _MEANING = {
 }
 
 
-def warn_of(N, regime, A, omega, stacklevel: int = 3) -> None:
-    """Warn once for every regime that N does not describe, or does so only with a reservation.
+IRREGULAR = ("aperiodic",)
+"""Regimes without a period, where N is an average all the same."""
+
+RESERVED = (*IRREGULAR, "drifting", "unstable")
+"""Regimes whose N has to be read with a reservation."""
+
+
+def warn_of(
+    N, regime, A, omega, *, regimes=RESERVED, missing=True, look_at="describing_function_family(...)"
+) -> None:
+    """Warn, once for all, of the regimes that N does not describe, or does so only with a reservation.
 
     Parameters
     ----------
     N : ndarray of complex
     regime : ndarray of str, the shape of N
     A, omega : ndarray broadcast to that shape; omega may be None
+    regimes : sequence of str
+        Those that are told of.
+    missing : bool
+        Whether points without N are told of, too.
+    look_at : str
+        What has more to say.
     """
     N, regime = np.asarray(N), np.asarray(regime)
-    missing = np.isnan(N)
-    doubtful = missing | np.isin(regime, ["aperiodic", "drifting", "unstable"])
+    lost = np.isnan(N)
+    doubtful = np.isin(regime, regimes) & ~lost | (lost & missing)
     if not doubtful.any():
         return
     said = []
@@ -55,12 +70,11 @@ def warn_of(N, regime, A, omega, stacklevel: int = 3) -> None:
             at += f", omega={float(np.broadcast_to(omega, N.shape)[first]):g}"
         outcome = _MEANING.get(str(name), "there is no periodic answer")
         points = f"{int(mine.sum())} of {N.size} points"
-        said.append(f"{name or 'unknown'} at {points}, first {at} ({outcome}{_nan(missing[mine])})")
-    warnings.warn(
+        said.append(f"{name or 'unknown'} at {points}, first {at} ({outcome}{_nan(lost[mine])})")
+    warn(
         f"the describing function is not that of a settled periodic motion everywhere: {'; '.join(said)}. "
-        "Look at describing_function_family(...).regime and .residual before using N there.",
+        f"Look at {look_at}.regime and .residual before using N there.",
         DescribingFunctionWarning,
-        stacklevel=stacklevel,
     )
 
 

@@ -16,7 +16,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ..blocks.mechanism import Mechanism
 from ..cached import cached_property
-from ..df.describing import describing_function_family
+from ..df.describing import quiet_family
 from ..df.dispatch import method_for
 from ..df.methods import ElementIntegrals, Method
 from ..df.points import points
@@ -125,7 +125,7 @@ def plane_of(
     na, nw = SIZE[method.quick]
     w = np.geomspace(omega[0], omega[1], nw)
     a = _amplitudes(method, np.geomspace(amplitude[0], amplitude[1], na), w)
-    family = describing_function_family(block, a, w, 1, output=structure.output, progress=progress)
+    family = quiet_family(block, a, w, 1, output=structure.output, progress=progress)
     P = structure.beside(w)
     N = np.broadcast_to(family.N, (a.size, w.size))
     wild = np.broadcast_to(noisy(family.regime, family.residual), N.shape)

@@ -84,14 +84,13 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        For tables a `FrequencyDiagnosis`. Ctrl-C returns what is known, its `status` ``"interrupted"``.
+        For tables a `FrequencyDiagnosis`. Ctrl-C returns what is known, its `status` ``"interrupted"``:
+        before the first result that is the model as given, its verdict ``"unknown"``, errors NaN.
 
     Raises
     ------
     TypeError, ValueError
         Data that are no measurements, an unknown effect id, a model that is no block.
-    KeyboardInterrupt
-        Ctrl-C before anything is known.
 
     Examples
     --------
@@ -128,4 +127,7 @@ def diagnose(
         search = dataset.search(block, names)
         return diagnosed(search, classes, executor, part, limits, search_with).diagnosis
 
-    return monitor.run(work)
+    def nothing():
+        return dataset.diagnosis.unknown(block, dataset.records, dataset.validation, limits)
+
+    return monitor.run(work, nothing)

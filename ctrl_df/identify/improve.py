@@ -62,12 +62,8 @@ def improve(
     Returns
     -------
     Study
-        Ctrl-C returns what is known, its `status` ``"interrupted"``.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        Ctrl-C before anything is known.
+        Ctrl-C returns what is known, its `status` ``"interrupted"``: before the first result that is the
+        model as given, its verdict ``"unknown"``, errors NaN.
 
     Examples
     --------
@@ -96,4 +92,8 @@ def improve(
         return dataset.estimated_parameters(block, kept)
 
     selection = StepwiseSelection(dataset, start, classes, free_of, max_effects, executor, monitor)
-    return monitor.run(selection.run)
+
+    def nothing():
+        return Study.unknown(dataset.diagnosis.unknown(start, dataset.records, dataset.validation, {}))
+
+    return monitor.run(selection.run, nothing)

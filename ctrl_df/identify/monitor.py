@@ -16,6 +16,7 @@ from typing import Any
 from ..checks import CHECK_VALUE, positive, shown
 from ..df.work import progress_bar
 from ..simulate import parallel
+from .interrupts import Interrupts
 from .thresholds import PROGRESS_EVERY, PROGRESS_POLL
 
 COMPLETE, UNDER_WAY, BUDGET_SPENT, INTERRUPTED = "complete", "under way", "budget spent", "interrupted"
@@ -62,6 +63,7 @@ class Monitor:
             seconds = positive(owner, "budget", budget, "s", remedy=CHECK_VALUE)
             self._until = self.started + seconds
         self._jobs, self._stage, self._bar = 0, "", None
+        self._interrupts = Interrupts()
         self._reported = self.started
 
     # --- what happens on the way ----------------------------------------------------------------------
@@ -110,7 +112,11 @@ class Monitor:
     beat = PROGRESS_POLL
 
     def left(self) -> float | None:
-        """Return how many seconds are left; None: no end is set, or nothing is known yet."""
+        """Return how many seconds are left; None: no end is set, or nothing is known yet.
+
+        Asked between units of work, it raises KeyboardInterrupt where a Ctrl-C was heard and dropped.
+        """
+        self._interrupts.check()
         if self._latest is None or math.isinf(self._until):
             return None
         return max(self._until - time.perf_counter(), 0.0)
@@ -129,26 +135,20 @@ class Monitor:
 
     # --- from begin to end ----------------------------------------------------------------------------
 
-    def run(self, work: Callable[[], Any]) -> Any:
+    def run(self, work: Callable[[], Any], nothing: Callable[[], Any]) -> Any:
         """Return what `work` comes to, or the last result known where it is ended before.
 
-        Raises
-        ------
-        KeyboardInterrupt
-            Ctrl-C before anything was known.
+        `nothing` makes the result as long as none is known.
         """
         try:
-            with parallel.watched(self), parallel.one_thread_each(), self._shown():
+            with self._interrupts, parallel.watched(self), parallel.one_thread_each(), self._shown():
                 return work()
         except parallel.TimeUp:
             status = BUDGET_SPENT
         except KeyboardInterrupt:
-            if self._latest is None:
-                raise
             status = INTERRUPTED
         _log.info("%s: %s after %.1f s, at: %s", self.owner, status, self.seconds, self._stage)
-        assert self._latest is not None  # no end is set before
-        return replace(self._latest(), status=status, seconds=self.seconds)
+        return replace((self._latest or nothing)(), status=status, seconds=self.seconds)
 
     @property
     def seconds(self) -> float:

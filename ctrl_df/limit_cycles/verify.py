@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..checks import kind_of
 from ..df.dispatch import translated
 from ..simulate.loop import closed_loop
 from ..status import Status
@@ -60,8 +61,9 @@ def verify(resp, *, loop=None, search=True, search_time=None) -> Check:
     check_search("verify", search_time=search_time, search=search)
     if not hasattr(resp, "limit_cycles"):
         raise TypeError(
-            f"verify needs the answer of describing_function_response; got {type(resp).__name__}. "
-            "python-control's own result does not keep H and the block."
+            "verify needs the answer of describing_function_response; got "
+            f"{kind_of(resp)}. python-control's own result does not keep H and the block: ask "
+            "ctrl_df.describing_function_response."
         )
     cycles = list(resp.limit_cycles)
     if loop is None:

@@ -9,6 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.lines import Line2D
 
+from ..calls import keywords_of
+from ..checks import kind_of, shown
 from ..limit_cycles.predicted.grade import UNRELIABLE
 from ..limit_cycles.predicted.linear import LinearPart
 from ..limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
@@ -26,6 +28,7 @@ from .parts.curves import (
     units,
     view_of,
 )
+from .parts.keywords import check_keywords
 from .parts.page import (
     CROSSING_COLOR,
     EXACT_COLOR,
@@ -110,22 +113,35 @@ def describing_function_plot(
     >>> plt.close(picture.figure)
     """
     if label not in (False, None) and not isinstance(label, str):
-        raise ValueError("label must be formatting string, False, or None")
+        raise ValueError(
+            f"label must be formatting string, False, or None; got {shown(label)}. Leave it out for none."
+        )
     if "warn" in kwargs:
         warnings.warn("'warn' is replaced by 'warn_nyquist'", FutureWarning, stacklevel=2)
         kwargs["warn_nyquist"] = kwargs.pop("warn")
+    for keyword in ("legend_loc", "legend_map", "show_legend"):
+        if keyword in kwargs:
+            raise TypeError(
+                f"describing_function_plot draws its own legend; got {keyword}={shown(kwargs[keyword])} "
+                f"(unexpected keyword argument '{keyword}'). Leave it out, and change the picture's axes."
+            )
     analysis = {key: kwargs.pop(key) for key in _ANALYSIS if key in kwargs}
+    own = (*keywords_of(describing_function_plot), "ax", "title", "width", *_ANALYSIS)
+    check_keywords("describing_function_plot", own, kwargs, ct.nyquist_plot)
     if len(sysdata) in (3, 4):
         response = describing_function_response(*sysdata, **analysis)
     elif len(sysdata) == 1:
         response = sysdata[0]
         if not isinstance(response, DescribingFunctionResponse):
-            raise TypeError("data must be DescribingFunctionResponse")
+            raise TypeError(
+                "data must be DescribingFunctionResponse of ctrl_df, or else H, F, A (and omega); got "
+                f"{kind_of(response)}. Ask ctrl_df.describing_function_response for one."
+            )
     else:
-        raise TypeError("1, 3, or 4 position arguments required")
-    for keyword in ("legend_loc", "legend_map", "show_legend"):
-        if keyword in kwargs:
-            raise TypeError(f"unexpected keyword argument '{keyword}'")
+        raise TypeError(
+            "describing_function_plot needs 1, 3, or 4 positional arguments: a response, or H, F, A (and "
+            f"omega); got {len(sysdata)}. Name the others."
+        )
     if memoryless(response.family):
         return _over_nyquist(response, point_label, label, _placed(response, exact), kwargs)
     return _family_picture(response, point_label, label, _placed(response, exact), kwargs)

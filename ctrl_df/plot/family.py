@@ -6,6 +6,7 @@ import control as ct
 import numpy as np
 from matplotlib.lines import Line2D
 
+from ..calls import keywords_of
 from .parts.curves import (
     draw_curves,
     finish,
@@ -19,6 +20,7 @@ from .parts.curves import (
     units,
     view_of,
 )
+from .parts.keywords import check_keywords
 from .parts.page import AMPLITUDE_COLOR, OMEGA_COLOR, legend_above, page
 
 _LONG = 20.0  # a span of amplitudes beyond which their axis is logarithmic
@@ -50,6 +52,7 @@ def plot_family(
         ``lines[0]`` curves at constant amplitude, ``lines[1]`` at constant frequency; of a memoryless block
         magnitude and phase.
     """
+    check_keywords("plot", keywords_of(plot_family)[1:], kwargs)
     name = short(family.description)
     if memoryless(family):
         return _over_amplitude(family, ax, width, title or f"N of {name}", kwargs)

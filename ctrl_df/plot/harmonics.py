@@ -6,8 +6,11 @@ import control as ct
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..calls import keywords_of
+from ..df.family import within
 from ..numerals import digits
 from .parts.curves import in_brackets, labels_of, log_ticks, memoryless, short, units
+from .parts.keywords import check_keywords
 from .parts.page import page
 
 _HARMONIC_STYLES = (("-", "o"), ("--", "s"), ("-", "^"), ("--", "v"), ("-.", "D"), (":", "x"))
@@ -27,7 +30,7 @@ def plot_harmonics(
     orders : sequence of int, optional
         Harmonics drawn; default 1 to 5.
     amplitude, omega : float, optional
-        Where the cuts are made, nearest grid value; default the middle of the grid.
+        Where the cuts are made, nearest grid value; default the middle of the grid. ValueError outside it.
     width : float, optional
         Of a new figure [in].
     **kwargs
@@ -37,10 +40,11 @@ def plot_harmonics(
     -------
     ControlPlot
     """
+    check_keywords("plot_harmonics", keywords_of(plot_harmonics)[1:], kwargs)
     orders = [k for k in (orders or range(1, 6)) if k <= family.orders]
     force, gain, _ = units(family)
-    i = _nearest(family.amplitudes, amplitude)
-    k = _nearest(family.omega, omega)
+    i = _nearest("amplitude", amplitude, family.amplitudes)
+    k = _nearest("omega", omega, family.omega)
     over_w, over_a = family.omega.size > 1 and not memoryless(family), family.amplitudes.size > 1
     panels = [name for name, wanted in (("omega", over_w), ("amplitude", over_a)) if wanted] or ["amplitude"]
     shape = (0.52, 1.5) if len(panels) > 1 else (0.65, 0.85)
@@ -101,7 +105,7 @@ def _end_names(ax, lines, places):
             labels.write(f"{k}", along[1:], offsets=((0, 4), (0, -4)), color=shade)
 
 
-def _nearest(grid, value):
+def _nearest(name, value, grid):
     if value is None:
         return grid.size // 2
-    return int(np.abs(np.log(grid) - np.log(value)).argmin())
+    return int(np.abs(np.log(grid) - np.log(within("plot_harmonics", name, value, grid))).argmin())

@@ -6,7 +6,9 @@ import control as ct
 import numpy as np
 
 from ..blocks.mechanism import Mechanism
+from ..calls import keywords_of
 from .parts.events import mark_events, shade_sticking
+from .parts.keywords import check_keywords
 from .parts.page import legend_above, page
 
 _SMALL = 0.1  # [m, rad]: below it motions are drawn in thousandths
@@ -32,6 +34,7 @@ def orbit_plot(orbit, *, ax=None, title=None, width=None, **line) -> ct.ControlP
     **line
         Line properties.
     """
+    check_keywords("plot", keywords_of(orbit_plot)[1:], line)
     style = {"color": "k", "lw": 1.3, **line}
     names = list(getattr(orbit.loop, "output_labels", ["x", "F"]))
     scale, length, force = _units(orbit, names)

@@ -7,7 +7,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ..blocks.coordinates import AXIS, LINE
+from ..calls import keywords_of
 from .parts.events import MARKS, mark_events, shade_sticking
+from .parts.keywords import check_keywords
 from .parts.page import legend_above, page
 
 _ROWS = 3
@@ -32,6 +34,7 @@ def event_response_plot(run, *, fmt=(), events=True, **keywords) -> ct.ControlPl
     ControlPlot
         python-control's.
     """
+    check_keywords("plot", keywords_of(event_response_plot)[1:], keywords, ct.time_response_plot)
     new = not plt.get_fignums()
     cplt = ct.time_response_plot(run, *fmt, **keywords)
     rows = np.shape(cplt.axes)[0]

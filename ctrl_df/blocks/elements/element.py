@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionNonlinearity as _PythonControlNonlinearity
 
 from ...checks import known_name, mapping, shown, system_name
 from ...drawing import go_on
+from ..immutable import Immutable
 from ..linearization import warn_of_element
 from ..parameter import Parameter
 
@@ -42,7 +42,7 @@ def finite(unit="", **bounds) -> dict:
     )
 
 
-class Element(ct.NonlinearIOSystem, DescribingFunctionNonlinearity):
+class Element(Immutable, DescribingFunctionNonlinearity):
     """One-input, one-output nonlinear element; built by `saturation`, `relay`, `play` ..., not directly.
 
     Attributes

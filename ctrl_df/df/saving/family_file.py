@@ -55,9 +55,11 @@ def read_arrays(path) -> dict[str, np.ndarray]:
     except (FileNotFoundError, IsADirectoryError, PermissionError):
         raise
     except Exception as error:  # a damaged zip fails in many ways, each with an error of its own
+        # numpy's words may advise to load with pickles: only its kind is told
         raise ValueError(
-            f"{path} is no family file or a damaged one (half copied, cut off): {error}. A family file is an "
-            "npz without pickled objects. Remove it and compute the family anew, or copy it again."
+            f"{path} is no family file or a damaged one (half copied, cut off; {type(error).__name__}). "
+            "A family file is an npz without pickled objects, written by Family.save. Copy it again, or "
+            "compute the family anew."
         ) from None
     missing = _KEYS - data.keys()
     if missing:

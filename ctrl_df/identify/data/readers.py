@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import is_number, mapping, names, path_of, shown
+from ...checks import is_number, mapping, names, no_file, path_of, shown
 from .text_table import read_csv, refuse_text
 from .thresholds import MOST_COLUMNS
 
@@ -35,6 +35,8 @@ def read_mat(path) -> dict[str, np.ndarray]:
     path = path_of("from_mat", "path", path)
     if not path.exists() and not path.suffix:
         path = path.with_suffix(".mat")
+    if not path.exists():
+        raise no_file("from_mat", "path", path)
     with open(path, "rb") as file:
         head = file.read(128)
     if b"MATLAB 7.3" in head or head.startswith(b"\x89HDF"):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...checks import choice, path_of, shown
+from ...checks import choice, no_file, path_of, shown
 from .thresholds import BINARY, BINARY_LOOK, BLOCK, NANOSECONDS, SAMPLE_ROWS
 
 _BOMS = (
@@ -150,7 +150,10 @@ def refuse_text(table, column: str, source: str) -> None:
 
 
 def _decoded(path: Path) -> str:
-    raw = path.read_bytes()
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise no_file("a table", "path", path) from None
     for magic, what in _STRANGERS.items():
         if raw.startswith(magic):
             raise ValueError(f"a table needs a text file with columns; {path} is {what}.")

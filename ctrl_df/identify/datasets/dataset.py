@@ -14,6 +14,7 @@ from ...checks import shown
 from ..arguments import free_parameters
 from ..estimation.own_values import OwnValue
 from ..residuals.comparison_base import ComparisonBase
+from ..results.diagnosis import Diagnosis
 from ..results.experiment import Experiment
 from ..selection.search import Search
 
@@ -61,12 +62,15 @@ class Dataset(ABC):
 
     Attributes
     ----------
+    diagnosis : type
+        What a diagnosis of such data is.
     records, validation : tuples
         To fit; to validate on (may be empty: a part of `records` is then held out).
     prior : mapping of str to (float, float)
         Value and standard deviation of parameters known beforehand.
     """
 
+    diagnosis: type[Diagnosis] = Diagnosis
     records: tuple
     validation: tuple
     prior: Mapping[str, tuple[float, float]] = MappingProxyType({})

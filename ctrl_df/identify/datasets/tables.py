@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..planning.sines import stepped_sines
+from ..results.table_diagnosis import FrequencyDiagnosis
 from ..tables.compare import comparison_of_tables, inner_block
 from ..tables.fit import fit_table
 from ..tables.points import points_of, table_scales
@@ -14,6 +15,8 @@ from .dataset import Dataset, Estimate
 
 class TableDataset(Dataset):
     """Describing functions measured over amplitude and frequency."""
+
+    diagnosis = FrequencyDiagnosis
 
     def __init__(self, records, validation=()):
         self.records, self.validation = tuple(records), tuple(validation)

@@ -14,7 +14,7 @@ from ...numerals import certainty as sure
 from ...numerals import digits, percent
 from ...table import Brief
 from ..data.measurement import Measurement
-from ..monitor import COMPLETE
+from ..monitor import COMPLETE, UNDER_WAY
 from ..residuals.horizons import ErrorByHorizon, error_by_horizon
 from ..thresholds import RULED_OUT
 from .thresholds import SHOWN_PROBABILITY
@@ -38,6 +38,22 @@ _WHICH = (
 """Why one model has several errors; said where they are printed."""
 
 EFFECT, AMBIGUOUS, NONE, UNKNOWN = "effect", "ambiguous", "none", "unknown"
+
+
+NOTHING_KNOWN = (
+    "Nothing is known yet: it ended before the model was refitted and the first effects were tried. The "
+    "model is as it was given."
+)
+"""What is said of a diagnosis that ended before its first result."""
+
+
+def require_known(error: float) -> None:
+    """Refuse to show the errors of a model that was not fitted any more."""
+    if math.isnan(error):
+        raise ValueError(
+            "a picture or report needs errors; got a result that ended before the first was known. Ask "
+            "again, and let it run until its callback is called."
+        )
 
 
 def which_errors(measure: str) -> str:
@@ -238,6 +254,15 @@ class Diagnosis(Brief):
     status: str = COMPLETE
     doubts: tuple[str, ...] = ()
 
+    @classmethod
+    def unknown(cls, model, train, holdout, limits):
+        """Return what is known before the first result: the model as it was given."""
+        nothing = Baseline(model)
+        return cls(
+            UNKNOWN, (), model, nothing, math.nan, math.nan, math.nan, math.nan, NOTHING_KNOWN, (), None,
+            tuple(train), tuple(holdout), limits=limits, status=UNDER_WAY,
+        )  # fmt: skip
+
     @property
     def calibrated(self) -> str:
         """On what the probabilities of the ranking rest."""
@@ -286,6 +311,7 @@ class Diagnosis(Brief):
 
     def plot(self, **keywords):
         """Draw the ranking and the residual before and after; returns a ``ct.ControlPlot``."""
+        require_known(self.nrmse)
         return draw("diagnosis", self, **keywords)
 
     def __str__(self) -> str:

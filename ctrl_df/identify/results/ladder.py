@@ -11,7 +11,7 @@ from ...drawing import draw, go_on
 from ...numerals import percent
 from ...table import Brief
 from ..monitor import COMPLETE
-from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, which_errors
+from .diagnosis import EFFECT, NONE, UNKNOWN, Diagnosis, require_known, which_errors
 from .neighbours import Neighbours
 from .thresholds import LEAST_WIDTH
 
@@ -139,6 +139,18 @@ class Study(Brief):
     status: str = COMPLETE
     neighbours: Neighbours = Neighbours()
 
+    @classmethod
+    def unknown(cls, diagnosis: Diagnosis):
+        """Return what is known before the first result: the model as it was given."""
+        model = diagnosis.model
+        step = Step(
+            model=model, parameters={k: p.value for k, p in model.parameters.items()}, diagnosis=diagnosis
+        )
+        return cls(
+            (step,), model, UNKNOWN, math.nan, model, diagnosis.train, diagnosis.holdout,
+            status=diagnosis.status, neighbours=Neighbours(complete=False),
+        )  # fmt: skip
+
     @property
     def effects(self) -> tuple[str, ...]:
         """Ids of the effects that were added and kept."""
@@ -181,6 +193,8 @@ class Study(Brief):
 
     def _outcome(self) -> str:
         first, last = self.steps[0], self.steps[-1]
+        if math.isnan(first.nrmse):
+            return last_diagnosis(self.steps).explanation
         if self.verdict == NONE:
             return (
                 f"Nothing is missing: with refitted parameters the model errs by {percent(first.nrmse)}, "
@@ -210,10 +224,12 @@ class Study(Brief):
 
     def plot(self, **keywords):
         """Draw the error of every step beside the noise; returns a ``ct.ControlPlot``."""
+        require_known(self.steps[0].nrmse)
         return draw("ladder", self, **keywords)
 
     def report(self, path) -> str:
         """Write one self-contained HTML file and return its path."""
+        require_known(self.steps[0].nrmse)
         return go_on("report", self, path)
 
     def __str__(self) -> str:

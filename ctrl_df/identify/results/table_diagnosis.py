@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...drawing import draw
-from .diagnosis import Diagnosis
+from .diagnosis import Diagnosis, require_known
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,4 +24,5 @@ class FrequencyDiagnosis(Diagnosis):
 
     def plot(self, **keywords):
         """Draw the ranking and the error on the plane before and after; returns a ``ct.ControlPlot``."""
+        require_known(self.nrmse)
         return draw("table diagnosis", self, **keywords)

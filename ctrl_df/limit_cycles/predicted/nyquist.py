@@ -7,10 +7,14 @@ import warnings
 import control as ct
 import numpy as np
 
-from ...calls import unknown_keywords
 from .linear import LinearPart
 from .scan_grid import refined_omega
 from .thresholds import INDENT, OMEGA_POINTS, OMEGA_POINTS_DRAWN
+
+KEYWORDS = ("omega_limits", "omega_num", "return_contour", "indent_radius")
+"""Of ``ct.nyquist_response`` that `describing_function_response` hands on, beside `BEGINNINGS`."""
+
+BEGINNINGS = ("indent_", "encirclement_", "_kwargs")
 
 
 def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
@@ -24,7 +28,7 @@ def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
     warn : bool or None
         Whether the contour may warn; None: only if `omega` is None.
     check : bool
-        Whether unknown keywords are refused.
+        Whether python-control refuses unknown keywords.
     kwargs : dict
         Further keywords of ``ct.nyquist_response``.
     """
@@ -53,16 +57,8 @@ def nyquist_of(linear: LinearPart, omega, warn, check, kwargs):
         if not warn:
             warnings.simplefilter("ignore")
         response = ct.nyquist_response(
-            H, omega, warn_encirclements=warn, warn_nyquist=warn, _check_kwargs=check, **_rest(kwargs, check)
+            H, omega, warn_encirclements=warn, warn_nyquist=warn, _check_kwargs=check, **kwargs
         )
     if linear.measured and linear.dt:
         response.contour, response.dt = np.exp(np.asarray(response.contour) * linear.dt), linear.H.dt
     return response
-
-
-def _rest(kwargs, check):
-    known = {"omega_limits", "omega_num", "return_contour", "_kwargs"}
-    unknown = [k for k in kwargs if k not in known and not k.startswith(("indent_", "encirclement_"))]
-    if check:
-        unknown_keywords("the Nyquist plot", {k: kwargs[k] for k in unknown}, (*known, "indent_radius"))
-    return kwargs

@@ -8,8 +8,10 @@ import control as ct
 import numpy as np
 from control.descfcn import DescribingFunctionResponse as _PythonControlResponse
 
+from ...calls import keywords_of, unknown_keywords
+from ...checks import shown
 from ...df.arguments import amplitudes_of
-from ...df.describing import describing_function_family, quiet_describing_function
+from ...df.describing import quiet_describing_function, quiet_family
 from ...df.dispatch import method_for
 from ...df.family import Family, minus_inverse
 from ...df.work import progress_bar
@@ -21,7 +23,7 @@ from .branches import branch_crossings
 from .crossings import Scan, find_crossings, merged, real_crossings
 from .grade import LimitCycle
 from .linear import LinearPart
-from .nyquist import nyquist_of
+from .nyquist import BEGINNINGS, KEYWORDS, nyquist_of
 from .scan_grid import defect, scan_grid
 from .thresholds import OMEGA_POINTS, ORDERS
 
@@ -185,12 +187,19 @@ def describing_function_response(
     >>> resp.limit_cycles
     [<LimitCycle: 3.344 @ 1.4142 rad/s, stable, trusted>]
     """
+    if _check_kwargs:
+        known = [k for k in keywords_of(describing_function_response) if not k.startswith("_")]
+        unknown = {k: v for k, v in kwargs.items() if k not in KEYWORDS and not k.startswith(BEGINNINGS)}
+        unknown_keywords("describing_function_response", unknown, (*known, *KEYWORDS))
     linear = LinearPart(H)
     if not isinstance(orders, int | np.integer) or isinstance(orders, bool) or orders < 2:
         raise ValueError(f"describing_function_response needs orders as an integer >= 2; got {orders!r}.")
     amplitudes = np.atleast_1d(amplitudes_of(A))
     if amplitudes.ndim != 1 or not (amplitudes > 0).any():
-        raise ValueError(f"A needs at least one amplitude > 0 in a 1-D array; got {A!r}.")
+        raise ValueError(
+            f"describing_function_response needs A with at least one amplitude > 0 in a 1-D array; got "
+            f"{shown(A)}. Give the amplitudes of the box, np.ravel(A)."
+        )
     positive = np.unique(amplitudes[amplitudes > 0])
     method = method_for(F, output, try_method, num_points, float(positive[-1]), options)
     _check_timebase(linear, F, method)
@@ -204,9 +213,7 @@ def describing_function_response(
         output=output, try_method=try_method, num_points=num_points, **(options or {})
     )
     zeros = (amplitudes == 0).any() or (omega is not None and np.any(np.asarray(omega) == 0))
-    family = describing_function_family(
-        F, positive, frequencies, orders, executor, save=save, progress=progress, **given
-    )
+    family = quiet_family(F, positive, frequencies, orders, executor, save=save, progress=progress, **given)
     if method.needs_omega:
         N_vals = family.minus_inverse
     else:

@@ -1,0 +1,56 @@
+"""Systems of python-control whose numbers stay as they were made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+import control as ct
+
+from ..checks import shown
+
+
+class FixedParameters(dict):
+    """The ``params`` of a block, read like any dictionary; `copy` returns one that can be changed."""
+
+    def _refuse(self, *args, **_) -> NoReturn:
+        got = f"params[{shown(args[0])}] = {shown(args[1])}" if len(args) == 2 else "a change of its params"
+        raise TypeError(
+            f"a block is a value, whose parameters stay; got {got}. Make another, "
+            "block.with_parameters({name: value}), or give params={name: value} to the call that simulates."
+        )
+
+    __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse  # pyright: ignore
+
+    def copy(self) -> dict[str, Any]:
+        """Return a dictionary of one's own."""
+        return dict(self)
+
+    def __reduce__(self):
+        return type(self), (dict(self),)
+
+
+class _GivenOnce:
+    """An attribute that is set once; reading it takes no longer than reading any other."""
+
+    def __init__(self, kept: Callable[[Any], Any] = lambda value: value):
+        self.kept = kept
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __set__(self, block: Any, value: Any) -> None:
+        if vars(block).get(self.name) is not None:
+            raise AttributeError(
+                f"a block is a value, whose {self.name} stays; got {self.name}={shown(value)}. Make another: "
+                "with_parameters, with_effect, or ct.nlsys for laws of your own."
+            )
+        vars(block)[self.name] = self.kept(value)
+
+
+class Immutable(ct.NonlinearIOSystem):
+    """A system whose laws and parameters are given once; names, its own and of signals, may be changed."""
+
+    params: Any = _GivenOnce(FixedParameters)
+    updfcn: Any = _GivenOnce()
+    outfcn: Any = _GivenOnce()
