@@ -314,7 +314,7 @@ def _stop_place(prog, node, side):
 
 @part
 def _wall_at(prog, node, x, mode, height):
-    """Side of the stop at which the motor of two stands, or above which it flies too low to count; 0: none."""
+    """Side of the stop at which the motor of two stands, or off which it flies too low to count; 0: none."""
     ao, wall = prog.nodes[node, AUX], mode[prog.nodes[node, MODE] + WALL]
     if prog.ints[ao + A_STOP] != 1 or wall != 0:
         return wall
@@ -338,18 +338,17 @@ def _between(v0, v1, m0, m1, e, e_stop):
 
     Speeds toward the stop, v0 of the load and v1 of the motor. As long as v0 > v1 they collide, and a motor
     that is thrown against the stop comes back by `e_stop`: one round, which takes (v0, v1) to a matrix times
-    it, of trace T and determinant e e_stop. Either the bodies part after some rounds, or they never do: with
+    it, whose determinant is e e_stop. Either the bodies part after some rounds, or they never do: with
     real eigenvalues l1 >= l2 >= 0 each round brings v1/v0 closer to the eigenvector of l1 < 1, unless it was
     below that of l2. Infinitely many collisions then bring both to rest at once, the inelastic collapse of
     McNamara & Young (1992).
     """
     share0, share1 = m0 / (m0 + m1), m1 / (m0 + m1)
     kept = share0 - e * share1
-    trace, product = kept - e_stop * (share1 - e * share0), e * e_stop
-    spread = trace * trace - 4.0 * product
-    if v0 > max(v1, 0.0) and trace > 0.0 and spread >= 0.0:
+    half, product = 0.5 * (kept - e_stop * (share1 - e * share0)), e * e_stop
+    if v0 > max(v1, 0.0) and half > 0.0 and half * half >= product:
         # l2, without a difference of nearly equal numbers
-        least = 2.0 * product / (trace + math.sqrt(spread))
+        least = product / (half + math.sqrt(half * half - product))
         if share1 * (1.0 + e) * v1 >= (least - kept) * v0:
             return 0.0, 0.0
     while v0 > v1:
