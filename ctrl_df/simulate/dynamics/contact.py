@@ -39,6 +39,7 @@ from ..program.layout import (
     WALL,
     X,
 )
+from ..thresholds import ROUNDS
 from .flow import node_input, refresh
 from .mechanics import accelerate, closed, dry_level, smooth_forces
 
@@ -351,12 +352,14 @@ def _between(v0, v1, m0, m1, e, e_stop):
         least = product / (half + math.sqrt(half * half - product))
         if share1 * (1.0 + e) * v1 >= (least - kept) * v0:
             return 0.0, 0.0
-    while v0 > v1:
+    for _round in range(ROUNDS):
+        if not v0 > v1:
+            return v0, v1
         common, rebound = _collision(v0, v1, m0, m1, e)
         v0, v1 = common - share1 * rebound, common + share0 * rebound
         if v1 > 0.0:
             v1 *= -e_stop
-    return v0, v1
+    return 0.0, 0.0
 
 
 @part
