@@ -1,5 +1,7 @@
 """The rate limiter in time: it catches up with its input, follows it, falls behind, at jumps as well."""
 
+from typing import Any
+
 import control as ct
 import numpy as np
 import pytest
@@ -62,7 +64,7 @@ def test_rate_limiter_in_a_loop_against_python_control(seed):
         connections=[["C.e", "-P.y"], [f"L.{enters}", "C.u"], ["P.v", f"L.{leaves}"]],
         inplist=["C.e"], inputs=["r"], outlist=["P.y"], outputs=["y"],
     )  # fmt: skip
-    r = np.ones_like(T) if seed % 2 else np.sin(rng.uniform(0.5, 4) * T)
+    r: Any = np.ones_like(T) if seed % 2 else np.sin(rng.uniform(0.5, 4) * T)
     run = cdf.event_response(loop, T, r)
     assert run.status is Status.CONVERGED and run.event_count < 50
     options = dict(rtol=1e-6, max_step=0.05)
