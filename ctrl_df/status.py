@@ -24,8 +24,8 @@ class Status(Enum):
         "lower the gains or start nearer to rest"
     )
     CHATTERING = (
-        "the switching element chatters: infinitely many switches in finite time (a sliding mode); "
-        "give the relay a hysteresis or the loop a lag"
+        "infinitely many events in finite time (chatter, a sliding mode); "
+        "give a relay a hysteresis or the loop a lag, a contact some compliance"
     )
     STEP_TOO_SMALL = (
         "the step fell below the resolution of time: the law is not continuous between its stated corners; "

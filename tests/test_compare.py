@@ -169,3 +169,17 @@ def test_models_beside_each_other_are_given_in_a_row_or_by_name():
         with pytest.raises(TypeError, match=r"needs beside as what compare\(\) returns"):
             one.plot(beside=wrong)
     plt.close("all")
+
+
+def test_a_model_whose_run_ends_early_is_named():
+    """No error is given without a word where the simulation did not come to the end of the record."""
+    t = np.arange(0, 2, 0.01)
+    force = 9 * np.sin(3 * t)
+    x = np.asarray(event_response(friction_mass(2.0, 3.0), t, force).outputs)[0]
+    record = Measurement(t, force, x, name="run 1")
+    runaway = cdf.Mass(2.0, name="cart").with_effect(cdf.LinearSpring(-1e6))
+    for mode in ("free", "windows"):
+        with pytest.warns(
+            RuntimeWarning, match=r"of cart on run 1 ends early, at t = \S+ s.*left every bound"
+        ):
+            compare(runaway, record, mode=mode)

@@ -7,7 +7,8 @@ Here sticking becomes creep and impact a short spring contact:
   creeps at up to that speed; the static level holds only below it;
 - contacts are springs and dampers whose stiffness makes a contact last ``ctrl_df.contact_time`` (default
   1 ms) and whose damping gives the stated restitution: a body pressed on by a steady force F sinks in by
-  F/stiffness;
+  F/stiffness. Two contacts at once, a load that hits a motor pressed against a stop, are two springs in
+  series, whatever they are made of: what the load rebounds by is not the restitution stated;
 - delays become first-order Pade elements: right up to about 0.5/delay rad/s.
 
 Both settings live in ``control.config.defaults``. The exact laws are what `ctrl_df.event_response` runs.

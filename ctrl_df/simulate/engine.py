@@ -290,7 +290,8 @@ class Engine:
                 )  # fmt: skip
             pointers.raise_kept()
             pace = CHUNK_TIME / max(perf_counter() - began, CHUNK_LEAST)
-            chunk = max(int(chunk * min(max(pace, CHUNK_CHANGE[0]), CHUNK_CHANGE[1])), FEWEST_STEPS)
+            changed = chunk * min(max(pace, CHUNK_CHANGE[0]), CHUNK_CHANGE[1])
+            chunk = max(int(min(changed, MAX_STEPS)), FEWEST_STEPS)
             fresh = 0
             used = min(int(clock[5]), len(log_t))
             if log > 1 and used:

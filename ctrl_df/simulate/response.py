@@ -191,7 +191,9 @@ def event_response(
         run.status = Status.DIVERGED
     if not run.status.ok:
         warnings.warn(
-            f"event_response ended at t = {run.state.time:.6g} s: {run.status}", RuntimeWarning, stacklevel=2
+            f"event_response ended at t = {run.state.time:.6g} s{_last_events(engine, run)}: {run.status}",
+            RuntimeWarning,
+            stacklevel=2,
         )
     response = EventResponse(
         times[:n],
@@ -213,6 +215,15 @@ def event_response(
     response.status = run.status
     response.propagated = run.propagated
     return response
+
+
+def _last_events(engine, run) -> str:
+    """Say which events a run that chatters has met last, where they were kept."""
+    if run.status is not Status.CHATTERING:
+        return ""
+    last = engine.name_events([column[-2:] for column in run.events])
+    found = dict.fromkeys(f"{event.kind} in {event.subsystem}" for event in last)
+    return f" (last: {', '.join(found)})" if found else ""
 
 
 class _Given:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from copy import copy
 from types import MappingProxyType
 
@@ -73,7 +74,9 @@ class TimeDataset(Dataset):
         """Return the comparison of a model whose initial states in each segment are known already."""
         rows = []
         for record, w, start in zip(self.records, segments, starts, strict=True):
-            run = simulator_of(model, record).run(w, None, start, rounded=True)
+            simulator = simulator_of(model, record)
+            run = simulator.run(w, None, start, rounded=True)
+            _warn_of_early(simulator, len(w))
             simulated = sensed(record).apart(run)
             beside = simulated[record.output]
             rows.append(
@@ -113,3 +116,19 @@ class TimeDataset(Dataset):
     def plan(self, diagnosis, models, names, **limits):
         """Return the input, of a few shapes and sizes, whose outputs differ most."""
         return input_that_separates(diagnosis, models, names, **limits)
+
+
+def _warn_of_early(simulator, segments: int) -> None:
+    """Warn where the last run of a model on a record did not reach its end."""
+    if not simulator.early:
+        return
+    time, status = min(simulator.early, key=lambda end: end[0])
+    where = f" (as do {len(simulator.early)} of {segments} segments)" if segments > 1 else ""
+    warnings.warn(
+        f"the simulation of {simulator.block.name} on {simulator.record.name} ends early, at t = {time:.6g} s"
+        f"{where}: {status}. From there on its output is put far beyond the record, and the errors given say "
+        "nothing of the model. See what it does there with event_response on the same input, and change its "
+        "parameters.",
+        RuntimeWarning,
+        stacklevel=6,
+    )

@@ -15,6 +15,7 @@ from ...simulate.groups import grouped
 from ...simulate.kernel.many import Drives
 from ...simulate.parallel import require_compiled
 from ...simulate.runs import run_many, sampled_drives
+from ...status import Status
 from ..data.measurement import Measurement
 from ..thresholds import RTOL
 from . import initial_states
@@ -94,6 +95,8 @@ class Simulator:
         )
         self.facts, self.sensed = facts_of(self.block, record), sensed(record)
         self.runs = 0
+        self.early: list[tuple[float, Status]] = []
+        """When runs of the last call ended that did not reach their end [s], and how."""
         self._prepared: dict[Any, PreparedModel] = {}
         self._kept_drives: Any = (), None
 
@@ -234,6 +237,7 @@ class Simulator:
     def _run(self, parts: Sequence[PreparedModel], asked: Sequence[Request], rounded: bool):
         """Run models made ready over what is asked for, with the values that they have."""
         self.runs += len(asked)
+        self.early = []
         if self.continued:
             outputs = [self._one_by_one(p, w, s) for p, (w, _, s) in zip(parts, asked, strict=True)]
         else:
@@ -262,6 +266,8 @@ class Simulator:
                         row[where] = run.outputs[: where.stop - where.start, column]
                         if not run.status.ok:
                             row[where.start + run.recorded : where.stop] = np.nan
+                if not run.status.ok:
+                    self.early.append((run.state.time + delay, run.status))
                 if follows and run.status.ok and delay == self.late(part):
                     came = self._arrival(part, segments, w + 1, run)
             hidden = {k: came[k] for k in continued_states if k in came}
@@ -304,6 +310,8 @@ class Simulator:
             )  # fmt: skip
             for error in result.errors.values():
                 raise error
+            for i in np.flatnonzero(result.recorded < length):
+                self.early.append((float(result.time[i]), result.status[i]))
             outputs |= {column: result.outputs[:, column] for column in columns}
         return [
             self._joined([outputs[c][ends[i] : ends[j]] for c in self.sensed.columns])

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..compiler.compiled import part
 from ..program.layout import (
     A_BODIES,
@@ -11,6 +13,7 @@ from ..program.layout import (
     A_CONTACT,
     A_JOINT,
     A_NFRIC0,
+    A_STOP,
     AUX,
     DIR0,
     DIR1,
@@ -36,6 +39,7 @@ from ..program.layout import (
     WALL,
     X,
 )
+from ..thresholds import ROUNDS
 from .flow import node_input, refresh
 from .mechanics import accelerate, closed, dry_level, smooth_forces
 
@@ -200,30 +204,42 @@ def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
     Chatter: with restitution e < 1 and a steady pressing acceleration p the flights shrink geometrically and
     end after 2 w / (p (1 - e)), w the rebound speed. Once a flight is lower than `height` of the gap (or of
     the position's own size) the rest of the chatter is passed over at once, momentum kept: an error of
-    position of that order.
+    position of that order. A motor driven against a stop close behind it is hit as often as it takes, see
+    `_between`.
     """
     w, f, trial = work
     nodes, par = prog.nodes, prog.par
     mo, po, xo = nodes[node, MODE], nodes[node, PAR], nodes[node, X]
     m0, m1, gap = par[po + P_M0], par[po + P_M0 + 1], par[po + P_GAP]
     v0, v1 = x[xo + 1], x[xo + 3]
-    common = (m0 * v0 + m1 * v1) / (m0 + m1)
-    rebound = -par[po + P_REST] * (v1 - v0)
+    face, wall = (gap if side > 0 else 0.0), _wall_at(prog, node, x, mode, height)
+    common, rebound = _collision(v0, v1, m0, m1, par[po + P_REST])
     if side * (v1 - v0) < 0.0:
         rebound = v1 - v0  # already parting: the margin was crossed by rounding alone
+    if wall == -side:
+        x[xo + 2] = _stop_place(prog, node, wall)
+        x[xo] = x[xo + 2] - face
+    else:
+        x[xo + 2] = x[xo] + face
     x[xo + 1] = common - m1 / (m0 + m1) * rebound
     x[xo + 3] = common + m0 / (m0 + m1) * rebound
-    x[xo + 2] = x[xo] + (gap if side > 0 else 0.0)
+    if wall == -side:
+        load, motor = _between(
+            wall * v0, wall * v1, m0, m1, par[po + P_REST], par[po + P_STOP_REST]
+        )  # fmt: skip
+        x[xo + 1], x[xo + 3] = wall * load, wall * motor
+        common, rebound = (m0 * x[xo + 1] + m1 * x[xo + 3]) / (m0 + m1), x[xo + 3] - x[xo + 1]
+        mode[mo + WALL] = wall if motor == 0.0 else 0
     mode[mo + JOINT] = 0
+    if wall != 0 and _rests(prog, drive, segment, t, x, mode, work, node, side, wall, height):
+        return E_CONTACT
     refresh(prog, drive, segment, t, x, mode, w)
     force = node_input(prog, node, 0, w)
     resolve(prog, node, t, x, mode, force, f, trial)
     accelerate(prog, node, t, x, mode, force, f, dx, g)
     press = side * (dx[xo + 3] - dx[xo + 1])
     speed = abs(rebound)
-    # positions are known relative to their size only: a flight below that resolution is none
-    lowest = height * (gap + 4.0 * abs(x[xo]))
-    if press > 0.0 and speed * speed < 2.0 * press * lowest:
+    if press > 0.0 and speed * speed < 2.0 * press * _least_flight(prog, node, x, height):
         x[xo + 1] = x[xo + 3] = common
         mode[mo + JOINT] = side
         refresh(prog, drive, segment, t, x, mode, w)
@@ -234,30 +250,40 @@ def impact(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
 
 @part
 def stop(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
-    """Newton's impact on an end stop; the end of chatter becomes rest at the stop."""
+    """Newton's impact on an end stop; the end of chatter becomes rest at the stop.
+
+    A load in contact flies on; where it stands behind the motor it hits it at once (`_between`).
+    """
     w, f, trial = work
     nodes, par, aux = prog.nodes, prog.par, prog.ints
     mo, po, xo = nodes[node, MODE], nodes[node, PAR], nodes[node, X]
     driven = aux[nodes[node, AUX] + A_BODIES] - 1
-    at, low, high = xo + 2 * driven, par[po + P_LOW], par[po + P_HIGH]
+    at = xo + 2 * driven
     rigid = aux[nodes[node, AUX] + A_JOINT] == J_RIGID
-    joined = driven == 1 and closed(prog, node, mode)
+    joint = mode[mo + JOINT] if driven == 1 and not rigid and closed(prog, node, mode) else 0
     v = x[at + 1]
     rebound = -par[po + P_STOP_REST] * v if side * v > 0.0 else v
-    x[at] = high if side > 0 else low
+    x[at] = _stop_place(prog, node, side)
     x[at + 1] = rebound
     if rigid:
         x[xo] = x[at]
         x[xo + 1] = rebound
-    elif joined:
-        # the load flies on, or is hit at once when it stands between motor and stop
-        mode[mo + JOINT] = 0 if rebound != v else mode[mo + JOINT]
+    elif joint != 0 and rebound != v:
+        x[xo] = x[at] - (par[po + P_GAP] if joint > 0 else 0.0)
+        mode[mo + JOINT] = 0
+        if joint == -side:
+            m0, m1 = par[po + P_M0], par[po + P_M0 + 1]
+            load, motor = _between(side * v, side * rebound, m0, m1, par[po + P_REST], par[po + P_STOP_REST])
+            x[xo + 1], x[at + 1] = side * load, side * motor
+        if _rests(prog, drive, segment, t, x, mode, work, node, joint, side, height):
+            return E_STOP_CONTACT
     refresh(prog, drive, segment, t, x, mode, w)
     force = node_input(prog, node, 0, w)
     resolve(prog, node, t, x, mode, force, f, trial)
     accelerate(prog, node, t, x, mode, force, f, dx, g)
-    press, speed = side * dx[at + 1], abs(rebound)
-    if speed == 0.0 or (press > 0.0 and speed * speed < 2.0 * press * height * (high - low + abs(x[at]))):
+    press, speed = side * dx[at + 1], abs(x[at + 1])
+    lowest = _least_flight_at_stop(prog, node, x[at], height)
+    if speed == 0.0 or (press > 0.0 and speed * speed < 2.0 * press * lowest):
         x[at + 1] = 0.0
         if rigid:
             x[xo + 1] = 0.0
@@ -266,3 +292,101 @@ def stop(prog, drive, segment, t, x, mode, work, dx, g, node, side, height):
         resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
         return E_STOP_CONTACT
     return E_STOP
+
+
+@part
+def _least_flight(prog, node, x, height):
+    """Flight in the gap below which there is none [m]: positions are known relative to their size only."""
+    return height * (prog.par[prog.nodes[node, PAR] + P_GAP] + 4.0 * abs(x[prog.nodes[node, X]]))
+
+
+@part
+def _least_flight_at_stop(prog, node, place, height):
+    """Do the same between the stops."""
+    po = prog.nodes[node, PAR]
+    return height * (prog.par[po + P_HIGH] - prog.par[po + P_LOW] + abs(place))
+
+
+@part
+def _stop_place(prog, node, side):
+    """Where the stop of a side stands [m]."""
+    return prog.par[prog.nodes[node, PAR] + (P_HIGH if side > 0 else P_LOW)]
+
+
+@part
+def _wall_at(prog, node, x, mode, height):
+    """Side of the stop at which the motor of two stands, or off which it flies too low to count; 0: none."""
+    ao, wall = prog.nodes[node, AUX], mode[prog.nodes[node, MODE] + WALL]
+    if prog.ints[ao + A_STOP] != 1 or wall != 0:
+        return wall
+    place = x[prog.nodes[node, X] + 2]
+    lowest = _least_flight_at_stop(prog, node, place, height)
+    for side in (-1, 1):
+        if side * (_stop_place(prog, node, side) - place) < lowest:
+            return side
+    return 0
+
+
+@part(inline=True)
+def _collision(v0, v1, m0, m1, e):
+    """Speed of the common centre of two bodies that collide, and that of the second over the first after."""
+    return (m0 * v0 + m1 * v1) / (m0 + m1), -e * (v1 - v0)
+
+
+@part
+def _between(v0, v1, m0, m1, e, e_stop):
+    """Speeds after all that follows at once where a load hits a motor that has a stop close behind it.
+
+    Speeds toward the stop, v0 of the load and v1 of the motor. As long as v0 > v1 they collide, and a motor
+    that is thrown against the stop comes back by `e_stop`: one round, which takes (v0, v1) to a matrix times
+    it, whose determinant is e e_stop. Either the bodies part after some rounds, or they never do: with
+    real eigenvalues l1 >= l2 >= 0 each round brings v1/v0 closer to the eigenvector of l1 < 1, unless it was
+    below that of l2. Infinitely many collisions then bring both to rest at once, the inelastic collapse of
+    McNamara & Young (1992).
+    """
+    share0, share1 = m0 / (m0 + m1), m1 / (m0 + m1)
+    kept = share0 - e * share1
+    half, product = 0.5 * (kept - e_stop * (share1 - e * share0)), e * e_stop
+    if v0 > max(v1, 0.0) and half > 0.0 and half * half >= product:
+        # l2, without a difference of nearly equal numbers
+        least = product / (half + math.sqrt(half * half - product))
+        if share1 * (1.0 + e) * v1 >= (least - kept) * v0:
+            return 0.0, 0.0
+    for _round in range(ROUNDS):
+        if not v0 > v1:
+            return v0, v1
+        common, rebound = _collision(v0, v1, m0, m1, e)
+        v0, v1 = common - share1 * rebound, common + share0 * rebound
+        if v1 > 0.0:
+            v1 *= -e_stop
+    return 0.0, 0.0
+
+
+@part
+def _rests(prog, drive, segment, t, x, mode, work, node, side, wall, height):
+    """Whether load and motor come to rest in contact, `side`, with the motor at a stop, `wall`; sets them so.
+
+    They do where both contacts are pressed together and the flights off either are too low to count: that of
+    the load off the motor that is held, and that of both off the stop.
+    """
+    w, f, trial = work
+    po, mo, xo = prog.nodes[node, PAR], prog.nodes[node, MODE], prog.nodes[node, X]
+    m0, m1 = prog.par[po + P_M0], prog.par[po + P_M0 + 1]
+    x0, v0, x1, v1 = x[xo], x[xo + 1], x[xo + 2], x[xo + 3]
+    dir0, dir1, joint, held = mode[mo + DIR0], mode[mo + DIR1], mode[mo + JOINT], mode[mo + WALL]
+    x[xo + 2] = _stop_place(prog, node, wall)
+    x[xo] = x[xo + 2] - (prog.par[po + P_GAP] if side > 0 else 0.0)
+    x[xo + 1] = x[xo + 3] = 0.0
+    mode[mo + JOINT], mode[mo + WALL] = side, wall
+    refresh(prog, drive, segment, t, x, mode, w)
+    resolve(prog, node, t, x, mode, node_input(prog, node, 0, w), f, trial)
+    if mode[mo + JOINT] == side and mode[mo + WALL] == wall:
+        press, both = -side * f[0] / m0, wall * (f[0] + f[1]) / (m0 + m1)
+        low = 2.0 * press * _least_flight(prog, node, x, height)
+        low_both = 2.0 * both * _least_flight_at_stop(prog, node, x[xo + 2], height)
+        still = v0 == 0.0 and v1 == 0.0
+        if still or ((v1 - v0) ** 2 < low and max(v0 * v0, v1 * v1) < low_both):
+            return True
+    x[xo], x[xo + 1], x[xo + 2], x[xo + 3] = x0, v0, x1, v1
+    mode[mo + DIR0], mode[mo + DIR1], mode[mo + JOINT], mode[mo + WALL] = dir0, dir1, joint, held
+    return False

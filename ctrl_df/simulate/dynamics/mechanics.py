@@ -323,8 +323,9 @@ def _joined_margins(prog, node, x, mode, f, f0, a, g):
     else:
         g[go + G_BODY1] = min(up - net, down + net)
     if impact:
-        # neither does the motor draw back, nor the load run ahead
-        g[go + G_JOINT_LOW] = side * f[1] + dry_level(prog, node, 1, 0.0, -float(side), 0.0, f)
+        # neither does the motor draw back, which a stop behind it does not let it, nor the load run ahead
+        if wall != -side:
+            g[go + G_JOINT_LOW] = side * f[1] + dry_level(prog, node, 1, 0.0, -float(side), 0.0, f)
         g[go + G_JOINT_HIGH] = dry_level(prog, node, 0, 0.0, float(side), 0.0, f) - side * f[0]
 
 

@@ -91,8 +91,9 @@ def settle(prog, drive, segment, t, x, mode, work, dx):
                     mode[mo] = m
                     changed = True
             elif kind == RATE:
-                gap = node_input(prog, n, 0, w) - x[nodes[n, X]]
-                if mode[mo] == 0 and gap != 0.0:
+                value, out = node_input(prog, n, 0, w), x[nodes[n, X]]
+                gap = value - out
+                if mode[mo] == 0 and abs(gap) > GRAIN * (abs(value) + abs(out)):
                     # a jump of the input cannot be followed at once
                     mode[mo] = 1 if gap > 0 else -1
                     changed = True
@@ -197,6 +198,9 @@ def event(prog, drive, segment, t, x, mode, work, dx, g, node, slot, height, rea
         return E_ENGAGE
     if kind == RATE:
         if mode[mo] != 0:
+            # caught up: what rounding leaves of the way is no jump of the input
+            refresh(prog, drive, segment, t, x, mode, w)
+            x[xo] = node_input(prog, node, 0, w)
             mode[mo] = 0
             return E_DISENGAGE
         # the sign of the input's rate tells the direction of the limit

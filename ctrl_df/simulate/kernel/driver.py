@@ -210,7 +210,7 @@ def advance(
         # --- rates and margins here
         if jumped and (has_tracked or not locate):
             settle(prog, drive, segment, t, x, mode, work, dx)
-            jumped = False
+            jumped = known = False
         if affine or gliding:
             slot = recall(prog, store, mode, work, x1, xi, dx, g)
             if gliding and skip > 0:
