@@ -10,12 +10,17 @@ import control as ct
 import numpy as np
 import pytest
 
-from ctrl_df.blocks.elements.hysteresis import friction_backlash_nonlinearity, relay_hysteresis_nonlinearity
+from ctrl_df.blocks.elements.hysteresis import (
+    friction_backlash_nonlinearity,
+    play,
+    relay_hysteresis_nonlinearity,
+)
 from ctrl_df.blocks.elements.memoryless import (
     DescribingFunctionNonlinearity,
     saturation,
     saturation_nonlinearity,
 )
+from ctrl_df.blocks.mechanism import Mass
 from ctrl_df.df.describing import describing_function
 from ctrl_df.limit_cycles.predicted.predict import DescribingFunctionResponse, describing_function_response
 from ctrl_df.plot.describing import describing_function_plot
@@ -166,3 +171,18 @@ def test_calls_of_python_control_are_understood():
     assert (a, w) == rough[0]
     with pytest.raises(TypeError, match="unrecognized keyword"):
         describing_function(np.tanh, 1.0, unknown=1)
+
+
+@pytest.mark.parametrize("names", [("a", "b"), (None, None)])
+@pytest.mark.parametrize("make", [lambda name: Mass(3.0, name=name), lambda name: play(1.0, name=name)])
+def test_equal_blocks_are_connected(make, names):
+    # python-control keeps systems by equality
+    one, other = (make(name) for name in names)
+    assert (one == other) == (names == (None, None))
+    inside, outside = one.input_labels[0], one.output_labels[0]
+    both = ct.interconnect(
+        [one, other], connections=[[f"{other.name}.{inside}", f"{one.name}.{outside}"]],
+        inplist=[f"{one.name}.{inside}"], outlist=[f"{other.name}.{outside}"], inputs=["u"], outputs=["y"],
+        warn_duplicate=False, check_unused=False,
+    )  # fmt: skip
+    assert both.nstates == len(set(both.state_labels)) == 2 * one.nstates

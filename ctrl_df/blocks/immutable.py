@@ -51,6 +51,18 @@ class _GivenOnce:
 class Immutable(ct.NonlinearIOSystem):
     """A system whose laws and parameters are given once; names, its own and of signals, may be changed."""
 
+    def __init__(self, *args, name=None, **keywords):
+        super().__init__(*args, name=name, **keywords)
+        self._numbered = self.name if name is None else None
+
+    @property
+    def given_name(self) -> str | None:
+        """Its name, if it was given one; None: python-control numbered it.
+
+        Equal blocks have equal ones: python-control tells the systems that it connects apart by that.
+        """
+        return None if self.name == self._numbered else self.name
+
     params: Any = _GivenOnce(FixedParameters)
     updfcn: Any = _GivenOnce()
     outfcn: Any = _GivenOnce()

@@ -48,7 +48,7 @@ class Mechanism(Immutable):
     def __init__(self, inertias: dict[str, float], effects=(), *, measured="load", name=None):
         owner = type(self).__name__
         system_name(owner, name)
-        unit, self._given_name = self._coordinates.unit_of("kg"), name
+        unit = self._coordinates.unit_of("kg")
         self._values = {
             k: checked(owner, k, v, {**_MASS, "unit": unit, "meaning": k.replace("_", " ")})
             for k, v in inertias.items()
@@ -195,7 +195,7 @@ class Mechanism(Immutable):
 
     def with_measured(self, measured: str) -> Mechanism:
         """Return the block with its sensor on the other body (``load`` or ``motor``)."""
-        return self._make(self._values, self._effects, measured, self._given_name)
+        return self._make(self._values, self._effects, measured, self.given_name)
 
     def with_name(self, name: str) -> Mechanism:
         """Return the block under another name."""
@@ -226,23 +226,24 @@ class Mechanism(Immutable):
         raise refused
 
     def _remade(self, inertias, effects) -> Mechanism:
-        return self._make(inertias, effects, self._measured, self._given_name)
+        return self._make(inertias, effects, self._measured, self.given_name)
 
     @classmethod
     def _make(cls, inertias, effects, measured, name=None) -> Mechanism:
         return cls(**inertias, effects=effects, measured=measured, name=name)  # type: ignore[call-arg]
 
     def __reduce__(self):
-        return _unpickle, (type(self), self._values, self._effects, self._measured, self.name)
+        numbered = {"name": self.name, "_numbered": self._numbered}
+        return _unpickle, (type(self), self._values, self._effects, self._measured, self.given_name), numbered
 
     def __eq__(self, other: Any) -> bool:
         if type(other) is not type(self):
             return NotImplemented
-        mine = (self._values, self._effects, self._measured)
-        return mine == (other._values, other._effects, other._measured)
+        mine = (self._values, self._effects, self._measured, self.given_name)
+        return mine == (other._values, other._effects, other._measured, other.given_name)
 
     def __hash__(self) -> int:
-        return hash((type(self), tuple(self._values.items()), self._effects, self._measured))
+        return hash((type(self), tuple(self._values.items()), self._effects, self._measured, self.given_name))
 
     def __repr__(self) -> str:
         inertias = ", ".join(f"{k}={v:g}" for k, v in self._values.items())

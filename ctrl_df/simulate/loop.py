@@ -9,10 +9,12 @@ import control as ct
 import numpy as np
 
 from ..blocks.elements.element import Element
+from ..blocks.immutable import FixedParameters
 from ..blocks.linearization import warn_of_mechanism
 from ..blocks.mechanism import Mechanism
 from ..blocks.primitives import RateLimiter
 from ..checks import is_number, number, returned, shown, system_name
+from ..nearest import did_you_mean
 from .sampled import Sampled
 
 
@@ -124,6 +126,7 @@ def closed_loop(pid, block, dt: float | None = 0, *, output=None, name=None) -> 
     )
     loop.__class__ = ClosedLoop  # python-control's interconnect makes no other
     loop.parts = LoopParts(pid, block, float(dt or 0))
+    loop.params = FixedParameters(loop.params)  # the exact simulation has the block's own
     return loop
 
 
@@ -220,7 +223,8 @@ def _as_lti(pid) -> Any:
         pid = ct.tf([number("closed_loop", "pid", pid)], [1.0])
     if not isinstance(pid, ct.TransferFunction | ct.StateSpace):
         raise TypeError(
-            f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}."
+            f"closed_loop needs a TransferFunction or StateSpace controller; got {type(pid).__name__}. The "
+            "nonlinear block comes second."
         )
     if not pid.issiso():
         raise ValueError(
@@ -250,5 +254,5 @@ def _label(block, output) -> str:
     named = isinstance(output, str) or (is_number(output) and not isinstance(output, float))
     raise (ValueError if named else TypeError)(
         f"closed_loop needs output out of {', '.join(labels)}, or a number from 0 to {len(labels) - 1}; got "
-        f"{shown(output)}."
+        f"{shown(output)}.{did_you_mean(output, labels, 'Give one of these.')}"
     )

@@ -106,17 +106,18 @@ class Element(Immutable, DescribingFunctionNonlinearity):
 
     def __reduce__(self):
         """Pickle as kind and arguments."""
-        return build, (self._kind, dict(self._values), self.name)
+        numbered = {"name": self.name, "_numbered": self._numbered}
+        return build, (self._kind, dict(self._values), self.given_name), numbered
 
     def __eq__(self, other: Any) -> bool:
-        """Compare by kind and arguments."""
+        """Compare by kind, arguments and given name."""
         if not isinstance(other, Element):
             return NotImplemented
-        return (self._kind, self._values) == (other._kind, other._values)
+        return (self._kind, self._values, self.given_name) == (other._kind, other._values, other.given_name)
 
     def __hash__(self) -> int:
-        """Hash of kind and arguments."""
-        return hash((self._kind, tuple(self._values.items())))
+        """Hash of kind, arguments and given name."""
+        return hash((self._kind, tuple(self._values.items()), self.given_name))
 
     def __repr__(self) -> str:
         """Return the call that builds it."""

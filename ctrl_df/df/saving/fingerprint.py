@@ -29,7 +29,7 @@ import numpy as np
 
 # Of a system: what it and its signals are called, and what follows from the rest.
 _NAMES = {
-    "name", "_given_name", "input_index", "output_index", "state_index", "syslist_index", "_repr_format",
+    "name", "_numbered", "input_index", "output_index", "state_index", "syslist_index", "_repr_format",
     "display_format", "connection_type", "_current_params", "_core", "_keys", "_specs", "_parameters",
 }  # fmt: skip
 # Of a class: what Python and dataclasses add to what the user wrote.
