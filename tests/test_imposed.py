@@ -143,6 +143,19 @@ def test_forces_are_those_of_an_independent_integrator(effect):
     np.testing.assert_allclose(np.asarray(found.outputs).ravel(), wanted, atol=3e-4)
 
 
+@pytest.mark.parametrize("shape", [64.0, 128.0, 400.0])
+def test_hysteresis_that_bends_sharply_is_a_spring_with_a_slider(shape):
+    # a long step past saturation overflows |z|^(shape - 1): it is no step, and the next one is shorter
+    t = np.linspace(0.0, 6.0, 751)
+    x = 2.0 * np.sin(1.1 * t + 1) + 0.6 * np.sin(2.9 * t + 2)
+    z = [0.0]
+    for move in np.diff(x):
+        z.append(min(max(z[-1] + move / 0.05, -1.0), 1.0))
+    found = cdf.imposed_response(cdf.Massless([cdf.Hysteresis(30.0, 0.05, shape)]), t, x)
+    # measured: 0.69 to 0.74 / shape, on the bend
+    assert np.abs(np.asarray(found.outputs).ravel() / 30.0 - z).max() < 1.0 / shape
+
+
 def test_a_mass_adds_its_inertia_and_friction_its_load():
     t = np.linspace(0.0, 2.0, 2001)
     x, v, a = np.sin(t), np.cos(t), -np.sin(t)
@@ -228,7 +241,7 @@ def test_nothing_is_found_where_nothing_is_hidden():
     assert found.verdict == "none"
 
 
-def test_a_machine_that_turns_and_one_with_inertia():
+def test_a_machine_that_turns_and_one_with_inertia(tmp_path):
     base = cdf.Inertia(0.05).with_effect(cdf.Coulomb(0.5)).with_effect(cdf.Viscous(0.1))
     truth = base.with_effect(cdf.Gravity(1.2, 0.3))
     run = record(truth, 1, place=1e-5, force=0.01, units=("rad", "N m"), size=1.0)
@@ -236,6 +249,8 @@ def test_a_machine_that_turns_and_one_with_inertia():
     assert study.effects == ("gravity",)
     assert study.model.parameters["gravity.torque"].value == pytest.approx(1.2, rel=0.01)
     assert study.model.parameters["inertia"].value == pytest.approx(0.05, rel=0.02)
+    study.report(tmp_path / "study.html")
+    assert "rms of the centred torque" in (tmp_path / "study.html").read_text(encoding="utf-8")
 
 
 def test_a_measured_velocity_is_used():

@@ -2,10 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import ctrl_df as cdf
-from ctrl_df.identify.shooting.variables import Variable
+from ctrl_df.identify.prediction.segments import facts
+from ctrl_df.identify.shooting.variables import Variable, variables_of
 
 FREE = cdf.Mass(2.0).with_effect(cdf.Hysteresis(4.0, stroke=0.1)).parameters["hysteresis.stroke"]
 
@@ -23,3 +25,13 @@ def test_a_value_that_is_next_to_nothing_has_no_size():
     level = cdf.friction_mass(2.0, 1.0, 1.0).parameters["coulomb.level"]
     bounded = Variable("level", level, 600.0, (125.0, 800.0), begin=5e-12)
     assert bounded.scale == 125.0 and Variable("level", level, 600.0, begin=5e-12).scale == 600.0
+
+
+@pytest.mark.parametrize("stop", [cdf.HardStop(0.1), cdf.HardStop(0.3, lower=0.2)])
+def test_stops_stay_apart_where_no_position_is_measured(stop):
+    t = np.arange(0, 5, 0.01)
+    run = cdf.Measurement(t, np.sin(t), np.cos(3 * t), output="velocity")
+    block = cdf.Mass(2.0).with_effect(stop)
+    (limit,) = variables_of(block, ["hard_stop.limit"], [run], facts(run))
+    nearest = block.with_parameters({"hard_stop.limit": limit.p(limit.clip(-1e3))}).effects[0]
+    assert nearest.span[1] - nearest.span[0] == pytest.approx(facts(run).speed * run.dt)

@@ -15,6 +15,7 @@ _ERRORS = {
     "output": "over the rms of the centred output, over segments each from a fitted initial state",
     "acceleration": "of the acceleration, averaged over some samples, over that measured: forces that no "
     "model has, such as friction that varies, are larger here than the noise of the sensor",
+    "force": "over the rms of the centred force, along the whole motion",
     "N": "of |N|",
 }
 

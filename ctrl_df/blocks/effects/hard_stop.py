@@ -82,5 +82,10 @@ class HardStop(Effect):
             yield cls(f * plane.swing.high, 0.3), 1.0
 
     def bounds(self, seen):
-        """Return where the stop can stand: no body has been where it would not let it."""
-        return {"limit": (seen.reach, math.inf)}
+        """Return where the stop can stand: no body has been where it would not let it.
+
+        Nor does any move between stops nearer to each other than its way from one sample to the next.
+        """
+        least = seen.speed * seen.dt
+        apart = 0.5 * least if self.lower is None else self.lower + least
+        return {"limit": (max(seen.reach, apart), math.inf)}

@@ -15,6 +15,7 @@ from ..parts.page import MODEL, OTHER, legend_above, page
 OF = {
     "output": "error [% of the output's rms]",
     "acceleration": "error of the acceleration [% of its rms]",
+    "force": "error [% of the force's rms]",
     "N": "error [% of |N|]",
 }
 """What errors are drawn as shares of."""
@@ -57,7 +58,7 @@ def plot_ladder(study, *, title=None, width=None) -> ct.ControlPlot:
         ax.set_xlim(-0.6, max(len(steps), 2) - 0.4)
         room = max(int(drawn.width * 0.8 * 72 / (max(len(steps), 2) * 0.58 * small)), 6)
         ax.set_xticks(at, [_in_lines(s.signs or ("refitted",), room) for s in steps])
-        ax.set_ylabel(OF[study.measure])
+        ax.set_ylabel(study.model.coordinates.text(OF[study.measure]))
         legend_above(ax, "Error of every step" if title is None else title)
         return drawn.finished([*bars, [noise]])
 

@@ -212,7 +212,7 @@ def _across(laws, motion, node, z, largest, rtol, pace, work):
             factor = STEP_GROWTH
             if error > 0.0:
                 factor = min(max(STEP_SAFETY * error ** (-1.0 / 3.0), IMPOSED_SHRINK), STEP_GROWTH)
-            if not factor > 0.0:  # NaN: shorter
+            elif not error <= 0.0:  # NaN, as where |z|^127 overflows: shorter
                 factor = IMPOSED_SHRINK
             if error <= 1.0:
                 break
