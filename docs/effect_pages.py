@@ -7,6 +7,7 @@ the same machine. An effect that joins the library gets its page with no change 
 import dataclasses
 import inspect
 import math
+import warnings
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -139,7 +140,9 @@ def characteristic(effect, bare, full, path):
 def on_plane(bare, full, path):
     """Draw N with the effect over N without, at three amplitudes, over frequency."""
     A, omega = np.array([3.0, 6.0, 18.0]), np.geomspace(1.5, 30, 40)
-    N0, N1 = (cdf.describing_function_family(b, A, omega).N for b in (bare, full))
+    with warnings.catch_warnings():  # an average, where a motion has no period, is what is drawn
+        warnings.filterwarnings("ignore", ".*aperiodic")
+        N0, N1 = (cdf.describing_function_family(b, A, omega).N for b in (bare, full))
     ratio = np.where(np.abs(N1) > 1e-3 * np.abs(N0), N1 / N0, np.nan)  # at less the body does not move
     words = full.coordinates
     figure, axes = plt.subplots(1, 2, figsize=(6.6, 2.6), layout="constrained")

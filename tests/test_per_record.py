@@ -290,11 +290,11 @@ def test_directions_are_told_by_record():
     assert told[0].startswith(
         "m and k of a cannot be distinguished on these data: raising m while lowering k of a"
     )
-    assert told[1] == "k of a and b has no influence on these data: its value is the start value."
+    assert told[1] == "k of a and b has no influence on these data, which do not tell its value."
     assert len(told) == 2 and undetermined(fit) == {"m"}
     own["k"]["c"] = own["k"]["a"]
     fit.null = [(0.0, [("k", r, 1.0)]) for r in "abc"]
-    assert doubts(fit) == ("k has no influence on these data: its value is the start value.",)
+    assert doubts(fit) == ("k has no influence on these data, which do not tell its value.",)
     assert undetermined(fit) == {"k"}
 
 

@@ -184,7 +184,7 @@ def doubts(found: FitResult) -> tuple[str, ...]:
                 alone.setdefault(k, {})[record] = None
     for k, records in alone.items():
         lines.append(
-            f"{_of(k, [*records], found)} has no influence on these data: its value is the start value."
+            f"{_of(k, [*records], found)} has no influence on these data, which do not tell its value."
         )
     doubtful = undetermined(found)
     for k in found.names:

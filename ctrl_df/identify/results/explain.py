@@ -106,8 +106,8 @@ def explain(d, words) -> str:
     doubts = "".join(f" {s}" for s in d.doubts)
     return (
         f"Missing: {named(first.effect)} ({values_of(first)}).{shows} With it the error falls from {size}; "
-        f"probability {sure(certainty(d.ranking))}.{same}{doubts}"
-        + (f" Without it, {where[0].lower() + where[1:]}" if where else "")
+        f"probability {sure(certainty(d.ranking))}{' of it and its equals' if first.equivalents else ''}."
+        f"{same}{doubts}" + (f" Without it, {where[0].lower() + where[1:]}" if where else "")
     )
 
 

@@ -20,7 +20,7 @@ def uncertainty(found: FittedTable) -> tuple[np.ndarray, dict[str, float], dict[
     size = np.linalg.norm(j, axis=0)
     for k, s in zip(names, size, strict=True):
         if s < FLAT_COLUMN * max(float(size.max()), NOTHING):
-            doubtful[k] = f"{k} has no influence on these data: its value is the start value."
+            doubtful[k] = f"{k} has no influence on these data, which do not tell its value."
     live = [i for i, k in enumerate(names) if k not in doubtful]
     residual = float(found.weighted @ found.weighted) / max(len(found.weighted) - len(live), 1)
     covariance = np.full((len(names), len(names)), np.inf)
