@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 import ctrl_df as cdf
+from ctrl_df.identify.data.imposed import imposed_motion, without_ends
 from ctrl_df.simulate.imposed import path_of
 
 BASE = cdf.Massless().with_effect(cdf.Coulomb(50.0)).with_effect(cdf.Viscous(100.0))
@@ -267,9 +268,44 @@ def test_a_measured_velocity_is_used():
     )
     beside = cdf.compare(BASE, run)
     assert "measured velocity" in str(beside)
-    extra = np.asarray(beside.simulated) - forces(BASE, TIMES, x)
+    (used,) = (r.record for r in beside.records)
+    v, plain = (signal[np.searchsorted(TIMES, used.t)] for signal in (v, forces(BASE, TIMES, x)))
+    extra = np.asarray(beside.simulated) - plain
     moving = np.abs(v) > 0.05
     np.testing.assert_allclose(extra[moving], 50.0 * v[moving], atol=0.5)
+
+
+def test_the_ends_of_a_record_are_left_out():
+    """Of its low-passed motion a reversal at the begin had a direction of its own: 89 N at one sample."""
+    t, rng = np.arange(0.0, 4.0, 0.005), np.random.default_rng(1)
+    parts = ((0.02, 2.6, 1.2), (0.008, 7.1, 2.0), (0.002, 17.0, 1.2))  # it turns at 7 ms
+    x, v, a = (sum(size * w**n * np.sin(w * t + p + n * np.pi / 2) for size, w, p in parts) for n in range(3))
+    true = cdf.Mass(20.0, [cdf.Coulomb(50.0), cdf.Viscous(100.0)])
+    y = 20.0 * a + 50.0 * np.sign(v) + 100.0 * v
+    run = cdf.Measurement(
+        t, x + 5e-4 * x.std() * rng.standard_normal(t.size), y + 0.3 * rng.standard_normal(t.size),
+        input_unit="m", output_unit="N",
+    )  # fmt: skip
+    beside = cdf.compare(true, run)
+    (used,) = (r.record for r in beside.records)
+    ends = used.t[0] - t[0], t[-1] - used.t[-1]
+    motion = imposed_motion(used)
+    assert min(ends) * motion.cutoff >= 1.0 and max(ends) < 1.0 / motion.cutoff + 0.01
+    assert f"less {motion.ends:.3g} s at either end" in str(beside)
+    # measured: 2.1 N, of the noise in force and place
+    assert np.max(np.abs(beside.residual)) < 3.0
+    # nothing more is lost to who asks again, and the motion is still that of the whole record
+    again = cdf.compare(true, used).records[0].record
+    assert len(again) == len(used)
+    inner = np.searchsorted(t, used.t)
+    np.testing.assert_array_equal(motion.x, imposed_motion(run).x[inner])
+    assert motion.path.count == len(used) and motion.path.nodes[0, 0] == used.t[0]
+
+
+def test_a_record_too_short_to_lose_its_ends_keeps_them():
+    t = 0.01 * np.arange(12)
+    run = cdf.Measurement(t, 0.01 * np.sin(30 * t), np.cos(30 * t), input_unit="m", output_unit="N")
+    assert without_ends(run) is run
 
 
 def test_records_of_other_quantities_are_refused():

@@ -39,6 +39,14 @@ class Path:
         """Number of samples."""
         return int(self.samples.max()) + 1
 
+    def between(self, first: int, last: int) -> Path:
+        """Return the motion from sample `first` to before `last`."""
+        begin, end = np.flatnonzero((self.samples == first) | (self.samples == last - 1))
+        nodes, samples = self.nodes[begin : end + 1].copy(), self.samples[begin : end + 1]
+        nodes[0, 4] = nodes[1, 4]  # no piece is before the first
+        inside = (self.open >= first) & (self.open < last)
+        return Path(nodes, np.where(samples < 0, -1, samples - first), self.open[inside] - first)
+
 
 def path_of(t, x, v=None, *, still: float = 0.0, slow: float = 0.0) -> Path:
     """Return the motion through positions x (n,) at times t (n,).

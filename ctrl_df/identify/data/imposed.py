@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,9 +12,10 @@ from ...simulate.imposed import Path, path_of
 from ...units import dimension
 from . import derivatives
 from .measurement import Measurement
-from .thresholds import SLOW, STILL
+from .thresholds import LOW_PASS_ENDS, MINIMUM, SLOW, STILL
 
 _MOTIONS: WeakKeyDictionary[Measurement, ImposedMotion] = WeakKeyDictionary()
+_WITHOUT_ENDS: WeakKeyDictionary[Measurement, Measurement] = WeakKeyDictionary()
 
 
 def imposes_motion(record: Measurement) -> bool:
@@ -37,6 +38,10 @@ class ImposedMotion:
         Whether the speed is a measured one (low-passed at its own cutoff).
     path : Path
         The same between samples.
+    lowest : float
+        [Hz] of the low-passes of position and speed: what they know least of the ends by.
+    ends : float
+        [s] that were left out at either end (see `without_ends`).
     """
 
     x: np.ndarray
@@ -45,11 +50,20 @@ class ImposedMotion:
     cutoff: float
     measured: bool
     path: Path
+    lowest: float
+    ends: float = 0.0
 
     def __str__(self) -> str:
         """Return how it was read, as a clause."""
         speed = "the measured velocity" if self.measured else "a cubic spline"
-        return f"the motion low-passed at {self.cutoff:.3g} Hz, {speed} between samples"
+        ends = f", less {self.ends:.3g} s at either end" if self.ends else ""
+        return f"the motion low-passed at {self.cutoff:.3g} Hz, {speed} between samples{ends}"
+
+    def between(self, first: int, last: int, ends: float) -> ImposedMotion:
+        """Return the motion from sample `first` to before `last`, with `ends` left out, as it was found."""
+        part = slice(first, last)
+        path = self.path.between(first, last)
+        return replace(self, x=self.x[part], v=self.v[part], a=self.a[part], path=path, ends=ends)
 
 
 def imposed_motion(record: Measurement) -> ImposedMotion:
@@ -64,10 +78,41 @@ def imposed_motion(record: Measurement) -> ImposedMotion:
     return known
 
 
+def without_ends(record: Measurement) -> Measurement:
+    """Return a record without its ends, where the low-pass of its motion has none of what lies beyond.
+
+    There speeds and accelerations are those of a continuation that nobody recorded, and near a reversal the
+    direction may be. The motion stays the one found from the whole record. Records that have lost their ends
+    already, and such of which too little would be left, are returned as they are.
+    """
+    motion = imposed_motion(record)
+    if motion.ends:
+        return record
+    known = _WITHOUT_ENDS.get(record)
+    if known is None:
+        known = _inner(record, motion)
+        if known is not record:  # which would keep itself alive
+            _WITHOUT_ENDS[record] = known
+    return known
+
+
+def _inner(record, motion) -> Measurement:
+    ends = LOW_PASS_ENDS / motion.lowest
+    first, last = np.searchsorted(record.t, (record.t[0] + ends, record.t[-1] - ends)).tolist()
+    if last - first < MINIMUM:
+        return record
+    inner = record.slice(record.t[first], record.t[last - 1])
+    _MOTIONS[inner] = motion.between(first, last, ends)
+    return inner
+
+
 def _motion(record) -> ImposedMotion:
     t = record.t
     x, cutoff = _smoothed(t, record.u)
-    v = None if record.velocity is None else _smoothed(t, record.velocity)[0]
+    v, lowest = None, cutoff
+    if record.velocity is not None:
+        v, own = _smoothed(t, record.velocity)
+        lowest = min(cutoff, own)
     # white noise below the cutoff, and what differentiation makes of it
     noise, band = derivatives.noise_floor(t, record.u), 2 * cutoff * record.dt
     place = noise * math.sqrt(band)
@@ -76,7 +121,7 @@ def _motion(record) -> ImposedMotion:
         speed = derivatives.noise_floor(t, record.velocity) * math.sqrt(min(band, 1.0))
     path = path_of(t, x, v, still=STILL * place, slow=SLOW * speed)
     _, x, v, a, _ = path.nodes[path.samples >= 0].T
-    return ImposedMotion(x, v, a, cutoff, record.velocity is not None, path)
+    return ImposedMotion(x, v, a, cutoff, record.velocity is not None, path, lowest)
 
 
 def _smoothed(t, y) -> tuple[np.ndarray, float]:

@@ -50,7 +50,8 @@ class Measurement:
     time_unit : str
         Of `t`, such as ``ms``.
     input_hold : {'zoh', 'linear'}
-        What the input did between samples: held its value, or varied linearly.
+        What the input did between samples: held its value, or varied linearly. A motion that is imposed, or
+        that of a base, is smooth whatever is said here.
     velocity : array_like or None, shape (n,)
         Measured velocity, if there was a sensor for it.
     velocity_unit : str or None
@@ -519,9 +520,10 @@ class Measurement:
         rate = f"dt {self.dt:g} s" if self.regular else f"irregular, median dt {self.dt:g} s"
         extra = "" if self.velocity is None else ", velocity"
         extra += "".join(f", {k}" for k in self.channels)  # type: ignore[union-attr]
+        held = quantities.between_samples(self.input_unit, self.output_unit, self.input_hold)
         return (
             f"Measurement({self.name!r}: {len(self)} samples, {self.t[0]:g} to {self.t[-1]:g} s, {rate}, "
-            f"input [{self.input_unit}] {self.input_hold}, output [{', '.join(self.units.values())}]{extra})"
+            f"input [{self.input_unit}] {held}, output [{', '.join(self.units.values())}]{extra})"
         )
 
 

@@ -71,6 +71,20 @@ def stated(keyword: str, word: str | None, unit: str | None, usual: str) -> tupl
     return found, *si_unit(unit)
 
 
+def between_samples(into: str, out: str, hold: str) -> str:
+    """Return what an input in unit `into` does between samples, `hold` being stated, as a word or a few.
+
+    What is imposed, or moves a base, is a motion and smooth; a place or a speed may be the reference of a
+    loop, too.
+    """
+    given = quantity_of(into)
+    if given not in _MOTION:
+        return hold
+    if given == "acceleration" or quantity_of(out) not in _MOTION:
+        return "smooth"
+    return f"{hold} as a reference, smooth as the motion of a base"
+
+
 def with_unit(channel) -> tuple[Any, str | None]:
     """Return array and unit of a channel given as an array or as a pair of both."""
     if isinstance(channel, tuple | list) and len(channel) == 2 and isinstance(channel[1], str):

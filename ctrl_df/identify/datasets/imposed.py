@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from ..data.imposed import imposes_motion
+from ..data.imposed import imposes_motion, without_ends
 from ..selection.kinematic_searches import ImposedSearch
 from .over_time import TimeDataset
 
 
 class ImposedDataset(TimeDataset):
-    """Records with motion as input and force as output."""
+    """Records with motion as input and force as output, but for their ends, which low-passes do not know."""
 
     def __init__(self, records, validation=()):
-        super().__init__(records, validation)
-        for record in (*self.records, *self.validation):
+        for record in (*records, *validation):
             if not imposes_motion(record):
                 raise ValueError(
                     "records with motion as input cannot be combined with records with force as input; got "
                     f"{record.name!r} (input in {record.input_unit}) among the former. Fit them one after "
                     "the other."
                 )
+        super().__init__(*(map(without_ends, rs) for rs in (records, validation)))
 
     def search(self, block, free):
         """Return the search in force."""
