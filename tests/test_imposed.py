@@ -249,6 +249,13 @@ def test_waves_much_shorter_than_the_stroke(core, wave):
     assert found.best.parameters["phase"] == pytest.approx(1.0, abs=0.05)
 
 
+def test_a_force_over_the_place_that_nothing_explains_is_no_noise():
+    """Its spectrum is one of slow noise, and no candidate lowers the error."""
+    wave = cdf.PositionRipple(8.0, wavelength=0.005, phase=1.0)
+    found = cdf.diagnose(GUESS, record(BASE.with_effect(wave), 3), candidates=["quadratic_drag"])
+    assert found.verdict == "unknown"
+
+
 def test_a_machine_that_turns_and_one_with_inertia():
     base = cdf.Inertia(0.05).with_effect(cdf.Coulomb(0.5)).with_effect(cdf.Viscous(0.1))
     truth = base.with_effect(cdf.Gravity(1.2, 0.3))
