@@ -242,6 +242,34 @@ def test_nothing_is_found_where_nothing_is_hidden():
     assert found.verdict == "none"
 
 
+@pytest.mark.parametrize(
+    ("core", "wave"),
+    [
+        (cdf.Massless(), cdf.PositionRipple(8.0, wavelength=0.0045, phase=1.0)),
+        (cdf.Mass(20.0), cdf.PositionRipple(8.0, wavelength=0.0025, phase=1.0)),
+        (cdf.Massless(), cdf.PositionDependentFriction(8.0, wavelength=0.0045, phase=1.0)),
+    ],
+)
+def test_waves_much_shorter_than_the_stroke(core, wave):
+    """Only the force shows them: a stroke of 67 mm has 15 and 27 of them."""
+    laws = [cdf.Coulomb(50.0), cdf.Viscous(100.0)]
+    run = record(core.with_effect(laws[0]).with_effect(laws[1]).with_effect(wave), 3)
+    guess = core.with_effect(cdf.Coulomb(40.0)).with_effect(cdf.Viscous(130.0))
+    found = cdf.diagnose(guess, run, candidates=["position_ripple", "position_dependent_friction"])
+    assert (found.verdict, found.best.id) == ("effect", wave.id)
+    assert found.best.nrmse < 0.015
+    assert found.best.parameters["wavelength"] == pytest.approx(wave.wavelength, rel=1e-3)
+    assert found.best.parameters["amplitude"] == pytest.approx(8.0, rel=0.02)
+    assert found.best.parameters["phase"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_force_over_the_place_that_nothing_explains_is_no_noise():
+    """Its spectrum is one of slow noise, and no candidate lowers the error."""
+    wave = cdf.PositionRipple(8.0, wavelength=0.005, phase=1.0)
+    found = cdf.diagnose(GUESS, record(BASE.with_effect(wave), 3), candidates=["quadratic_drag"])
+    assert found.verdict == "unknown"
+
+
 def test_a_machine_that_turns_and_one_with_inertia(tmp_path):
     base = cdf.Inertia(0.05).with_effect(cdf.Coulomb(0.5)).with_effect(cdf.Viscous(0.1))
     truth = base.with_effect(cdf.Gravity(1.2, 0.3))

@@ -34,6 +34,8 @@ class ImposedMotion:
         Position, speed and acceleration at the samples, of the signal below `cutoff`.
     cutoff : float
         [Hz] of the zero-phase low-pass that the position has passed.
+    error : float
+        [m] rms that noise leaves in the position below `cutoff`.
     measured : bool
         Whether the speed is a measured one (low-passed at its own cutoff).
     path : Path
@@ -48,6 +50,7 @@ class ImposedMotion:
     v: np.ndarray
     a: np.ndarray
     cutoff: float
+    error: float
     measured: bool
     path: Path
     lowest: float
@@ -121,7 +124,7 @@ def _motion(record) -> ImposedMotion:
         speed = derivatives.noise_floor(t, record.velocity) * math.sqrt(min(band, 1.0))
     path = path_of(t, x, v, still=STILL * place, slow=SLOW * speed)
     _, x, v, a, _ = path.nodes[path.samples >= 0].T
-    return ImposedMotion(x, v, a, cutoff, record.velocity is not None, path, lowest)
+    return ImposedMotion(x, v, a, cutoff, place, record.velocity is not None, path, lowest)
 
 
 def _smoothed(t, y) -> tuple[np.ndarray, float]:

@@ -61,6 +61,7 @@ def remainder(
     # what rounding errs by may go with the motion
     telling = bool(missed) and missed[0].evidence > significant and missed[0].rms > rounding_error(best)
     structure = missed[0].rms if telling else 0.0
+    structure = max(structure, _as_curve(best, data))
     if not rounded and not data.disturbed:
         # what the right model misses over long segments it misses over short ones
         most = min(most, _noise_most(best, data))
@@ -86,6 +87,18 @@ def remainder(
     shows = telling if rounded else own > LEFT and share > FOLLOWED
     more = shows and not (data.disturbed or data.noise_free)
     return Remainder(spread, max(structure, outside), unexplained, missed, more=more)
+
+
+def _as_curve(best: CandidateFit, data: SegmentedData) -> float:
+    """Return how much of an error under an imposed motion is a curve over a quantity of the motion.
+
+    There the error is the force that is missing: one that repeats over the place, say, is not noise however
+    much its spectrum looks like that of slow noise. What varies over time alone may be noise.
+    """
+    if not all(facts(r).imposed for r in data.train.records):
+        return 0.0
+    share = max((s for name, s in _curves(best, data).items() if name != "time"), default=0.0)
+    return math.sqrt(share) * best.train.rmse if share > CURVE_SHARE else 0.0
 
 
 def _noise_most(best: CandidateFit, data: SegmentedData) -> float:
@@ -160,15 +173,17 @@ def located(
 
 def _curve(base: CandidateFit, data: SegmentedData) -> list[str]:
     """Return the region in which the smoothed missing force of the longest record is a curve, if any."""
-    record = max(data.train.records, key=len)
-    try:
-        force = missing_force(base.block, record)
-    except ValueError:  # it is not to be had of this record
-        return []
-    if not force.significant:
-        return []
-    name, share = next(iter(force.shares.items()))
+    name, share = next(iter(_curves(base, data).items()), ("", 0.0))
     return [CURVES[name]] if share > CURVE_SHARE else []
+
+
+def _curves(tried: CandidateFit, data: SegmentedData) -> dict[str, float]:
+    """Return the shares of the smoothed missing force of the longest record; none if not significant."""
+    try:
+        force = missing_force(tried.block, max(data.train.records, key=len))
+    except ValueError:  # it is not to be had of this record
+        return {}
+    return force.shares if force.significant else {}
 
 
 def _sentences(left: Remainder, missed: list[FreeForce], where, measure: str) -> str:

@@ -12,6 +12,9 @@ over has noise of two kinds, of the sensor and of forces; each frequency weighs 
 it (Whittle's likelihood), so that either may prevail. Pauses do not count: friction is whatever the drive is
 there, and would pass for noise of forces. Then k is scanned, from the stroke down to what the smoothed
 position resolves.
+
+Where the motion was imposed the force is what was measured: nothing is integrated, and the equation is one of
+the force itself (`ImposedSpectrum`).
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...values.per_record import PerRecord
+from ..data.imposed import imposed_motion
 from ..prediction.segments import facts
 from ..thresholds import DEPENDENT, NEARLY_NOTHING, NOISE_FREE, NOTHING, SLOWLY
 from .thresholds import (
@@ -76,6 +80,8 @@ class RippleSpectrum:
         Whether the wave sought is of friction, which acts against the motion.
     """
 
+    _differences = 2
+
     def __init__(
         self,
         records: Sequence,
@@ -85,16 +91,14 @@ class RippleSpectrum:
         reversing: bool = False,
     ):
         self.records, self.elastic = records, elastic
-        self.places = [_smoothed(r) for r in records]
+        self.places = [self._place(r) for r in records]
         self._senses = [-np.sign(facts(r).velocity) if reversing else 1.0 for r in records]
         self.span = max(float(np.ptp(x)) for x in self.places)
-        # the band of the motion and some of the noise above it
-        band = min(facts(r).half for r in records) // RIPPLE_BAND
         moving = [_moving(r) for r in records]
         if not any(_runs(w, 1, m) for w, m in zip(segments, moving, strict=True)):
             moving = [np.ones(len(r), bool) for r in records]
         longest = max(j - i for w, m in zip(segments, moving, strict=True) for i, j in _runs(w, 1, m))
-        self._size = max(band, math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
+        self._size = max(self._band(), math.ceil(max(map(len, records)) / SPECTRUM_SAMPLES), 1)
         self._size = max(min(self._size, longest // RIPPLE_RUN), 1)
         self._runs = [_runs(w, self._size, m) for w, m in zip(segments, moving, strict=True)]
         forces = [_forces(r, x) for r, x in zip(records, self.places, strict=True)]
@@ -102,9 +106,9 @@ class RippleSpectrum:
         for k in known:
             pairs = self._apart(self._response([np.exp(1j * k * x) for x in self.places]))
             base += [[part(p) for p in pair] for pair in pairs for part in (np.real, np.imag)]
-        given = [_integral(_held(r), r.t) for r in records]
+        given, measured = self._signals()
         self._base = [self._parts(given), *base]
-        self._y = self._parts([facts(r).place for r in records])
+        self._y = self._parts(measured)
         self._weights = [np.ones(_length(y) // 2 + 1) for y in self._y]
         for _ in range(RIPPLE_ROUNDS):
             w = self._regressed(self._base)
@@ -120,7 +124,7 @@ class RippleSpectrum:
         """Return the ripples that explain most, the best first."""
         if not self.span > 0 or not self._power > 0:
             return []
-        finest = self.span / (RIPPLE_COARSEST * max(_blur(r) for r in self.records))
+        finest = self.span / (RIPPLE_COARSEST * max(self._blur(r) for r in self.records))
         turns = np.arange(RIPPLE_LONGEST, max(min(finest, RIPPLE_TURNS), 2.0), RIPPLE_STEP)
         gains = self._scan(turns)
         found: list[Wave] = []
@@ -134,7 +138,7 @@ class RippleSpectrum:
         return found
 
     def wave(self, k: float) -> Wave | None:
-        """Return the ripple of wave number `k` [rad/m], fitted; None where the mass would be negative."""
+        """Return the ripple of wave number `k` [rad/m], fitted; None where that makes no sense."""
         waves = self._waves(k)
         pairs = self._apart(self._response(waves))
         # what a drive may have besides blurs the parameters of what it does have
@@ -142,19 +146,19 @@ class RippleSpectrum:
         plain = [column for column, there in zip(self._base, has, strict=False) if there]
         columns = [[part(p) for p in pair] for pair in pairs for part in (np.imag, np.real)]
         w = self._regressed([*plain, *columns])
-        if w[0] <= 0:
+        if (units := self._units(float(w[0]))) is None:
             return None
-        mass, each = 1 / w[0], w[len(plain) :].reshape(-1, 2)
+        (mass, force), each = units, w[len(plain) :].reshape(-1, 2)
         size = float(np.mean([math.hypot(*ab) for ab in each]))
         phase = PerRecord.angles([r.name for r in self.records], [math.atan2(b, a) for a, b in each])
         return Wave(
             self._gain(waves),
-            mass * size,
+            force * size,
             2 * math.pi / k,
             phase,
             mass,
-            float(mass * w[1]),
-            float(mass * w[2]),
+            float(force * w[1]),
+            float(force * w[2]),
         )
 
     def _waves(self, k: float) -> list[np.ndarray]:
@@ -190,6 +194,32 @@ class RippleSpectrum:
     def _without(self, x) -> np.ndarray:
         return x - self._basis @ (self._basis.T @ x)
 
+    def _band(self) -> int:
+        """Return samples over which means keep the band of the motion and some of the noise above it."""
+        return min(facts(r).half for r in self.records) // RIPPLE_BAND
+
+    def _signals(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Return what the mass goes with, here what the force given does to 1 kg; and what was measured."""
+        given = [_integral(_held(r), r.t) for r in self.records]
+        return given, [facts(r).place for r in self.records]
+
+    def _units(self, weight: float) -> tuple[float, float] | None:
+        """Return the mass, and the force of a weight of one; `weight`: of what the mass goes with.
+
+        None where the mass would be negative.
+        """
+        return (1 / weight, 1 / weight) if weight > 0 else None
+
+    def _place(self, record) -> np.ndarray:
+        """Return the position without the noise above the band of the motion."""
+        x = _integral(facts(record).velocity, record.t)
+        return x - np.mean(x) + np.mean(facts(record).place)
+
+    def _blur(self, record) -> float:
+        """Return the error of the smoothed position [m]."""
+        known = facts(record)
+        return max(known.noise / math.sqrt(2 * known.half), NOISE_FREE * known.position)
+
     def _response(self, forces) -> list[np.ndarray]:
         """Return what forces, one array a record, do to a free mass of 1 kg, as `_parts` does."""
         return self._parts(
@@ -206,7 +236,7 @@ class RippleSpectrum:
         parts = []
         for s, runs in zip(signals, self._runs, strict=True):
             for i, j in runs:
-                d = np.diff(s[i:j].reshape(-1, self._size).mean(axis=1), 2)
+                d = np.diff(s[i:j].reshape(-1, self._size).mean(axis=1), self._differences)
                 # faded at the ends: sensor noise is a million times stronger at high than at low frequencies
                 parts.append(d * _fade(len(d)))
         return parts
@@ -215,6 +245,35 @@ class RippleSpectrum:
         """Return the weighted spectra of parts, real and imaginary."""
         spectra = [np.fft.rfft(s, _length(s)) * w for s, w in zip(parts, self._weights, strict=True)]
         return np.concatenate([c for s in spectra for c in (s.real, s.imag)])
+
+
+class ImposedSpectrum(RippleSpectrum):
+    """Records of an imposed motion and the force that it took, as one linear regression of that force.
+
+    It is mass times acceleration, less friction and the wave, as these act on the mass. The motion knows
+    nothing of the wave, and its band nothing of that of the force.
+    """
+
+    _differences = 0
+
+    def _band(self) -> int:
+        return 1
+
+    def _signals(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        return [imposed_motion(r).a for r in self.records], [facts(r).load for r in self.records]
+
+    def _units(self, weight: float) -> tuple[float, float]:
+        return weight, 1.0
+
+    def _place(self, record) -> np.ndarray:
+        return imposed_motion(record).x
+
+    def _blur(self, record) -> float:
+        return max(imposed_motion(record).error, NOISE_FREE * facts(record).position)
+
+    def _response(self, forces) -> list[np.ndarray]:
+        """Return what it takes to move against forces."""
+        return self._parts([-f for f in forces])
 
 
 @functools.lru_cache(maxsize=64)
@@ -238,18 +297,6 @@ def _held(record) -> np.ndarray:
 
 def _integral(f, t) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(t))))
-
-
-def _smoothed(record) -> np.ndarray:
-    """Return the position without the noise above the band of the motion."""
-    x = _integral(facts(record).velocity, record.t)
-    return x - np.mean(x) + np.mean(facts(record).place)
-
-
-def _blur(record) -> float:
-    """Return the error of the smoothed position [m]."""
-    known = facts(record)
-    return max(known.noise / math.sqrt(2 * known.half), NOISE_FREE * known.position)
 
 
 def _moving(record) -> np.ndarray:

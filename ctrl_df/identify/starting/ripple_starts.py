@@ -9,9 +9,10 @@ import numpy as np
 
 from ...blocks.effect import Effect
 from ...values.per_record import PerRecord
+from ..prediction.segments import facts
 from .extend import extended
 from .regression import own_values
-from .ripple_spectrum import RippleSpectrum, Wave, apart
+from .ripple_spectrum import ImposedSpectrum, RippleSpectrum, Wave, apart
 from .thresholds import LONG_WAVE_TURNS, LONG_WAVES, RIPPLE_LONGEST, RIPPLE_STEP, RIPPLES, WAVE_TRIED
 
 
@@ -76,7 +77,9 @@ def waves(screen, known: Sequence[float], reversing: bool) -> Iterator[tuple[Wav
         return
     has = [2 * math.pi / length for length in known]
     elastic = screen.block.core.position_dependent
-    search = RippleSpectrum(view.records, view.segments, has, elastic, reversing)
+    imposed = all(facts(r).imposed for r in view.records)
+    spectrum = ImposedSpectrum if imposed else RippleSpectrum
+    search = spectrum(view.records, view.segments, has, elastic, reversing)
     # where friction drifts the fit over segments knows the mass better than whitened forces do
     plain = all(map(_linear, screen.block.effects)) and not screen.data.disturbed
     for wave in search.best(RIPPLES):
